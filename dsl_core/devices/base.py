@@ -1,0 +1,170 @@
+"""The verbs of a rig's devices and what they promise.
+
+A driver implements one of these abstract classes in one file. Capabilities, latency and identity are
+data (``info``), not methods. Every method may raise `DeviceError`, with a message that names the
+device, what it was asked and what to do. Devices are context managers; ``close`` may be called twice.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.frames import Frame
+from dsl_core.model.rig import BayerPattern, Rig
+from dsl_core.model.spectral import SpectralCurve
+
+
+class Device(ABC):
+    """Something that is opened, used and closed."""
+
+    def close(self) -> None:
+        """Release the hardware; a second call does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+@dataclass(frozen=True)
+class CameraInfo:
+    """What a camera is and delivers: the raw mosaic, ``bit_depth`` bits in uint16, right-aligned."""
+
+    model: str
+    serial: str
+    width_px: int
+    height_px: int
+    bayer: BayerPattern
+    bit_depth: int
+    exposure_range_ms: tuple[float, float]
+
+
+class Camera(Device):
+    """Takes one exposure at a time."""
+
+    @property
+    @abstractmethod
+    def info(self) -> CameraInfo:
+        """Identity and capabilities; does not change while the camera is open."""
+
+    @abstractmethod
+    def configure(self, exposure_ms: float) -> float:
+        """Set the exposure and return the one in force; raises `DeviceError` outside the range."""
+
+    @abstractmethod
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        """Expose now and return the frame.
+
+        The exposure starts after the call, so the frame shows what the projector shows at the time of
+        the call. ``frame_id`` rises by at least one from frame to frame. Raises `DeviceError` when no frame
+        arrives in time.
+        """
+
+
+@dataclass(frozen=True)
+class ProjectorInfo:
+    """What a projector is: logical size, and how long a pattern takes to become light."""
+
+    model: str
+    serial: str
+    width_px: int
+    height_px: int
+    latency_ms: float
+    frame_period_ms: float
+
+
+class Projector(Device):
+    """Shows exact pixels."""
+
+    @property
+    @abstractmethod
+    def info(self) -> ProjectorInfo:
+        """Identity and capabilities."""
+
+    @abstractmethod
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show drive levels, shape (height, width) or (height, width, 3), from now on.
+
+        Returns when the pattern is visible (latency included). Raises `DeviceError` for another size
+        or type.
+        """
+
+
+class Stage(Device):
+    """Moves the target along the camera axis."""
+
+    @property
+    @abstractmethod
+    def range_mm(self) -> tuple[float, float]:
+        """Smallest and largest position, mm."""
+
+    @property
+    @abstractmethod
+    def position_mm(self) -> float:
+        """Where the stage is, mm."""
+
+    @abstractmethod
+    def move_to(self, position_mm: float) -> float:
+        """Move, wait until it has settled, and return the position reached, mm."""
+
+
+class Spectroradiometer(Device):
+    """Measures spectral radiance of a spot."""
+
+    @abstractmethod
+    def measure(self) -> SpectralCurve:
+        """Measure once; the curve's unit is W/(sr m2 nm)."""
+
+
+@dataclass
+class DeviceRig:
+    """The devices of one rig, opened together and closed together.
+
+    ``calibration`` is what is known of the rig (the twin knows itself); ``sleep`` is how its clock
+    waits, so that a simulated rig does not have to.
+    """
+
+    name: str
+    camera: Camera
+    projector: Projector
+    stage: Stage | None = None
+    spectroradiometer: Spectroradiometer | None = None
+    calibration: Rig | None = None
+    sleep: Callable[[float], None] | None = None
+    notes: dict[str, str] = field(default_factory=dict)
+
+    def close(self) -> None:
+        """Close every device, also when one of them fails to; raises the first failure at the end."""
+        first: Exception | None = None
+        for device in (self.projector, self.camera, self.stage, self.spectroradiometer):
+            try:
+                if device is not None:
+                    device.close()
+            except Exception as error:  # a broken device must not keep the others open
+                first = first or error
+        if first is not None:
+            raise first
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,46 @@
+"""Frames as captured, and where they come from and go to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.plan import CapturePlan, Shot
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One exposure: the raw mosaic, uint16, shape (rows, columns), in DN, and how it was taken."""
+
+    pixels: NDArray[np.uint16]
+    exposure_ms: float
+    timestamp_s: float = 0.0
+    frame_id: int = 0
+
+
+class FrameSource(Protocol):
+    """A finished scan: a plan and, for every shot of it, a raw mosaic."""
+
+    @property
+    def plan(self) -> CapturePlan:
+        """The plan the frames belong to."""
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The raw mosaic of a shot, shape (rows, columns); raises `StoreError` when it is not there."""
+
+
+class FrameSink(Protocol):
+    """Where a runner puts frames, one by one, safely."""
+
+    def missing(self) -> Iterator[Shot]:
+        """Shots of the plan that are not stored yet, in order."""
+
+    def write(self, shot: Shot, frame: Frame) -> None:
+        """Store a frame so that it survives a crash from this moment on; raises `StoreError`."""
+
+    def close(self) -> None:
+        """Finish; the sink may be reopened later."""

@@ -1,0 +1,162 @@
+"""What to capture: pattern sets, settings and shots, as frozen data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from dsl_core.model.base import Record
+
+
+class GrayCode(Record):
+    """Binary reflected Gray code, each bit followed by its inverse, then white, then black.
+
+    With rows: the published 40 frames of a 640 x 360 projector (10 column and 9 row bits).
+    Columns only: 22.
+    """
+
+    kind: Literal["gray"] = "gray"
+    rows: bool = True
+
+
+class ScanLines(Record):
+    """One white vertical line per frame: line ``i`` covers columns ``[step*i, step*i + width)``."""
+
+    kind: Literal["lines"] = "lines"
+    width_px: int = Field(default=5, ge=1)
+    step_px: int = Field(default=2, ge=1)
+
+
+class LineComb(Record):
+    """Several lines per frame, ``period_px`` apart, moved by ``step_px`` from frame to frame."""
+
+    kind: Literal["comb"] = "comb"
+    width_px: int = Field(default=5, ge=1)
+    step_px: int = Field(default=2, ge=1)
+    period_px: int = Field(default=106, ge=2)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.width_px >= self.period_px:
+            raise ValueError("the lines of a comb must be narrower than its period")
+        return self
+
+
+class Columns(Record):
+    """Any set of column profiles: ``levels[k][x][c]`` in 0..1, radiance relative to full drive."""
+
+    kind: Literal["columns"] = "columns"
+    levels: tuple[tuple[tuple[float, float, float], ...], ...]
+
+
+SpectralSet = Annotated[ScanLines | LineComb | Columns, Field(discriminator="kind")]
+
+
+class Setting(Record):
+    """One camera and projector setting of an HDR bracket: exposure, and pattern drive level 0..1."""
+
+    exposure_ms: float = Field(gt=0)
+    level: float = Field(gt=0, le=1)
+
+
+Role = Literal["code", "spectral", "white", "black"]
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One exposure of a plan.
+
+    ``index`` counts all shots of the plan; ``pattern`` counts within the role's pattern set:
+    ``code`` frames in the order of the code (white and black last, as roles of their own),
+    ``spectral`` frames in the order of the set. ``setting`` is an index into the plan's settings.
+    """
+
+    index: int
+    role: Role
+    pattern: int
+    setting: int
+    exposure_ms: float
+    level: float
+
+
+class CapturePlan(Record):
+    """Everything a scan will do, known before it starts.
+
+    Shots run through the settings one after the other, code first, then the lines, so that
+    exposure and drive level change once.
+    """
+
+    schema_version: Literal[1] = 1
+    name: str = "reference"
+    camera_size_px: tuple[int, int] = (890, 580)
+    projector_size_px: tuple[int, int] = (640, 360)
+    code: GrayCode = GrayCode()
+    spectral: SpectralSet = ScanLines()
+    settings: tuple[Setting, ...] = (
+        Setting(exposure_ms=500.0 / 3.0, level=0.2),
+        Setting(exposure_ms=1000.0 / 3.0, level=0.8),
+    )
+    code_settings: tuple[int, ...] = (0, 1)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not self.settings:
+            raise ValueError("a plan needs at least one setting (exposure and level)")
+        if not self.code_settings or any(not 0 <= i < len(self.settings) for i in self.code_settings):
+            raise ValueError(
+                f"code_settings {self.code_settings} must name settings 0 to {len(self.settings) - 1}"
+            )
+        return self
+
+    @property
+    def code_bits(self) -> tuple[int, int]:
+        """Column bits and row bits (0 when rows are not coded)."""
+        width, height = self.projector_size_px
+        return (width - 1).bit_length(), (height - 1).bit_length() if self.code.rows else 0
+
+    @property
+    def code_count(self) -> int:
+        """Frames of the code without white and black."""
+        return 2 * sum(self.code_bits)
+
+    @property
+    def spectral_count(self) -> int:
+        """Frames of the spectral pattern set."""
+        width = self.projector_size_px[0]
+        match self.spectral:
+            case ScanLines(width_px=w, step_px=s):
+                return max((width - w) // s + 1, 1)
+            case LineComb(step_px=s, period_px=p):
+                return -(-p // s)
+            case Columns(levels=levels):
+                return len(levels)
+
+    def shots(self) -> Iterator[Shot]:
+        """Every exposure, in the order it is taken."""
+        index = 0
+        for i, setting in enumerate(self.settings):
+            # Black is taken at every setting: it is what every other frame of that setting is measured from.
+            roles: list[tuple[Role, int]] = [("black", 1)]
+            if i in self.code_settings:
+                roles = [("code", self.code_count), ("white", 1), ("black", 1)]
+            for role, count in [*roles, ("spectral", self.spectral_count)]:
+                for pattern in range(count):
+                    yield Shot(index, role, pattern, i, setting.exposure_ms, setting.level)  # type: ignore[arg-type]
+                    index += 1
+
+    @property
+    def shot_count(self) -> int:
+        """Number of exposures."""
+        return sum(1 for _ in self.shots())
+
+    @property
+    def raw_bytes(self) -> int:
+        """Bytes of all raw mosaics before compression (16 bit a pixel)."""
+        return 2 * self.camera_size_px[0] * self.camera_size_px[1] * self.shot_count
+
+    def duration_s(self, latency_ms: float = 0.0) -> float:
+        """Seconds the exposures and a latency per frame take together."""
+        return sum(shot.exposure_ms + latency_ms for shot in self.shots()) / 1000.0

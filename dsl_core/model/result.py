@@ -1,0 +1,113 @@
+"""The result of a scan: names, units and flags of an `xarray.Dataset`."""
+
+from __future__ import annotations
+
+from enum import IntFlag
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SCHEMA_VERSION = 1
+
+
+class Flag(IntFlag):
+    """Why a pixel is not what it could be; 0 means nothing is wrong."""
+
+    NO_LIGHT = 1
+    SATURATED = 2
+    CODE_UNSURE = 4
+    OUT_OF_RANGE = 8
+    NOT_REFINED = 16
+    DEPTH_EDGE = 32
+    BANDS_UNREACHED = 64
+    AT_BOUND = 128
+    POOR_FIT = 256
+    NON_FINITE = 512
+
+
+REASONS: dict[Flag, str] = {
+    Flag.NO_LIGHT: "too little projector light reaches this pixel (shadow, black or out of the beam)",
+    Flag.SATURATED: "a frame that is needed here is saturated in every setting",
+    Flag.CODE_UNSURE: "a bit of the binary code is too close to its inverse to be decided",
+    Flag.OUT_OF_RANGE: "the triangulated depth is outside the calibrated range",
+    Flag.NOT_REFINED: "the column could not be refined below one pixel; depth is coarse",
+    Flag.DEPTH_EDGE: "depth jumps next to this pixel; normal and shading are unreliable",
+    Flag.BANDS_UNREACHED: "no first order reaches some bands; prior and zero-order colour decide there",
+    Flag.AT_BOUND: "the spectrum touches a bound of the solver in some bands",
+    Flag.POOR_FIT: "the measured intensities do not fit any spectrum (mixed materials, interreflection, motion)",
+    Flag.NON_FINITE: "the input or an intermediate value was not a finite number",
+}
+
+#: Flags after which depth, respectively the spectrum, is not given at all (NaN).
+DEPTH_INVALID = Flag.NO_LIGHT | Flag.CODE_UNSURE | Flag.OUT_OF_RANGE | Flag.NON_FINITE
+SPECTRUM_INVALID = DEPTH_INVALID
+
+
+class Reach(IntFlag):
+    """Which light measured a band of a pixel."""
+
+    PLUS_ONE = 1
+    MINUS_ONE = 2
+    ZERO_ONLY = 4
+
+
+def reasons(flags: int) -> list[str]:
+    """Sentences for every bit of a pixel's flags.
+
+    >>> reasons(0)
+    []
+    >>> reasons(Flag.NO_LIGHT)[0].startswith("too little")
+    True
+    """
+    return [text for flag, text in REASONS.items() if flags & flag]
+
+
+#: name -> (dimensions, unit, long name); every variable a complete result holds.
+VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "depth_mm": (("y", "x"), "mm", "depth along the camera axis"),
+    "depth_std_mm": (("y", "x"), "mm", "standard deviation of depth"),
+    "column_px": (("y", "x"), "px", "projector column through the zero order"),
+    "column_std_px": (("y", "x"), "px", "standard deviation of the column"),
+    "points_mm": (("axis", "y", "x"), "mm", "point in camera coordinates"),
+    "normals": (("axis", "y", "x"), "1", "unit normal in camera coordinates, towards the camera"),
+    "shading": (("y", "x"), "1", "cosine and distance factor of the illumination"),
+    "reflectance": (("wavelength_nm", "y", "x"), "1", "reflectance on the Spectralon scale"),
+    "reflectance_std": (("wavelength_nm", "y", "x"), "1", "posterior standard deviation of reflectance"),
+    "data_share": (("wavelength_nm", "y", "x"), "1", "share of the answer decided by data, not by the prior"),
+    "reach": (("wavelength_nm", "y", "x"), "bitmask", "orders that reach the band (1: +1, 2: -1, 4: zero only)"),
+    "rgb": (("channel", "y", "x"), "1", "sRGB under D65, 0..1"),
+    "flags": (("y", "x"), "bitmask", "reasons why the pixel is limited; 0 is good"),
+}
+
+
+def build_result(
+    arrays: dict[str, NDArray[np.generic]],
+    wavelengths_nm: NDArray[np.float64],
+    attributes: dict[str, str | int | float],
+) -> xr.Dataset:
+    """Assemble the dataset of a scan from arrays named as in `VARIABLES`.
+
+    Unknown names raise ``KeyError``; missing ones are left out, so that a depth-only result is possible.
+    """
+    import xarray as xr
+
+    data = {}
+    for name, values in arrays.items():
+        dims, unit, long_name = VARIABLES[name]
+        data[name] = (dims, values, {"units": unit, "long_name": long_name})
+    if "flags" in data:
+        masks = [int(f) for f in Flag]
+        names = " ".join(str(f.name).lower() for f in Flag)
+        data["flags"][2].update({"flag_masks": masks, "flag_meanings": names})  # type: ignore[dict-item]
+    coords = {
+        "wavelength_nm": ("wavelength_nm", wavelengths_nm, {"units": "nm", "long_name": "band centre"}),
+        "axis": ("axis", ["x", "y", "z"]),
+        "channel": ("channel", ["R", "G", "B"]),
+    }
+    used = {d for name in arrays for d in VARIABLES[name][0]}
+    coords = {k: v for k, v in coords.items() if k in used}
+    return xr.Dataset(data, coords=coords, attrs={"schema_version": SCHEMA_VERSION, **attributes})

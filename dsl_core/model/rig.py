@@ -1,0 +1,134 @@
+"""A calibrated rig: everything needed to turn frames into depth and reflectance."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from dsl_core.model.base import Record
+from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.spectral import SpectralCurve
+
+BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
+
+
+class Film(Record):
+    """The diffraction film in front of the projector, in projector coordinates.
+
+    The film is a cylinder patch whose axis is vertical: ``bend_per_mm`` is its curvature. Tilts turn
+    its normal away from the projector axis; roll turns its lines about that axis.
+    """
+
+    distance_mm: float = Field(default=29.0, gt=0)
+    lines_per_mm: float = Field(default=500.0, gt=0)
+    tilt_x_deg: float = 0.0
+    tilt_y_deg: float = 0.0
+    roll_deg: float = 0.0
+    bend_per_mm: float = 0.0
+
+    @property
+    def period_nm(self) -> float:
+        """Distance between neighbouring lines, nm."""
+        return 1e6 / self.lines_per_mm
+
+
+class Sensor(Record):
+    """How light becomes digital numbers (DN)."""
+
+    bayer: BayerPattern = "RGGB"
+    bit_depth: int = Field(default=12, ge=8, le=16)
+    black_level_dn: float = Field(default=260.0, ge=0)
+    electrons_per_dn: float = Field(default=10.0, gt=0)
+    read_noise_dn: float = Field(default=0.5, ge=0)
+
+    @property
+    def full_scale_dn(self) -> int:
+        """Largest digital number; a pixel that reads it is saturated."""
+        return int(2**self.bit_depth - 1)
+
+
+class ProjectorResponse(Record):
+    """From drive level to light: ``radiance = level ** gamma``, black level, blur and halo.
+
+    The halo is light of the zero order scattered sideways in the film: a column at distance ``d``
+    px contributes ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance.
+    """
+
+    gamma: float = Field(default=2.2, gt=0)
+    black_fraction: float = Field(default=0.0, ge=0, lt=1)
+    blur_px: float = Field(default=0.6, gt=0)
+    halo_peak_per_px: float = Field(default=0.0, ge=0)
+    halo_decay_px: float = Field(default=30.0, gt=0)
+
+    def radiance(self, level: float | NDArray[np.float64]) -> NDArray[np.float64]:
+        """Radiance relative to full drive, black included, for a level in 0..1, after 8 bit rounding."""
+        drive = np.round(np.clip(level, 0, 1) * 255) / 255
+        return np.asarray(self.black_fraction + (1 - self.black_fraction) * drive**self.gamma)
+
+
+class CorrespondenceGrid(Record):
+    """The data-driven model of seed section 4: ``q = alpha * z**beta + gamma`` on a pixel grid.
+
+    ``coefficients`` holds alpha, beta, gamma for every (order, wavelength, row, column) node, flattened in
+    C order; ``z`` is depth in units of ``depth_unit_mm``.
+    """
+
+    orders: tuple[int, ...]
+    wavelengths_nm: tuple[float, ...]
+    rows_px: tuple[float, ...]
+    columns_px: tuple[float, ...]
+    depth_unit_mm: float = 1000.0
+    depth_range_mm: tuple[float, float]
+    coefficients: tuple[float, ...]
+
+    @property
+    def array(self) -> NDArray[np.float64]:
+        """Coefficients, shape (orders, wavelengths, rows, columns, 3)."""
+        shape = (len(self.orders), len(self.wavelengths_nm), len(self.rows_px), len(self.columns_px), 3)
+        return np.array(self.coefficients, float).reshape(shape)
+
+
+class Provenance(Record):
+    """Where a calibration comes from."""
+
+    created: str = ""
+    source: str = ""
+    camera_serial: str = ""
+    projector_serial: str = ""
+    notes: str = ""
+
+
+class Rig(Record):
+    """Geometry, spectral response and radiometry of one camera, projector and film.
+
+    Signal of channel c, DN per ms above black, for reflectance H and pattern radiance P per LED::
+
+        white_scale * s * sum_lambda response_c H sum_m efficiency_m sum_c' emission_c' P_c' d_lambda
+
+    with the shading ``s = cos(incidence) * (reference_distance_mm / distance)**2`` and the efficiency
+    of order zero equal to one by definition.
+    """
+
+    schema_version: Literal[1] = 1
+    name: str
+    camera: Lens
+    projector: Lens
+    pose: Pose
+    film: Film
+    response: Rgb
+    emission: Rgb
+    efficiency: dict[int, SpectralCurve]
+    sensor: Sensor = Sensor()
+    projector_response: ProjectorResponse = ProjectorResponse()
+    white_scale: float = Field(gt=0)
+    white_scale_rel_std: float = Field(default=0.0, ge=0)
+    reference_distance_mm: float = Field(default=700.0, gt=0)
+    frame_period_ms: float = Field(default=1000.0 / 60.0, gt=0)
+    depth_range_mm: tuple[float, float] = (500.0, 1000.0)
+    column_std_px: float = Field(default=0.02, ge=0)
+    correspondence: CorrespondenceGrid | None = None
+    provenance: Provenance = Provenance()

@@ -1,0 +1,1 @@
+"""Patterns: encode and decode side by side."""
