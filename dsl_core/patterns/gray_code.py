@@ -13,10 +13,12 @@ always differ with the right sign, whatever the albedo: no threshold is needed.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
 
-from dsl_core.errors import PlanError
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsl_core.errors import DecodeError, PlanError
 from dsl_core.model.plan import GrayCode
 
 
@@ -69,3 +71,136 @@ def code_image(spec: GrayCode, size_px: tuple[int, int], index: int) -> NDArray[
 def code_images(spec: GrayCode, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     """All frames of the code, shape (frames, height, width), 0 or 255; white and black are last."""
     return np.stack([code_image(spec, size_px, i) for i in range(frame_count(spec, size_px))])
+
+
+@dataclass(frozen=True)
+class DecodedCode:
+    """What a Gray code says of each camera pixel; arrays share one shape.
+
+    ``column`` and ``row`` are projector pixels, int32, -1 where ``undecided``; ``row`` is None when rows
+    are not coded. ``margin`` is the smallest ``|positive - inverse|`` over all bits, float32, in the
+    unit of the input; ``margin_sigmas`` the smallest in standard deviations, None when none were given.
+    """
+
+    column: NDArray[np.int32]
+    row: NDArray[np.int32] | None
+    margin: NDArray[np.float32]
+    margin_sigmas: NDArray[np.float32] | None
+    undecided: NDArray[np.bool_]
+
+
+class GrayDecoder:
+    """Decodes pair by pair, in the order of the code, so that a stack is never held in memory."""
+
+    def __init__(self, spec: GrayCode, size_px: tuple[int, int]) -> None:
+        """Expect the pairs of ``spec`` on a projector of ``size_px`` = (width, height)."""
+        self._size_px = size_px
+        self._bits = bit_counts(spec, size_px)
+        self._pairs = 0
+        self._margin_sigmas: NDArray[np.float32] | None = None
+
+    @property
+    def missing_pairs(self) -> int:
+        """Pairs that have not been added yet."""
+        return sum(self._bits) - self._pairs
+
+    def add(self, positive: ArrayLike, inverse: ArrayLike, std: ArrayLike | None = None) -> None:
+        """Add the next pair: two linear images of equal shape, in any unit, black subtracted or not.
+
+        ``std`` is the standard deviation of their difference, in the same unit, broadcastable; give it
+        with every pair or with none. Raises `DecodeError` for a surplus pair or another shape.
+        """
+        difference = self._difference(np.asarray(positive), np.asarray(inverse))
+        if self._pairs == 0:
+            self._start(difference.shape, std is not None)
+        elif difference.shape != self._margin.shape:
+            raise DecodeError(
+                f"Pair {self._pairs} of the binary code has shape {difference.shape}, the pairs before it"
+                f" {self._margin.shape}. All frames must come from one camera setting."
+            )
+        if (std is not None) != (self._margin_sigmas is not None):
+            raise DecodeError("Give the standard deviation with every pair of the binary code, or with none.")
+        if self._pairs in (0, self._bits[0]):
+            self._bit[...] = False
+        code = self._column if self._pairs < self._bits[0] else self._row
+        # A binary digit is the exclusive or of the Gray digits so far, most significant first.
+        np.logical_xor(self._bit, difference > 0, out=self._bit)
+        code <<= 1
+        code |= self._bit
+        np.abs(difference, out=difference)
+        np.minimum(self._margin, difference, out=self._margin)
+        if std is not None and self._margin_sigmas is not None:
+            difference /= np.asarray(std, np.float32)
+            np.minimum(self._margin_sigmas, difference, out=self._margin_sigmas)
+        self._pairs += 1
+
+    def finish(self, min_margin: float = 0.0, min_sigmas: float = 0.0) -> DecodedCode:
+        """Columns and rows of all pixels; raises `DecodeError` when pairs are missing.
+
+        Undecided is a pixel whose margin is zero, not a number or below ``min_margin`` or ``min_sigmas``,
+        and one whose code lies outside the projector.
+        """
+        if self.missing_pairs:
+            raise DecodeError(
+                f"The binary code is incomplete: {self._pairs} of {sum(self._bits)} pattern pairs were given."
+                " Capture the missing frames (resume the scan)."
+            )
+        decided = (self._margin >= min_margin) & (self._margin > 0)
+        if self._margin_sigmas is not None:
+            decided &= self._margin_sigmas >= min_sigmas
+        decided &= self._column < self._size_px[0]
+        if self._bits[1]:
+            decided &= self._row < self._size_px[1]
+        undecided = ~decided
+        return DecodedCode(
+            column=_without(self._column, undecided),
+            row=_without(self._row, undecided) if self._bits[1] else None,
+            margin=self._margin,
+            margin_sigmas=self._margin_sigmas,
+            undecided=undecided,
+        )
+
+    def _difference(self, positive: NDArray[np.generic], inverse: NDArray[np.generic]) -> NDArray[np.float32]:
+        if not self.missing_pairs:
+            raise DecodeError(f"The binary code has {self._pairs} pattern pairs; one more was given.")
+        if positive.shape != inverse.shape:
+            raise DecodeError(
+                f"A pattern has shape {positive.shape}, its inverse {inverse.shape}."
+                " Both must come from one camera setting."
+            )
+        # Unsigned frames are converted before they are subtracted: they must not wrap around.
+        difference = positive.astype(np.float32)
+        difference -= inverse
+        return difference
+
+    def _start(self, shape: tuple[int, ...], with_sigmas: bool) -> None:
+        self._bit = np.zeros(shape, bool)
+        self._column = np.zeros(shape, np.int32)
+        self._row = np.zeros(shape if self._bits[1] else 0, np.int32)
+        self._margin = np.full(shape, np.inf, np.float32)
+        self._margin_sigmas = np.full(shape, np.inf, np.float32) if with_sigmas else None
+
+
+def decode(
+    positive: ArrayLike,
+    inverse: ArrayLike,
+    spec: GrayCode,
+    size_px: tuple[int, int],
+    min_margin: float = 0.0,
+) -> DecodedCode:
+    """Decode whole stacks, shape (pairs, ...), columns before rows, most significant bit first."""
+    decoder = GrayDecoder(spec, size_px)
+    for one, other in zip(np.asarray(positive), np.asarray(inverse), strict=True):
+        decoder.add(one, other)
+    return decoder.finish(min_margin=min_margin)
+
+
+def lit_mask(white: ArrayLike, black: ArrayLike, threshold: ArrayLike) -> NDArray[np.bool_]:
+    """Where ``white - black > threshold`` (all in one unit); the rest is in shadow, or not a number."""
+    difference = np.asarray(white, np.float32) - np.asarray(black, np.float32)
+    return np.asarray(difference > np.asarray(threshold))
+
+
+def _without(code: NDArray[np.int32], undecided: NDArray[np.bool_]) -> NDArray[np.int32]:
+    # The decoder keeps its own codes, so that finish() may be asked again with other limits.
+    return np.where(undecided, np.int32(-1), code)
