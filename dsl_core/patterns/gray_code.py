@@ -110,22 +110,19 @@ class GrayDecoder:
         ``std`` is the standard deviation of their difference, in the same unit, broadcastable; give it
         with every pair or with none. Raises `DecodeError` for a surplus pair or another shape.
         """
-        difference = self._difference(np.asarray(positive), np.asarray(inverse))
-        if self._pairs == 0:
-            self._start(difference.shape, std is not None)
-        elif difference.shape != self._margin.shape:
-            raise DecodeError(
-                f"Pair {self._pairs} of the binary code has shape {difference.shape}, the pairs before it"
-                f" {self._margin.shape}. All frames must come from one camera setting."
-            )
-        if (std is not None) != (self._margin_sigmas is not None):
-            raise DecodeError("Give the standard deviation with every pair of the binary code, or with none.")
+        one, other = np.asarray(positive), np.asarray(inverse)
+        self._check(one.shape, other.shape, std is not None)
+        # Buffers are kept from pair to pair: fresh pages would cost more than the arithmetic.
+        difference = self._difference
+        np.copyto(difference, one)
+        difference -= np.asarray(other, np.float32)
+        np.greater(difference, 0, out=self._digit)
+        # A binary digit is the exclusive or of the Gray digits so far, most significant first.
         if self._pairs in (0, self._bits[0]):
             self._bit[...] = False
+        self._bit ^= self._digit
         code = self._column if self._pairs < self._bits[0] else self._row
-        # A binary digit is the exclusive or of the Gray digits so far, most significant first.
-        np.logical_xor(self._bit, difference > 0, out=self._bit)
-        code <<= 1
+        code += code
         code |= self._bit
         np.abs(difference, out=difference)
         np.minimum(self._margin, difference, out=self._margin)
@@ -160,21 +157,27 @@ class GrayDecoder:
             undecided=undecided,
         )
 
-    def _difference(self, positive: NDArray[np.generic], inverse: NDArray[np.generic]) -> NDArray[np.float32]:
+    def _check(self, shape: tuple[int, ...], inverse: tuple[int, ...], with_sigmas: bool) -> None:
         if not self.missing_pairs:
             raise DecodeError(f"The binary code has {self._pairs} pattern pairs; one more was given.")
-        if positive.shape != inverse.shape:
+        if shape != inverse:
             raise DecodeError(
-                f"A pattern has shape {positive.shape}, its inverse {inverse.shape}."
-                " Both must come from one camera setting."
+                f"A pattern has shape {shape}, its inverse {inverse}. Both must come from one camera setting."
             )
-        # Unsigned frames are converted before they are subtracted: they must not wrap around.
-        difference = positive.astype(np.float32)
-        difference -= inverse
-        return difference
+        if self._pairs == 0:
+            self._start(shape, with_sigmas)
+        if shape != self._margin.shape:
+            raise DecodeError(
+                f"Pair {self._pairs} of the binary code has shape {shape}, the pairs before it"
+                f" {self._margin.shape}. All frames must come from one camera setting."
+            )
+        if with_sigmas != (self._margin_sigmas is not None):
+            raise DecodeError("Give the standard deviation with every pair of the binary code, or with none.")
 
     def _start(self, shape: tuple[int, ...], with_sigmas: bool) -> None:
-        self._bit = np.zeros(shape, bool)
+        self._difference = np.empty(shape, np.float32)
+        self._digit = np.empty(shape, bool)
+        self._bit = np.empty(shape, bool)
         self._column = np.zeros(shape, np.int32)
         self._row = np.zeros(shape if self._bits[1] else 0, np.int32)
         self._margin = np.full(shape, np.inf, np.float32)

