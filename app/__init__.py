@@ -1,0 +1,1 @@
+"""The desktop application of dsl-scan: what the user sees, on top of the headless `dsl_core`."""

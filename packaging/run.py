@@ -1,0 +1,329 @@
+#!/usr/bin/env python3
+"""Set dsl-scan up in a virtual environment and run it; needs only Python 3.11 to 3.13 and a network.
+
+python3 packaging/run.py demo [...]       a scan on the digital twin, from patterns to a report
+python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest
+python3 packaging/run.py dsl-scan [...]   the command line of the project
+python3 packaging/run.py shell            a shell inside the environment
+python3 packaging/run.py lock             write packaging/constraints.txt anew (for maintainers)
+"""
+
+import argparse
+import ast
+import contextlib
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+# Before the first annotation that an old Python cannot read, so that this sentence is what one sees.
+if not (3, 11) <= sys.version_info[:2] <= (3, 13):  # a newer one lacks wheels of torch
+    sys.exit(
+        "dsl-scan needs Python 3.11, 3.12 or 3.13; this is {}.{}. Start the script with one of those, "
+        "for example: python3.12 packaging/run.py demo".format(*sys.version_info[:2])
+    )
+
+ROOT = Path(__file__).resolve().parent.parent
+CONSTRAINTS = ROOT / "packaging" / "constraints.txt"
+STAMP = "dsl-scan-setup.json"
+COMMANDS = ("demo", "test", "dsl-scan", "shell", "lock")
+
+# Shared library or program -> Debian package. Qt and VTK load these at run time; their wheels lack them.
+LIBRARIES = {
+    "libglib-2.0.so.0": "libglib2.0-0",
+    "libGL.so.1": "libgl1",
+    "libEGL.so.1": "libegl1",
+    "libfontconfig.so.1": "libfontconfig1",
+    "libxkbcommon.so.0": "libxkbcommon0",
+    "libdbus-1.so.3": "libdbus-1-3",
+    "libxkbcommon-x11.so.0": "libxkbcommon-x11-0",
+    "libxcb-cursor.so.0": "libxcb-cursor0",
+    "libxcb-icccm.so.4": "libxcb-icccm4",
+    "libxcb-keysyms.so.1": "libxcb-keysyms1",
+    "libxcb-shape.so.0": "libxcb-shape0",
+}
+TEST_PROGRAMS = {"Xvfb": "xvfb", "xauth": "xauth"}
+
+CHECKS = (
+    ("ruff check", ("ruff", "check", ".")),
+    ("ruff format", ("ruff", "format", "--check", ".")),
+    ("mypy", ("mypy",)),
+    ("import contracts", ("lint-imports", "--no-cache")),
+)
+
+
+class SetupError(Exception):
+    """The environment cannot be made; the message says what to do."""
+
+
+def say(text: str) -> None:
+    """Tell the person, on the error stream, so that the output of ``dsl-scan --json`` stays clean."""
+    print(f"[run.py] {text}", file=sys.stderr, flush=True)
+
+
+@contextlib.contextmanager
+def timed(what: str) -> Iterator[None]:
+    """Name a step before it starts and tell its seconds when it is done."""
+    say(f"{what} ...")
+    start = time.monotonic()
+    yield
+    say(f"{what}: {time.monotonic() - start:.1f} s")
+
+
+def missing_packages(
+    listing: str, with_tests: bool, which: Callable[[str], str | None] = shutil.which
+) -> list[str]:
+    """Debian packages whose libraries ``ldconfig -p`` does not list or whose programs are not found."""
+    listed = {line.split()[0] for line in listing.splitlines() if line.strip()}
+    missing = [package for library, package in LIBRARIES.items() if library not in listed]
+    if with_tests:
+        missing += [package for program, package in TEST_PROGRAMS.items() if which(program) is None]
+    return missing
+
+
+def install_system_libraries(with_tests: bool) -> None:
+    """Install what Qt and VTK need as root on Debian, else print the line; never stops the setup."""
+    ldconfig = shutil.which("ldconfig", path=os.environ.get("PATH", "") + ":/sbin:/usr/sbin")
+    if ldconfig is None:  # Windows and macOS: the wheels bring everything
+        return
+    listing = subprocess.run([ldconfig, "-p"], capture_output=True, text=True, check=False).stdout
+    missing = missing_packages(listing, with_tests)
+    if not missing:
+        return
+    line = f"apt-get update && apt-get install -y --no-install-recommends {' '.join(missing)}"
+    if shutil.which("apt-get") is None:
+        say(f"Windows and 3D views need what Debian calls {' '.join(missing)}. Please install it.")
+    elif os.geteuid() != 0:
+        say(f"Windows and 3D views need system libraries. Install them with: sudo sh -c '{line}'")
+    else:
+        with timed(f"Installing system libraries: {' '.join(missing)}"):
+            environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+            done = subprocess.run(["sh", "-c", f"{{ {line}; }} >/dev/null"], env=environment, check=False)
+        if done.returncode != 0:
+            say(f"That failed; windows and 3D views may not work. Try by hand: {line}")
+
+
+def venv_program(venv: Path, name: str) -> Path:
+    """Path of a program inside a virtual environment."""
+    return venv / "Scripts" / f"{name}.exe" if os.name == "nt" else venv / "bin" / name
+
+
+def venv_variables(venv: Path) -> dict[str, str]:
+    """Environment variables of an activated virtual environment."""
+    variables = {key: value for key, value in os.environ.items() if key != "PYTHONHOME"}
+    variables["VIRTUAL_ENV"] = str(venv)
+    variables["PATH"] = str(venv_program(venv, "python").parent) + os.pathsep + variables.get("PATH", "")
+    variables.setdefault("QT_API", "pyside6")
+    return variables
+
+
+def pip_settings(listing: str) -> dict[str, list[str]]:
+    """Values of ``pip config list`` that uv must be told, by name; later lines win as they do in pip."""
+    settings: dict[str, list[str]] = {}
+    for line in listing.splitlines():
+        key, _, value = line.partition("=")
+        name = key.rpartition(".")[2].strip()
+        if name in ("find-links", "index-url"):
+            settings[name] = str(ast.literal_eval(value)).split()
+    return settings
+
+
+def find_links(settings: dict[str, list[str]]) -> list[str]:
+    """Folders and pages with wheels, from pip's settings and from UV_FIND_LINKS (comma-separated)."""
+    from_uv = [link for link in os.environ.get("UV_FIND_LINKS", "").split(",") if link]
+    return list(dict.fromkeys([*settings.get("find-links", []), *from_uv]))
+
+
+def torch_options(choice: str, links: Sequence[str], platform: str = sys.platform) -> list[str]:
+    """Options of ``uv pip install`` for the build of torch that was asked for.
+
+    The registry's default is a CUDA build on Linux and a CPU build elsewhere. Raises `SetupError` for
+    CUDA on macOS, which has none.
+    """
+    local = [option for link in links for option in ("--find-links", link)]
+    if choice == "cuda":
+        if platform == "darwin":
+            raise SetupError("There is no CUDA build of torch for macOS; leave out --torch cuda.")
+        # Local wheels are left out: one of the CPU build would win over the registry's.
+        return [] if platform.startswith("linux") else ["--torch-backend", "cu130"]
+    has_local_cpu = any(list(Path(link).glob("torch-*+cpu-*.whl")) for link in links)
+    if choice == "cpu" and platform.startswith("linux") and not has_local_cpu:
+        return [*local, "--torch-backend", "cpu"]
+    return local
+
+
+def digest(torch: str) -> str:
+    """Hash of everything that decides what is installed."""
+    parts = [(ROOT / "pyproject.toml").read_bytes(), CONSTRAINTS.read_bytes()]
+    parts += [str(part).encode() for part in (torch, sys.version_info[:2], ROOT)]
+    return hashlib.sha256(b"\0".join(parts)).hexdigest()
+
+
+def read_stamp(venv: Path) -> dict[str, str]:
+    """What the last complete installation left; empty when there was none."""
+    try:
+        stamp = json.loads((venv / STAMP).read_text())
+    except (OSError, ValueError):
+        return {}
+    return stamp if isinstance(stamp, dict) else {}
+
+
+def make_venv(venv: Path) -> None:
+    """Make the virtual environment; one made by another Python is made anew, anything else is left alone."""
+    config = venv / "pyvenv.cfg"
+    if venv.exists() and not config.exists() and any(venv.iterdir()):
+        raise SetupError(f"{venv} is not a virtual environment. Name another folder with --venv.")
+    version = ".".join(map(str, sys.version_info[:2]))
+    if config.exists() and venv_program(venv, "python").exists() and f" = {version}." in config.read_text():
+        return
+    with timed(f"Making a virtual environment in {venv}"):
+        made = subprocess.run([sys.executable, "-m", "venv", "--clear", str(venv)], check=False)
+    if made.returncode != 0:
+        raise SetupError(
+            f"Python {version} could not make a virtual environment in {venv}. Is the folder writable? "
+            "On Debian and Ubuntu the module is a package of its own: apt-get install python3-venv"
+        )
+
+
+def install(venv: Path, torch: str) -> None:
+    """Install the project and its pinned dependencies; raises `SetupError` when that fails."""
+    python = str(venv_program(venv, "python"))
+    constraints = ["--constraint", str(CONSTRAINTS)]
+    quiet = ["--quiet", "--disable-pip-version-check", "--retries", "2"]
+    with timed("Installing uv"):
+        done = subprocess.run([python, "-m", "pip", "install", *quiet, *constraints, "uv"], check=False)
+    if done.returncode == 0:
+        listing = subprocess.run(
+            [python, "-m", "pip", "config", "list"], capture_output=True, text=True, check=False
+        )
+        settings = pip_settings(listing.stdout)
+        options = torch_options(torch, find_links(settings))
+        if "index-url" in settings and "UV_DEFAULT_INDEX" not in os.environ:
+            options += ["--default-index", settings["index-url"][0]]
+        variables = {key: value for key, value in os.environ.items() if key != "UV_FIND_LINKS"}
+        command = [python, "-m", "uv", "pip", "install", "--python", python, *options, *constraints]
+        command += ["--build-constraints", str(CONSTRAINTS), "--editable", f"{ROOT}[test]"]
+        with timed("Installing dsl-scan and what it needs"):
+            done = subprocess.run(command, env=variables, check=False)
+    if done.returncode != 0:
+        raise SetupError(
+            "The installation failed; the lines above say why. It needs a network, or PIP_FIND_LINKS with a "
+            "folder of wheels; behind a proxy set HTTPS_PROXY. Then give the same command again."
+        )
+
+
+def prepare(venv: Path, torch: str | None, with_tests: bool) -> None:
+    """Bring the environment up to date; does nothing when it already is."""
+    stamp = read_stamp(venv)
+    torch = torch or stamp.get("torch", "default")
+    wanted = {"digest": digest(torch), "torch": torch}
+    fresh = stamp == wanted and venv_program(venv, "python").exists()
+    if not fresh or with_tests:
+        install_system_libraries(with_tests)
+    if not fresh:
+        make_venv(venv)
+        (venv / STAMP).unlink(missing_ok=True)
+        install(venv, torch)
+        (venv / STAMP).write_text(json.dumps(wanted))
+
+
+def run(command: Sequence[str], variables: dict[str, str], folder: Path | None = None) -> tuple[int, bool]:
+    """Run a command; return its exit code and whether Ctrl-C was pressed meanwhile.
+
+    The terminal sends Ctrl-C to the command too, which needs its time to put things in order.
+    """
+    process = subprocess.Popen(list(command), env=variables, cwd=folder)
+    interrupted = False
+    while True:
+        try:
+            code = process.wait()
+        except KeyboardInterrupt:
+            interrupted = True
+        else:
+            return (code if code >= 0 else 128 - code), interrupted
+
+
+def test(venv: Path, arguments: Sequence[str]) -> int:
+    """Run every check and the tests; the first exit code that is not zero is the answer."""
+    variables = venv_variables(venv)
+    results: list[tuple[str, int, float]] = []
+    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *arguments))):
+        start = time.monotonic()
+        say(f"{name} ...")
+        code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT)
+        results.append((name, code, time.monotonic() - start))
+        if interrupted:
+            return 130
+    for name, code, seconds in results:
+        say(f"{name:17s} {'passed' if code == 0 else f'FAILED ({code})':11s} {seconds:6.1f} s")
+    return next((code for _, code, _ in results if code != 0), 0)
+
+
+def lock(venv: Path) -> int:
+    """Write the constraints anew: one set of versions for all Pythons and systems."""
+    command = [str(venv_program(venv, "python")), "-m", "uv", "pip", "compile", "--universal", "--upgrade"]
+    command += ["--fork-strategy", "fewest", "--python-version", "3.11", "--no-annotate", "--quiet"]
+    command += ["--custom-compile-command", "python3 packaging/run.py lock"]
+    command += ["--extra", "test", "--group", "lock", "--output-file", str(CONSTRAINTS), "pyproject.toml"]
+    hidden = ("UV_FIND_LINKS", "PIP_FIND_LINKS")  # local builds must not get into the file
+    variables = {key: value for key, value in os.environ.items() if key not in hidden}
+    return run(command, variables, ROOT)[0]
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the command line; wrong use ends with exit code 2."""
+    parser = argparse.ArgumentParser(
+        prog="run.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--venv", type=Path, default=ROOT / ".venv", help="virtual environment (default .venv)"
+    )
+    parser.add_argument(
+        "--torch", choices=("cpu", "cuda"), help="build of torch (default: local wheel, else the registry's)"
+    )
+    parser.add_argument("command", choices=COMMANDS)
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="passed on to the command")
+    return parser.parse_args(arguments)
+
+
+def dispatch(command: str, venv: Path, arguments: Sequence[str]) -> int:
+    """Run what was asked for inside the environment."""
+    if command == "test":
+        return test(venv, arguments)
+    if command == "lock":
+        return lock(venv)
+    if command == "shell":
+        shell = (
+            os.environ.get("COMSPEC", "cmd.exe") if os.name == "nt" else os.environ.get("SHELL", "/bin/sh")
+        )
+        return run([shell, *arguments], venv_variables(venv))[0]
+    program = [str(venv_program(venv, "dsl-scan")), *(["demo"] if command == "demo" else []), *arguments]
+    return run(program, venv_variables(venv))[0]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Prepare the environment, run the command and return its exit code."""
+    asked = parse(arguments)
+    venv = Path(os.path.abspath(asked.venv))
+    try:
+        prepare(venv, asked.torch, with_tests=asked.command == "test")
+        start = time.monotonic()
+        code = dispatch(asked.command, venv, asked.arguments)
+    except (SetupError, OSError) as error:
+        say(str(error))
+        return 2
+    except KeyboardInterrupt:
+        say("Stopped. Give the same command again to go on.")
+        return 130
+    if asked.command in ("demo", "test"):
+        say(f"{asked.command} took {time.monotonic() - start:.1f} s, exit code {code}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,75 @@
+"""What is imported is declared, what is declared is imported, and the pins satisfy the declarations."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+# Import name -> distribution, where they differ.
+DISTRIBUTIONS = {
+    "OpenEXR": "openexr",
+    "PySide6": "pyside6-essentials",
+    "colour": "colour-science",
+    "cv2": "opencv-contrib-python-headless",
+}
+# The desktop application is built on these; until its first window nothing imports them.
+OF_THE_APP = {"pyside6-essentials", "pyqtgraph", "pyvista", "pyvistaqt", "superqt"}
+GPL = {"plyfile", "pylablib", "pylablib-lightweight", "thorlabs-apt-device", "pyqt5", "pyqt6"}
+
+
+def imported() -> Iterator[str]:
+    """Distributions that dsl_core and app import anywhere, also inside functions."""
+    for path in [*(ROOT / "dsl_core").rglob("*.py"), *(ROOT / "app").rglob("*.py")]:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names: list[str] = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+                names = [node.module]
+            for name in (name.partition(".")[0] for name in names):
+                if name not in sys.stdlib_module_names and name not in ("dsl_core", "app"):
+                    yield canonicalize_name(DISTRIBUTIONS.get(name, name))
+
+
+def declared(requirements: list[str]) -> dict[str, Requirement]:
+    parsed = (Requirement(text) for text in requirements)
+    return {canonicalize_name(requirement.name): requirement for requirement in parsed}
+
+
+def test_every_import_is_declared() -> None:
+    assert set(imported()) - set(declared(PROJECT["dependencies"])) == set()
+
+
+def test_every_declaration_is_imported() -> None:
+    assert set(declared(PROJECT["dependencies"])) - set(imported()) - OF_THE_APP == set()
+
+
+def test_every_declaration_is_pinned_to_a_version_that_it_allows() -> None:
+    lines = (ROOT / "packaging" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pins = declared([line for line in lines if line and not line.startswith("#")])
+    for name, wanted in declared(PROJECT["dependencies"] + PROJECT["optional-dependencies"]["test"]).items():
+        version = re.fullmatch(r"==([^+]+)", str(pins[name].specifier))
+        assert version is not None, f"{name} is not pinned to one public version"
+        assert wanted.specifier.contains(version[1]), f"{name} {version[1]} is not {wanted.specifier}"
+
+
+def test_nothing_is_under_the_gpl() -> None:
+    text = (ROOT / "packaging" / "constraints.txt").read_text(encoding="utf-8")
+    names = {canonicalize_name(re.split(r"[= ]", line)[0]) for line in text.splitlines()}
+    assert names.isdisjoint(GPL)
+
+
+def test_architecture_gives_a_reason_for_every_dependency() -> None:
+    table = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").lower()
+    missing = [name for name in declared(PROJECT["dependencies"]) if f"`{name}`" not in table]
+    assert missing == []

@@ -1,0 +1,54 @@
+"""The rules of ARCHITECTURE.md on imports hold, and the command line starts without heavy libraries."""
+
+from __future__ import annotations
+
+import graphlib
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import grimp
+import pytest
+from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
+
+ROOT = Path(__file__).resolve().parents[2]
+
+HEAVY = (
+    "OpenEXR",
+    "PySide6",
+    "colour",
+    "cv2",
+    "matplotlib",
+    "pandas",
+    "pyvista",
+    "scipy",
+    "spectral",
+    "torch",
+    "vtkmodules",
+    "xarray",
+    "zarr",
+)
+
+
+def test_import_contracts_hold(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)  # where the contracts are written down
+    status = lint_imports(no_cache=True)
+    assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
+
+
+def test_no_module_imports_itself_in_a_circle() -> None:
+    graph = grimp.build_graph("dsl_core", "app", cache_dir=None)
+    imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+    try:
+        graphlib.TopologicalSorter(imports).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(" > ".join(error.args[1]))
+
+
+@pytest.mark.skipif(importlib.util.find_spec("dsl_core.cli") is None, reason="there is no command line yet")
+def test_the_command_line_starts_light() -> None:
+    code = "import json, sys, dsl_core.cli; print(json.dumps(sorted(sys.modules)))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(HEAVY).isdisjoint(json.loads(answer.stdout))

@@ -1,0 +1,162 @@
+"""The parts of packaging/run.py that decide something; nothing is installed here."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+SCRIPT = Path(__file__).resolve().parents[2] / "packaging" / "run.py"
+
+
+def load() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("packaging_run", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+run = load()
+
+
+def start(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(SCRIPT), *arguments], capture_output=True, text=True, check=False
+    )
+
+
+def ready_environment(folder: Path, program: str, lines: str) -> Path:
+    """A folder that passes for a finished environment, with one program in it."""
+    file = run.venv_program(folder, program)
+    file.parent.mkdir(parents=True)
+    file.write_text(f"#!{sys.executable}\n{lines}")
+    file.chmod(0o755)
+    run.venv_program(folder, "python").symlink_to(sys.executable)
+    (folder / run.STAMP).write_text(json.dumps({"digest": run.digest("default"), "torch": "default"}))
+    return folder
+
+
+def test_the_script_needs_only_the_standard_library() -> None:
+    command = [sys.executable, "-I", "-S", str(SCRIPT), "--help"]
+    assert "demo" in subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.mark.parametrize("arguments", [(), ("dance",), ("--torch", "tpu", "demo")])
+def test_wrong_arguments_end_with_code_2_and_the_usage(arguments: tuple[str, ...]) -> None:
+    answer = start(*arguments)
+    assert answer.returncode == 2
+    assert "usage: run.py" in answer.stderr
+
+
+@pytest.mark.parametrize("version", [(3, 8), (3, 14)])
+def test_a_python_that_does_not_fit_is_told_so(version: tuple[int, int]) -> None:
+    code = f"import sys, runpy; sys.version_info = {(*version, 0)}; runpy.run_path({str(SCRIPT)!r})"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert answer.returncode == 1
+    assert f"this is {version[0]}.{version[1]}" in answer.stderr
+    assert "Traceback" not in answer.stderr
+
+
+def test_options_after_the_command_belong_to_the_command() -> None:
+    asked = run.parse(["--torch", "cpu", "demo", "--json", "--venv", "x"])
+    assert (asked.command, asked.torch, asked.arguments) == ("demo", "cpu", ["--json", "--venv", "x"])
+
+
+def test_what_ldconfig_does_not_list_is_missing() -> None:
+    present = [library for library in run.LIBRARIES if library != "libEGL.so.1"]
+    listing = "2 libs found in cache\n" + "\n".join(
+        f"\t{name} (libc6,x86-64) => /lib/{name}" for name in present
+    )
+    assert run.missing_packages(listing, with_tests=False) == ["libegl1"]
+    absent = run.missing_packages(listing, with_tests=True, which=lambda program: None)
+    assert absent == ["libegl1", "xvfb", "xauth"]
+
+
+def test_a_later_setting_of_pip_wins_and_others_are_left_out() -> None:
+    listing = "global.find-links='a'\nglobal.cert='c'\n:env:.find-links='b\\nb2'\nglobal.index-url='i'"
+    assert run.pip_settings(listing) == {"find-links": ["b", "b2"], "index-url": ["i"]}
+
+
+def test_links_of_pip_and_uv_are_joined_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("UV_FIND_LINKS", "b,c")
+    assert run.find_links({"find-links": ["a", "b"]}) == ["a", "b", "c"]
+
+
+def test_torch_comes_from_a_local_folder_where_there_is_one(tmp_path: Path) -> None:
+    links = [str(tmp_path)]
+    assert run.torch_options("cpu", links, "linux") == ["--find-links", links[0], "--torch-backend", "cpu"]
+    (tmp_path / "torch-2.13.0+cpu-cp311-cp311-manylinux_2_28_x86_64.whl").touch()
+    assert run.torch_options("cpu", links, "linux") == ["--find-links", links[0]]
+    assert run.torch_options("default", links, "linux") == ["--find-links", links[0]]
+
+
+def test_cuda_is_never_taken_from_a_local_cpu_folder(tmp_path: Path) -> None:
+    assert run.torch_options("cuda", [str(tmp_path)], "linux") == []
+    assert run.torch_options("cuda", [], "win32") == ["--torch-backend", "cu130"]
+    with pytest.raises(run.SetupError, match="macOS"):
+        run.torch_options("cuda", [], "darwin")
+
+
+def test_a_folder_that_is_no_environment_is_left_alone(tmp_path: Path) -> None:
+    precious = tmp_path / "thesis.txt"
+    precious.write_text("years of work")
+    with pytest.raises(run.SetupError, match="not a virtual environment"):
+        run.make_venv(tmp_path)
+    assert precious.read_text() == "years of work"
+
+
+def test_a_change_of_the_pins_or_of_torch_asks_for_a_new_installation(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pins = tmp_path / "constraints.txt"
+    pins.write_text("a==1")
+    monkeypatch.setattr(run, "CONSTRAINTS", pins)
+    before = run.digest("cpu")
+    assert before == run.digest("cpu")
+    assert before != run.digest("cuda")
+    pins.write_text("a==2")
+    assert before != run.digest("cpu")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]"])
+def test_a_damaged_stamp_counts_as_none(tmp_path: Path, text: str) -> None:
+    (tmp_path / run.STAMP).write_text(text)
+    assert run.read_stamp(tmp_path) == {}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in for dsl-scan is a script with a shebang")
+def test_output_arguments_and_exit_code_pass_through(tmp_path: Path) -> None:
+    venv = ready_environment(tmp_path, "dsl-scan", "import sys; print(sys.argv[1:]); sys.exit(7)")
+    answer = start("--venv", str(venv), "dsl-scan", "info", "--json")
+    assert (answer.returncode, answer.stdout, answer.stderr) == (7, "['info', '--json']\n", "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_ctrl_c_lets_the_command_put_things_in_order(tmp_path: Path) -> None:
+    """The whole process group gets the signal, as from a terminal."""
+    lines = (
+        "import sys, time\n"
+        "try:\n    print('ready', flush=True); time.sleep(60)\n"
+        "except KeyboardInterrupt:\n    time.sleep(0.6); print('in order'); sys.exit(2)\n"
+    )
+    venv = ready_environment(tmp_path, "dsl-scan", lines)
+    command = [sys.executable, str(SCRIPT), "--venv", str(venv), "dsl-scan"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    guard = threading.Timer(30, process.kill)
+    guard.start()
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    os.killpg(process.pid, signal.SIGINT)
+    rest = process.communicate()[0]
+    guard.cancel()
+    assert (process.returncode, rest) == (2, "in order\n")
