@@ -14,12 +14,16 @@ from dsl_core.model.plan import CapturePlan, Shot
 
 @dataclass(frozen=True)
 class Frame:
-    """One exposure: the raw mosaic, uint16, shape (rows, columns), in DN, and how it was taken."""
+    """One exposure: the raw mosaic, uint16, shape (rows, columns), in DN, and how it was taken.
+
+    ``attempts`` counts the exposures it took until this one was kept (a runner sets it).
+    """
 
     pixels: NDArray[np.uint16]
     exposure_ms: float
     timestamp_s: float = 0.0
     frame_id: int = 0
+    attempts: int = 1
 
 
 class FrameSource(Protocol):

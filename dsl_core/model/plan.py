@@ -46,7 +46,7 @@ class LineComb(Record):
 
 
 class Columns(Record):
-    """Any set of column profiles: ``levels[k][x][c]`` in 0..1, radiance relative to full drive."""
+    """Any set of column profiles: ``levels[k][x][c]`` in 0..1 multiplies the setting's drive level."""
 
     kind: Literal["columns"] = "columns"
     levels: tuple[tuple[tuple[float, float, float], ...], ...]

@@ -1,0 +1,191 @@
+"""Which projector column lights a camera pixel, through which order, at which wavelength.
+
+Two models answer through the same call: the grating equation with the film's pose, and the data-driven
+fit of seed section 4, ``q = alpha * z**beta + gamma``. Both are smooth in wavelength, so they are
+evaluated at a few Chebyshev nodes and interpolated by a polynomial.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import Rig
+from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
+from dsl_core.optics.pinhole import pixel_rays, project
+
+#: Chebyshev nodes over the wavelength range; the interpolation error stays below 1e-3 px.
+NODES = 6
+#: Pixels solved at once.
+CHUNK = 8192
+
+
+class Footprint(NamedTuple):
+    """Projector columns and rows (px) that light some pixels, each of shape (wavelengths, pixels)."""
+
+    columns: Tensor
+    rows: Tensor
+
+    def inside(self, width_px: int, height_px: int) -> Tensor:
+        """Whether the light comes from inside the projector's frame, same shape, bool."""
+        c, r = self
+        return (c > -0.5) & (c < width_px - 0.5) & (r > -0.5) & (r < height_px - 0.5)
+
+
+class Correspondence(Protocol):
+    """A model of the projector pixel of every (camera pixel, depth, order, wavelength)."""
+
+    def trace(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+        """Projector pixels that light camera pixels.
+
+        ``pixels`` are flat indices into the camera image (int64), ``depth_mm`` has the same shape.
+        """
+
+
+@lru_cache(maxsize=8)
+def _rays_in_projector(rig_key: tuple[object, ...], device: torch.device, dtype: torch.dtype) -> Tensor:
+    camera, pose = rig_key
+    rays = np.einsum("ij,jhw->ihw", pose.matrix, pixel_rays(camera)).reshape(3, -1)  # type: ignore[attr-defined,arg-type]
+    return torch.as_tensor(np.ascontiguousarray(rays), device=device, dtype=dtype)
+
+
+def projector_points(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> Vectors:
+    """Points seen by flat pixel indices at a depth, in projector coordinates (mm), shape of ``depth_mm``."""
+    rays = _rays_in_projector((rig.camera, rig.pose), depth_mm.device, depth_mm.dtype)[:, pixels]
+    t = rig.pose.translation_mm
+    return Vectors(*(rays[i] * depth_mm + t[i] for i in range(3)))
+
+
+def zero_order(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tensor]:
+    """Projector column and row (px) of the zero order: conventional structured light, seed Eq. (11)."""
+    return project(rig.projector, *projector_points(rig, pixels, depth_mm))
+
+
+def chebyshev_nodes(start_nm: float, stop_nm: float, count: int = NODES) -> NDArray[np.float64]:
+    """Chebyshev nodes of the first kind over a wavelength range, nm, rising."""
+    k = np.arange(count)[::-1]
+    return np.asarray(0.5 * (start_nm + stop_nm) + 0.5 * (stop_nm - start_nm) * np.cos(np.pi * (k + 0.5) / count))
+
+
+def interpolation_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix of polynomial interpolation from values at nodes to values at targets (Lagrange)."""
+    scale = lambda x: (x - nodes.mean()) / np.ptp(nodes)  # noqa: E731 - keeps the Vandermonde matrix well conditioned
+    order = len(nodes) - 1
+    return np.asarray(np.linalg.solve(np.vander(scale(nodes), order + 1).T, np.vander(scale(targets), order + 1).T).T)
+
+
+def like(array: NDArray[np.floating[Any]], other: Tensor) -> Tensor:
+    """The array as a tensor of another tensor's device and type."""
+    return torch.as_tensor(array, device=other.device, dtype=other.dtype)
+
+
+def _zero_footprint(rig: Rig, pixels: Tensor, depth_mm: Tensor, count: int) -> Footprint:
+    column, row = zero_order(rig, pixels, depth_mm)
+    return Footprint(column.expand(count, -1), row.expand(count, -1))
+
+
+def wavelength_range(wavelengths_nm: NDArray[np.float64]) -> tuple[float, float]:
+    """First and last wavelength, widened where they are equal so that nodes stay apart."""
+    low, high = float(wavelengths_nm.min()), float(wavelengths_nm.max())
+    return (low, high) if high - low > 1 else (low - 1, high + 1)
+
+
+class GratingModel:
+    """The analytic model: grating equation with the film's pose, period and bend."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.film = FilmFrame.of(rig.film)
+
+    def exact(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+        """Projector pixels solved at every wavelength, without interpolation."""
+        nm = like(wavelengths_nm, depth_mm)[:, None]
+        columns = torch.empty((len(wavelengths_nm), len(pixels)), device=depth_mm.device, dtype=depth_mm.dtype)
+        rows = torch.empty_like(columns)
+        # In chunks, so that the dozens of intermediate arrays stay in the cache.
+        for i in range(0, len(pixels), CHUNK):
+            part = slice(i, i + CHUNK)
+            point = projector_points(self.rig, pixels[part], depth_mm[part])
+            columns[:, part], rows[:, part] = project(
+                self.rig.projector, *incoming_direction(self.film, point, order, nm)
+            )
+        return Footprint(columns, rows)
+
+    def trace(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+        """Projector pixels, solved at Chebyshev nodes and interpolated in wavelength."""
+        if order == 0:
+            return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
+        nodes = chebyshev_nodes(*wavelength_range(wavelengths_nm))
+        matrix = like(interpolation_matrix(nodes, wavelengths_nm), depth_mm)
+        return Footprint(*(matrix @ q for q in self.exact(pixels, depth_mm, order, nodes)))
+
+
+class GridModel:
+    """The data-driven model of seed section 4: power law in depth, linear in wavelength, cubic in pixel."""
+
+    def __init__(self, rig: Rig) -> None:
+        if rig.correspondence is None:
+            raise CalibrationError(
+                f"Rig {rig.name!r} holds no data-driven correspondence; run the depth-stage calibration"
+                " or use the analytic model."
+            )
+        self.rig = rig
+        self.grid = rig.correspondence
+
+    def trace(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+        """Projector pixels; the rows, which the fit does not cover, are those of the analytic model."""
+        if order == 0:
+            return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
+        if order not in self.grid.orders:
+            raise CalibrationError(f"The data-driven correspondence knows orders {self.grid.orders}, not {order}.")
+        alpha, beta, gamma = self._coefficients(order, pixels, depth_mm)
+        at_nodes = alpha * (depth_mm / self.grid.depth_unit_mm) ** beta + gamma
+        matrix = like(_linear_matrix(np.array(self.grid.wavelengths_nm), wavelengths_nm), depth_mm)
+        rows = GratingModel(self.rig).trace(pixels, depth_mm, order, wavelengths_nm).rows
+        return Footprint(matrix @ at_nodes, rows)
+
+    def _coefficients(self, order: int, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Alpha, beta, gamma at flat pixels, each (wavelength nodes, pixels)."""
+        full = _upsampled(self.grid, order, self.rig.camera.width_px, self.rig.camera.height_px)
+        at = like(full, depth_mm)[:, :, pixels]
+        return at[0], at[1], at[2]
+
+
+@lru_cache(maxsize=4)
+def _upsampled(grid: object, order: int, width: int, height: int) -> NDArray[np.float32]:
+    """Coefficients of every pixel, shape (3, wavelengths, pixels), by cubic splines over the grid."""
+    from scipy.interpolate import make_interp_spline
+
+    from dsl_core.model.rig import CorrespondenceGrid
+
+    assert isinstance(grid, CorrespondenceGrid)
+    nodes = grid.array[grid.orders.index(order)]
+    rows = make_interp_spline(np.array(grid.rows_px), nodes, k=min(3, len(grid.rows_px) - 1), axis=1)(np.arange(height))
+    both = make_interp_spline(np.array(grid.columns_px), rows, k=min(3, len(grid.columns_px) - 1), axis=2)(np.arange(width))
+    return np.ascontiguousarray(np.moveaxis(both, 3, 0), np.float32).reshape(3, len(grid.wavelengths_nm), -1)
+
+
+def _linear_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix of linear interpolation, extrapolating with the outermost pair."""
+    i = np.clip(np.searchsorted(nodes, targets) - 1, 0, len(nodes) - 2)
+    t = (targets - nodes[i]) / (nodes[i + 1] - nodes[i])
+    matrix = np.zeros((len(targets), len(nodes)))
+    matrix[np.arange(len(targets)), i] = 1 - t
+    matrix[np.arange(len(targets)), i + 1] += t
+    return matrix
+
+
+def correspondence(rig: Rig, model: str = "auto") -> Correspondence:
+    """The model asked for: ``grating``, ``grid``, or ``auto`` (grid where the rig holds one)."""
+    if model == "auto":
+        model = "grid" if rig.correspondence is not None else "grating"
+    models: dict[str, type[GratingModel] | type[GridModel]] = {"grating": GratingModel, "grid": GridModel}
+    if model not in models:
+        raise CalibrationError(f"There is no correspondence model {model!r}; choose auto, grating or grid.")
+    return models[model](rig)

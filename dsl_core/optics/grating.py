@@ -1,0 +1,104 @@
+"""The diffraction film: grating equation in direction cosines, and the ray that reaches a point.
+
+In the film's local frame (x across the lines, y along them, z through the film) light of direction
+cosines (a, b, c) leaves order m with::
+
+    a' = a - m * wavelength / period,    b' = b,    c' = sqrt(1 - a'^2 - b'^2)
+
+The sign counts orders as the model package says: order +1 comes from columns right of the zero order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.rig import Film
+
+#: The film is close to the projector and the scene is far, so each step shrinks the error about
+#: twentyfold; five steps end below 1e-4 px.
+ITERATIONS = 5
+
+
+class Vectors(NamedTuple):
+    """Three components of a field of vectors, each of the same shape."""
+
+    x: Tensor
+    y: Tensor
+    z: Tensor
+
+
+@dataclass(frozen=True)
+class FilmFrame:
+    """The film's pose in projector coordinates: rotation rows are its x, y and normal axes."""
+
+    axes: NDArray[np.float64]
+    distance_mm: float
+    bend_per_mm: float
+    period_nm: float
+
+    @classmethod
+    def of(cls, film: Film) -> FilmFrame:
+        """Pose of a film record: roll about the normal, then tilts about x and y."""
+        ax, ay, az = np.radians([film.tilt_x_deg, film.tilt_y_deg, film.roll_deg])
+        cx, sx, cy, sy, cz, sz = np.cos(ax), np.sin(ax), np.cos(ay), np.sin(ay), np.cos(az), np.sin(az)
+        rx = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+        ry = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+        return cls((ry @ rx @ rz).T, film.distance_mm, film.bend_per_mm, film.period_nm)
+
+    def to_film(self, p: Vectors) -> Vectors:
+        """Rotate projector coordinates into the film's axes."""
+        r = self.axes
+        return Vectors(*(float(q[0]) * p.x + float(q[1]) * p.y + float(q[2]) * p.z for q in r))
+
+    def to_projector(self, p: Vectors) -> Vectors:
+        """Rotate film axes back into projector coordinates."""
+        r = self.axes.T
+        return Vectors(*(float(q[0]) * p.x + float(q[1]) * p.y + float(q[2]) * p.z for q in r))
+
+
+def diffract(a: Tensor, b: Tensor, order: int, wavelength_over_period: Tensor | float) -> Vectors:
+    """Outgoing direction cosines of incoming (a, b); NaN where the order is evanescent."""
+    out = a - order * wavelength_over_period
+    return Vectors(out, b, torch.sqrt(1 - out * out - b * b))
+
+
+def incoming_direction(
+    frame: FilmFrame, point: Vectors, order: int, wavelength_nm: Tensor
+) -> Vectors:
+    """Direction in which light must leave the projector's centre to reach a point through an order.
+
+    ``point`` is in projector coordinates (mm); shapes broadcast with ``wavelength_nm``. The result is in
+    projector coordinates. Solved by fixed-point iteration over the place where the ray meets the film.
+    """
+    target = frame.to_film(point)
+    # The film's surface point nearest the projector's axis, in film axes.
+    origin = frame.axes @ np.array([0.0, 0.0, frame.distance_mm])
+    shift = order * wavelength_nm / frame.period_nm
+    scale = origin[2] / target.z
+    film_x, film_y = target.x * scale, target.y * scale
+    direction = target
+    for _ in range(ITERATIONS):
+        u = film_x - origin[0]
+        sag = 0.5 * frame.bend_per_mm * u * u
+        dx, dy, dz = target.x - film_x, target.y - film_y, target.z - (origin[2] + sag)
+        inverse = torch.rsqrt(dx * dx + dy * dy + dz * dz)
+        # Local frame on the bent film: x axis (1, 0, slope), normal (-slope, 0, 1), both normalised.
+        slope = frame.bend_per_mm * u
+        unit = torch.rsqrt(1 + slope * slope)
+        a_out = (dx + slope * dz) * unit * inverse
+        b = dy * inverse
+        a = a_out + shift
+        # Evanescent orders end at grazing incidence, far outside any frame, instead of NaN.
+        a = a.clip(-0.999, 0.999)
+        c = torch.sqrt((1 - a * a - b * b).clip(min=1e-3))
+        direction = Vectors((a - slope * c) * unit, b, (slope * a + c) * unit)
+        reach = (origin[2] + sag) / direction.z
+        film_x, film_y = direction.x * reach, direction.y * reach
+    return frame.to_projector(direction)

@@ -1,0 +1,87 @@
+"""Pinhole camera with the five-coefficient distortion of Brown and OpenCV.
+
+The arithmetic is written with operators only, so that NumPy arrays and torch tensors pass through
+the same lines.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.geometry import Lens
+
+
+def distort(x: Any, y: Any, coefficients: tuple[float, ...], max_radius_sq: float = np.inf) -> tuple[Any, Any]:
+    """Distorted image-plane coordinates of undistorted ones (any shape, unit focal length).
+
+    OpenCV's model: radial ``1 + k1 r^2 + k2 r^4 + k3 r^6`` and tangential p1, p2. Beyond
+    ``max_radius_sq`` the radial factor stays constant, because the polynomial folds back on itself
+    far outside the image and would put impossible points inside it.
+    """
+    k1, k2, p1, p2, k3 = coefficients
+    r2 = x * x + y * y
+    rc = r2.clip(max=max_radius_sq) if np.isfinite(max_radius_sq) else r2
+    radial = 1 + rc * (k1 + rc * (k2 + rc * k3))
+    xy = 2 * x * y
+    return x * radial + p1 * xy + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + p2 * xy
+
+
+def undistort(
+    x: NDArray[np.float64], y: NDArray[np.float64], coefficients: tuple[float, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Undistorted coordinates of distorted ones: the inverse of `distort` by Newton's method.
+
+    Raises `CalibrationError` when the distortion cannot be inverted there.
+    """
+    u, v = x.astype(float), y.astype(float)
+    h = 1e-6
+    for _ in range(20):
+        fx, fy = distort(u, v, coefficients)
+        ex, ey = fx - x, fy - y
+        if max(np.abs(ex).max(initial=0), np.abs(ey).max(initial=0)) < 1e-12:
+            return u, v
+        ax, ay = distort(u + h, v, coefficients)
+        bx, by = distort(u, v + h, coefficients)
+        jxx, jyx, jxy, jyy = (ax - fx) / h, (ay - fy) / h, (bx - fx) / h, (by - fy) / h
+        det = jxx * jyy - jxy * jyx
+        u = u - (jyy * ex - jxy * ey) / det
+        v = v - (jxx * ey - jyx * ex) / det
+    if not max(np.abs(ex).max(), np.abs(ey).max()) < 1e-9:
+        raise CalibrationError(
+            f"The lens distortion {coefficients} cannot be inverted inside the image; the calibration is not"
+            " that of a real lens. Calibrate the geometry again."
+        )
+    return u, v
+
+
+@lru_cache(maxsize=8)
+def pixel_rays(lens: Lens) -> NDArray[np.float64]:
+    """Direction of every pixel's ray in camera coordinates with z = 1, shape (3, rows, columns)."""
+    columns, rows = np.meshgrid(np.arange(lens.width_px), np.arange(lens.height_px))
+    x, y = undistort(
+        (columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px, lens.distortion
+    )
+    rays = np.stack([x, y, np.ones_like(x)])
+    rays.setflags(write=False)
+    return rays
+
+
+@lru_cache(maxsize=8)
+def max_radius_sq(lens: Lens) -> float:
+    """Squared radius of the image circle, a tenth beyond the farthest corner (unit focal length)."""
+    corners = pixel_rays(lens)[:2, [0, 0, -1, -1], [0, -1, 0, -1]]
+    return float(1.21 * (corners**2).sum(0).max())
+
+
+def project(lens: Lens, x: Any, y: Any, z: Any) -> tuple[Any, Any]:
+    """Column and row (px) of points in the lens's own coordinates (mm); any shape.
+
+    Seed Eqs. (9) to (11), with distortion.
+    """
+    u, v = distort(x / z, y / z, lens.distortion, max_radius_sq(lens))
+    return u * lens.fx_px + lens.cx_px, v * lens.fy_px + lens.cy_px

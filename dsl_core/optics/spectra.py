@@ -1,0 +1,61 @@
+"""Spectral response of the whole chain: LED emission, film efficiency, camera response."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Rig
+
+
+#: Light this far beyond the bands still counts in the zero order.
+BEYOND_NM = 40.0
+
+
+def chain_response(rig: Rig, order: int, wavelengths_nm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """DN per ms and nm of a perfect diffuser at unit shading, full drive of one LED.
+
+    Shape (camera channels 3, LEDs 3, wavelengths). Orders that the rig does not know give zero.
+    """
+    if order == 0:
+        efficiency = np.ones(len(wavelengths_nm))
+    elif order in rig.efficiency:
+        efficiency = rig.efficiency[order].at(wavelengths_nm)
+    else:
+        efficiency = np.zeros(len(wavelengths_nm))
+    response = np.stack([curve.at(wavelengths_nm) for curve in rig.response])
+    emission = np.stack([curve.at(wavelengths_nm) for curve in rig.emission])
+    return rig.white_scale * response[:, None] * (emission * efficiency)[None]
+
+
+def hat_moments(
+    rig: Rig, order: int, centres_nm: NDArray[np.float64], step_nm: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weight and centroid of the chain's response under each band's hat function.
+
+    Reflectance is taken as linear between bands, so a band's share of the signal is the response under
+    a triangle of half width ``step_nm``. In the zero order, which mixes all light, the two end bands also
+    stand for what lies beyond them. Returns the integrals (DN per ms), shape (3, 3, bands), and the
+    centroids (nm), shape (bands,), of all channels and LEDs together. With both kept exact, curvature of
+    the response inside a band matters only in second order.
+    """
+    fine = np.linspace(-step_nm, step_nm, 41)
+    hat = np.broadcast_to(1 - np.abs(fine) / step_nm, (len(centres_nm), fine.size)).copy()
+    nm = centres_nm[:, None] + fine
+    weight = chain_response(rig, order, nm.ravel()).reshape(3, 3, *nm.shape) * hat
+    width = fine[1] - fine[0]
+    total = weight.sum((0, 1))
+    mass = total.sum(-1)
+    centroid = np.where(mass > 0, (total * nm).sum(-1) / np.where(mass > 0, mass, 1), centres_nm)
+    moments = weight.sum(-1) * width
+    if order == 0:
+        moments[..., 0] += _beyond(rig, centres_nm[0], -1, step_nm)
+        moments[..., -1] += _beyond(rig, centres_nm[-1], 1, step_nm)
+    return moments, centroid
+
+
+def _beyond(rig: Rig, end_nm: float, side: int, step_nm: float) -> NDArray[np.float64]:
+    """Zero-order response on one side of an end band that its hat leaves out, shape (3, 3)."""
+    distance_nm = np.arange(0, BEYOND_NM, 0.25)
+    outside = np.clip(distance_nm / step_nm, 0, 1)
+    return np.asarray((chain_response(rig, 0, end_nm + side * distance_nm) * outside).sum(-1) * 0.25)

@@ -1,0 +1,226 @@
+"""Camera, projector, stage and spectroradiometer of the twin, and how the twin is opened by name."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import (
+    Camera,
+    CameraInfo,
+    DeviceRig,
+    Projector,
+    ProjectorInfo,
+    Spectroradiometer,
+    Stage,
+)
+from dsl_core.errors import DeviceError
+from dsl_core.model.frames import Frame
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.truth import Scene
+from dsl_core.simulation.world import Clock, World
+
+LATENCY_MS = 50.0
+EXPOSURE_RANGE_MS = (0.019, 30_000.0)
+STAGE_RANGE_MM = (500.0, 1000.0)
+#: Scenes that a stage can carry towards and away from the camera.
+STAGED = ("plane", "stage")
+
+
+class SimCamera(Camera):
+    """Looks at the world through the calibrated optics."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._exposure_ms = 100.0
+        self._shot, self._attempt, self._frame_id = -1, 0, 0
+        lens, sensor = world.rig.camera, world.rig.sensor
+        self._info = CameraInfo(
+            "twin of GS3-U3-32S4C", "TWIN-C", lens.width_px, lens.height_px, sensor.bayer, sensor.bit_depth,
+            EXPOSURE_RANGE_MS,
+        )  # fmt: skip
+
+    @property
+    def info(self) -> CameraInfo:
+        """Identity and capabilities."""
+        return self._info
+
+    def configure(self, exposure_ms: float) -> float:
+        """Set the exposure; raises `DeviceError` outside the range."""
+        low, high = EXPOSURE_RANGE_MS
+        if not low <= exposure_ms <= high:
+            raise DeviceError(
+                f"The camera was asked for an exposure of {exposure_ms:g} ms; it can do {low:g} to {high:g} ms."
+                " Change the plan's settings."
+            )
+        self._exposure_ms = exposure_ms
+        return exposure_ms
+
+    def prepare(self, shot_index: int, attempt: int = 0) -> None:
+        """Announce the shot; its noise depends on nothing else."""
+        self._shot, self._attempt = shot_index, attempt
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        """Expose and return the frame."""
+        world = self.world
+        pixels = world.expose(self._exposure_ms, self._shot + 1, self._attempt)
+        world.clock.wait(self._exposure_ms / 1000)
+        self._frame_id += 1
+        return Frame(pixels, self._exposure_ms, world.clock.now_s, self._frame_id)
+
+
+class SimProjector(Projector):
+    """Changes the world."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        lens = world.rig.projector
+        self._info = ProjectorInfo(
+            "twin of PH30N", "TWIN-P", lens.width_px, lens.height_px, LATENCY_MS, world.rig.frame_period_ms
+        )
+
+    @property
+    def info(self) -> ProjectorInfo:
+        """Identity and capabilities."""
+        return self._info
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show drive levels; raises `DeviceError` for another size or type."""
+        wanted = (self._info.height_px, self._info.width_px)
+        if image.dtype != np.uint8 or image.shape not in (wanted, (*wanted, 3)):
+            raise DeviceError(
+                f"The projector was given an image of shape {image.shape} and type {image.dtype}; it shows"
+                f" {wanted[0]} x {wanted[1]} pixels of uint8, grey or RGB."
+            )
+        self.world.show(image)
+        self.world.clock.wait(LATENCY_MS / 1000)
+
+
+class SimStage(Stage):
+    """Moves the scene along the camera axis."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+
+    @property
+    def range_mm(self) -> tuple[float, float]:
+        """Smallest and largest position, mm."""
+        return STAGE_RANGE_MM
+
+    @property
+    def position_mm(self) -> float:
+        """Where the stage is, mm."""
+        return self.world.position_mm
+
+    def move_to(self, position_mm: float) -> float:
+        """Move; raises `DeviceError` outside the range."""
+        low, high = STAGE_RANGE_MM
+        if not low <= position_mm <= high:
+            raise DeviceError(
+                f"The stage was asked for {position_mm:g} mm; it travels from {low:g} to {high:g} mm."
+            )
+        self.world.move_to(float(position_mm))
+        return self.world.position_mm
+
+
+class SimSpectroradiometer(Spectroradiometer):
+    """Measures the spot in the middle of the camera's view, 1 % noise of the peak."""
+
+    NOISE = 0.002
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self._count = 0
+
+    def measure(self) -> SpectralCurve:
+        """Spectral radiance of the spot in relative units of W/(sr m2 nm)."""
+        world, truth = self.world, self.world.truth
+        nm = truth.materials.wavelengths_nm
+        spot = (truth.depth_mm.shape[0] // 2, truth.depth_mm.shape[1] // 2)
+        material = int(truth.material[spot])
+        reflectance = truth.materials.reflectance[material] if material >= 0 else np.zeros(len(nm))
+        drive = np.zeros(3) if world.image is None else world.image.reshape(-1, world.image.shape[-1])[:, -3:].mean(0) / 255
+        light = world.rig.projector_response.radiance(drive)
+        value = reflectance * sum(w * curve.at(nm) for w, curve in zip(light, world.rig.emission, strict=True))
+        if world.noise:
+            self._count += 1
+            rng = np.random.Generator(np.random.SFC64([world.seed, 1 << 20, self._count]))
+            value = value + self.NOISE * value.max() * rng.standard_normal(len(nm))
+        return SpectralCurve.of(nm, value, unit="W/(sr m2 nm)")
+
+
+def open_twin(options: dict[str, str]) -> DeviceRig:
+    """The twin of the published rig; scenes, noise and image size as options.
+
+    ``scene`` (default ``color-checker``) and its own options, ``size`` (``890x580``), ``seed``, ``noise``
+    (``on``, ``off``), ``sigma`` (extra noise as a share of full scale), ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``),
+    ``realtime`` (``on`` waits as long as real devices would). Raises `DeviceError` for a value that makes no sense.
+    """
+    rest = dict(options)
+    rig = published_rig()
+    size = rest.pop("size", "")
+    if size:
+        rig = rig.model_copy(update={"camera": rig.camera.resized(*_size(size))})
+    name = rest.pop("scene", "color-checker")
+    world = World(
+        rig,
+        scene_at=lambda position_mm: make_scene(name, **rest),
+        seed=int(_number("seed", rest.pop("seed", "0"))),
+        noise=_switch("noise", rest.pop("noise", "on")),
+        extra_sigma_fs=_number("sigma", rest.pop("sigma", "0")),
+        film=_switch("film", rest.pop("film", "on")),
+        device=rest.pop("device", "cpu"),
+        clock=Clock(sleep=time.sleep) if _switch("realtime", rest.pop("realtime", "off")) else Clock(),
+    )
+    if name in STAGED:
+        world.position_mm = _number("depth_mm", rest.pop("depth_mm", "700"))
+        world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **rest)
+    return assemble(world)
+
+
+def assemble(world: World) -> DeviceRig:
+    """The devices of a world as a rig; its true calibration is known."""
+    return DeviceRig(
+        name="twin",
+        camera=SimCamera(world),
+        projector=SimProjector(world),
+        stage=SimStage(world),
+        spectroradiometer=SimSpectroradiometer(world),
+        calibration=world.rig,
+        sleep=world.clock.wait,
+    )
+
+
+def check_scene(name: str, options: dict[str, str]) -> Scene:
+    """Build the scene once so that a wrong name or option is told before anything is captured."""
+    return make_scene(name, **options)
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        width = height = 0
+    if not (16 <= width <= 4096 and 16 <= height <= 4096):
+        raise DeviceError(f"The twin's size must be like 890x580 (16 to 4096 pixels a side), not {text!r}.")
+    return width, height
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value) or value < 0:
+        raise DeviceError(f"The twin's option {name} must be a number of at least 0, not {text!r}.")
+    return value
+
+
+def _switch(name: str, text: str) -> bool:
+    if text not in ("on", "off"):
+        raise DeviceError(f"The twin's option {name} must be 'on' or 'off', not {text!r}.")
+    return text == "on"
