@@ -1,0 +1,1 @@
+"""Doing a plan with the devices of a rig."""

@@ -1,0 +1,1 @@
+"""What cameras, projectors, stages and spectroradiometers promise, and how rigs of them are found."""

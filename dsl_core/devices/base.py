@@ -64,6 +64,13 @@ class Camera(Device):
     def configure(self, exposure_ms: float) -> float:
         """Set the exposure and return the one in force; raises `DeviceError` outside the range."""
 
+    def prepare(self, shot_index: int, attempt: int = 0) -> None:
+        """Learn which shot of a plan, and which attempt at it, the next `snap` is for.
+
+        Hardware need not care. A simulated camera draws its noise from these numbers, so that a scan
+        that was interrupted and resumed equals an unbroken one.
+        """
+
     @abstractmethod
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         """Expose now and return the frame.

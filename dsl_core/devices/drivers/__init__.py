@@ -1,0 +1,1 @@
+"""Drivers of real hardware, one file each; only the registry sees them."""

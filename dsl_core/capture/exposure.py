@@ -1,0 +1,144 @@
+"""One frame of one shot, whatever it takes: retries, late frames, only what changed is sent."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError
+from dsl_core.model.describe import describe_shot
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, Shot
+
+PatternImage = Callable[[CapturePlan, Shot], NDArray[np.uint8]]
+
+#: A camera may round the exposure it is asked for by this share.
+EXPOSURE_TOLERANCE = 0.05
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class RetryPolicy:
+    """How patient a runner is with a shot.
+
+    ``attempts`` exposures at most, ``wait_ms`` between them after a lost frame; ``timeout_ms`` is added to
+    the exposure before a frame counts as lost.
+    """
+
+    attempts: int = 4
+    wait_ms: float = 200.0
+    timeout_ms: float = 5000.0
+
+
+class _StaleFrameError(DeviceError):
+    """The camera delivered a picture that it had delivered before."""
+
+
+class ShotTaker:
+    """Takes shots with a rig and remembers what projector and camera are set to."""
+
+    def __init__(
+        self, rig: DeviceRig, plan: CapturePlan, pattern_image: PatternImage, policy: RetryPolicy
+    ) -> None:
+        """Keep the parts; nothing is sent to the devices yet."""
+        self._rig = rig
+        self._plan = plan
+        self._pattern_image = pattern_image
+        self._policy = policy
+        self._sleep = rig.sleep or time.sleep
+        self._shown: tuple[object, ...] | None = None
+        self._exposure_ms: float | None = None
+        self._last: Frame | None = None
+
+    def take(self, shot: Shot) -> Frame:
+        """The frame of a shot; raises `DeviceError` when all attempts failed."""
+        before = self._last
+        suspected = False
+        for attempt in range(self._policy.attempts):
+            try:
+                frame = self._attempt(shot, attempt)
+            except DeviceError as error:
+                self._recover(shot, attempt, error)
+                continue
+            # New number, old picture: noise never repeats, so the picture is suspect, unless the camera
+            # has no noise, which shows when a second exposure agrees as well.
+            if suspected or not _same_picture(frame, before):
+                return replace(frame, attempts=attempt + 1)
+            suspected = True
+        raise DeviceError(
+            f"The camera delivered the picture of the shot before for {describe_shot(shot)}."
+            " Check that the projector follows and restart the camera, then resume the scan."
+        )
+
+    def show_black(self) -> None:
+        """Turn the projector dark; raises `DeviceError`."""
+        info = self._rig.projector.info
+        self._shown = None
+        self._rig.projector.show(np.zeros((info.height_px, info.width_px), np.uint8))
+
+    def _attempt(self, shot: Shot, attempt: int) -> Frame:
+        self._set(shot)
+        self._rig.camera.prepare(shot.index, attempt)
+        frame = self._rig.camera.snap(shot.exposure_ms + self._policy.timeout_ms)
+        self._check(frame)
+        self._last = frame
+        return frame
+
+    def _set(self, shot: Shot) -> None:
+        """Send pattern and exposure where they differ from what the devices have."""
+        if shot.exposure_ms != self._exposure_ms:
+            actual = self._rig.camera.configure(shot.exposure_ms)
+            if abs(actual - shot.exposure_ms) > EXPOSURE_TOLERANCE * shot.exposure_ms:
+                raise DeviceError(
+                    f"The camera exposes for {actual:g} ms instead of the {shot.exposure_ms:g} ms of"
+                    f" {describe_shot(shot)}. Choose an exposure that this camera can do."
+                )
+            self._exposure_ms = shot.exposure_ms
+        pattern = (shot.role, shot.pattern, shot.level)
+        if pattern != self._shown:
+            self._shown = None
+            self._rig.projector.show(self._pattern_image(self._plan, shot))
+            self._shown = pattern
+
+    def _check(self, frame: Frame) -> None:
+        """Raise `DeviceError` for a frame of another size or type, or one that came before."""
+        width, height = self._plan.camera_size_px
+        if frame.pixels.shape != (height, width) or frame.pixels.dtype != np.uint16:
+            raise DeviceError(
+                f"The camera delivered {frame.pixels.dtype} of shape {frame.pixels.shape} instead of uint16"
+                f" of shape {(height, width)}. Check its pixel format and region of interest."
+            )
+        last = self._last
+        if last is None:
+            return
+        same_time = frame.timestamp_s == last.timestamp_s != 0.0
+        if frame.frame_id <= last.frame_id or same_time:
+            raise _StaleFrameError(
+                f"The camera delivered frame number {frame.frame_id} again (time {frame.timestamp_s:g} s)."
+                " Restart the camera; on a slow connection lower its frame rate."
+            )
+
+    def _recover(self, shot: Shot, attempt: int, error: DeviceError) -> None:
+        """Get ready for another attempt, or give up with a clear sentence."""
+        if attempt + 1 >= self._policy.attempts:
+            raise DeviceError(
+                f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {error}"
+                " Everything before it is stored; resume the scan when the device works again."
+            ) from error
+        _log.warning("%s, attempt %d: %s", describe_shot(shot), attempt + 1, error)
+        if not isinstance(error, _StaleFrameError):
+            self._shown = self._exposure_ms = None
+            self._sleep(self._policy.wait_ms / 1000.0)
+
+
+def _same_picture(frame: Frame, before: Frame | None) -> bool:
+    """Whether two frames agree in every pixel without being clipped throughout."""
+    if before is None or not np.array_equal(frame.pixels, before.pixels):
+        return False
+    return bool(frame.pixels.min() < frame.pixels.max())

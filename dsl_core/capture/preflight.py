@@ -1,0 +1,69 @@
+"""Whether a plan is possible on a rig, asked before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import CapturePlan
+
+
+def find_obstacles(rig: DeviceRig, plan: CapturePlan) -> list[str]:
+    """Everything that keeps the rig from doing the plan, one clause each; empty when it can start."""
+    return [*_sizes(rig, plan), *_exposures(rig, plan), *_calibration(rig)]
+
+
+def require_possible(rig: DeviceRig, plan: CapturePlan) -> None:
+    """Raise `PlanError` naming all obstacles at once."""
+    obstacles = find_obstacles(rig, plan)
+    if obstacles:
+        raise PlanError(
+            f"The plan {plan.name!r} is impossible on the rig {rig.name!r}: {'; '.join(obstacles)}."
+        )
+
+
+def _sizes(rig: DeviceRig, plan: CapturePlan) -> Iterator[str]:
+    camera, projector = rig.camera.info, rig.projector.info
+    for name, wanted, found in (
+        ("camera", plan.camera_size_px, (camera.width_px, camera.height_px)),
+        ("projector", plan.projector_size_px, (projector.width_px, projector.height_px)),
+    ):
+        if wanted != found:
+            yield (
+                f"the plan is for a {name} of {wanted[0]} x {wanted[1]} pixels,"
+                f" this one has {found[0]} x {found[1]} (make the plan with this {name}'s size)"
+            )
+
+
+def _exposures(rig: DeviceRig, plan: CapturePlan) -> Iterator[str]:
+    shortest, longest = rig.camera.info.exposure_range_ms
+    for i, setting in enumerate(plan.settings):
+        if not shortest <= setting.exposure_ms <= longest:
+            yield (
+                f"setting {i} exposes for {setting.exposure_ms:g} ms, but the camera can do {shortest:g}"
+                f" to {longest:g} ms"
+            )
+
+
+def _calibration(rig: DeviceRig) -> Iterator[str]:
+    known = rig.calibration
+    if known is None:
+        return
+    camera, projector = rig.camera.info, rig.projector.info
+    for name, lens, found in (
+        ("camera", known.camera, (camera.width_px, camera.height_px)),
+        ("projector", known.projector, (projector.width_px, projector.height_px)),
+    ):
+        if (lens.width_px, lens.height_px) != found:
+            yield (
+                f"the calibration is for a {name} of {lens.width_px} x {lens.height_px} pixels,"
+                f" this one has {found[0]} x {found[1]}"
+                " (calibrate again, or load the calibration of this size)"
+            )
+    if (known.sensor.bayer, known.sensor.bit_depth) != (camera.bayer, camera.bit_depth):
+        yield (
+            f"the calibration is for a {known.sensor.bayer} mosaic of {known.sensor.bit_depth} bits,"
+            f" the camera delivers {camera.bayer} of {camera.bit_depth} bits"
+            " (set the camera, or calibrate again)"
+        )

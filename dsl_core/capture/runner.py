@@ -1,0 +1,211 @@
+"""Doing a plan: one small state machine around one loop.
+
+Shots are taken in order and pushed to a sink. Pausing and cancelling act between shots. Whatever
+happens, the projector is dark at the end and every stored frame stays stored.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
+from dsl_core.capture.preflight import require_possible
+from dsl_core.capture.status import State, Status
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import Cancelled, DslError
+from dsl_core.model.frames import FrameSink
+from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.progress import CancelToken, NoProgress, Progress
+
+Listener = Callable[[Status], None]
+_log = logging.getLogger(__name__)
+
+
+class Runner:
+    """Runs a plan once; everything but `run` may be called from other threads.
+
+    The runner owns neither the rig nor the sink: who opened them closes them.
+    """
+
+    def __init__(
+        self,
+        rig: DeviceRig,
+        plan: CapturePlan,
+        sink: FrameSink,
+        pattern_image: PatternImage,
+        *,
+        policy: RetryPolicy | None = None,
+        progress: Progress | None = None,
+        token: CancelToken | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time."""
+        self._rig = rig
+        self._plan = plan
+        self._sink = sink
+        self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy())
+        self._progress = progress or NoProgress()
+        self._token = token or CancelToken()
+        self._pace = _Pace(clock, rig.projector.info.latency_ms)
+        self._status = Status(State.IDLE, total=plan.shot_count)
+        self._listeners: list[Listener] = []
+        self._condition = threading.Condition()
+        self._pause_wanted = False
+
+    @property
+    def status(self) -> Status:
+        """The latest status."""
+        return self._status
+
+    def listen(self, listener: Listener) -> None:
+        """Call ``listener`` with every new status, on the thread of `run`; what it raises is only logged."""
+        self._listeners.append(listener)
+
+    def pause(self) -> None:
+        """Stop before the next shot until `resume` or `cancel`."""
+        with self._condition:
+            self._pause_wanted = True
+
+    def resume(self) -> None:
+        """Go on after `pause`."""
+        with self._condition:
+            self._pause_wanted = False
+            self._condition.notify_all()
+
+    def cancel(self) -> None:
+        """End before the next shot; what is stored stays stored."""
+        self._token.cancel()
+        with self._condition:
+            self._condition.notify_all()
+
+    def run(self) -> Status:
+        """Take every missing shot and return the final status.
+
+        Raises `PlanError` when the plan is impossible on the rig, `DeviceError` when a shot cannot be taken,
+        `StoreError` when it cannot be stored, `Cancelled` when someone asked for the end.
+        """
+        if self._status.state is not State.IDLE:
+            raise RuntimeError("a runner runs once; make a new one to go on with the same sink")
+        try:
+            self._set(State.CHECKING)
+            require_possible(self._rig, self._plan)
+            self._take_all(list(self._sink.missing()))
+        except (Cancelled, KeyboardInterrupt) as error:
+            self._end(
+                State.CANCELLED, str(error) or "Interrupted; what is stored stays stored. Resume to go on."
+            )
+            raise
+        except DslError as error:
+            self._end(State.FAILED, str(error))
+            raise
+        except BaseException as error:
+            self._end(State.FAILED, f"{type(error).__name__}: {error}")
+            raise
+        self._end(State.FINISHED, f"All {self._plan.shot_count} frames are stored.")
+        return self._status
+
+    def _take_all(self, missing: list[Shot]) -> None:
+        done = self._plan.shot_count - len(missing)
+        self._pace.start(missing)
+        for shot in missing:
+            self._between_shots(shot, done)
+            self._set(State.RUNNING, shot=shot, done=done)
+            frame = self._taker.take(shot)
+            self._sink.write(shot, frame)
+            self._pace.passed(shot)
+            done += 1
+            self._set(State.RUNNING, shot=shot, done=done)
+            self._report(done)
+
+    def _between_shots(self, shot: Shot, done: int) -> None:
+        """Wait while paused; raise `Cancelled` when the end is wanted."""
+        with self._condition:
+            if self._must_wait():
+                self._pace.hold()
+                self._set(State.PAUSED, shot=shot, done=done)
+                # A token may be cancelled elsewhere without notifying, hence the time-out.
+                while self._must_wait():
+                    self._condition.wait(0.1)
+                self._pace.go_on()
+        if self._token.is_cancelled:
+            self._set(State.CANCELLING, shot=shot, done=done)
+            raise Cancelled(
+                f"Cancelled after {done} of {self._plan.shot_count} frames; they are stored. Resume to go on."
+            )
+
+    def _must_wait(self) -> bool:
+        return self._pause_wanted and not self._token.is_cancelled
+
+    def _report(self, done: int) -> None:
+        try:
+            self._progress.report("scan", done, self._plan.shot_count)
+        except Cancelled:
+            self._token.cancel()  # a finished scan ends as finished; otherwise the next boundary ends it
+        except Exception:
+            _log.exception("the progress display failed; the scan goes on")
+
+    def _set(self, state: State, **changes: object) -> None:
+        elapsed_s, remaining_s = self._pace.times()
+        self._status = replace(
+            self._status,
+            state=state,
+            elapsed_s=elapsed_s,
+            remaining_s=remaining_s,
+            **changes,  # type: ignore[arg-type]
+        )
+        for listener in tuple(self._listeners):
+            try:
+                listener(self._status)
+            except Exception:
+                _log.exception("a listener failed; the scan goes on")
+
+    def _end(self, state: State, message: str) -> None:
+        """Leave the projector dark and say how it ended; a failing projector does not hide the reason."""
+        try:
+            self._taker.show_black()
+        except Exception as error:
+            _log.warning("the projector could not be turned dark: %s", error)
+            message += f" The projector could not be turned dark ({error})"
+        self._pace.hold()
+        self._set(state, message=message)
+
+
+class _Pace:
+    """Time spent running, and an estimate of what is left, weighted by exposure."""
+
+    def __init__(self, clock: Callable[[], float], latency_ms: float) -> None:
+        self._clock = clock
+        self._latency_ms = latency_ms
+        self._spent_s = 0.0
+        self._since_s: float | None = None
+        self._cost_done_s = 0.0
+        self._cost_left_s = 0.0
+
+    def start(self, missing: list[Shot]) -> None:
+        self._cost_left_s = sum(map(self._cost_s, missing))
+        self._since_s = self._clock()
+
+    def passed(self, shot: Shot) -> None:
+        self._cost_done_s += self._cost_s(shot)
+        self._cost_left_s -= self._cost_s(shot)
+
+    def hold(self) -> None:
+        self._spent_s = self.times()[0]
+        self._since_s = None
+
+    def go_on(self) -> None:
+        self._since_s = self._clock()
+
+    def times(self) -> tuple[float, float]:
+        """Seconds spent running, and seconds left at the pace so far."""
+        running_s = 0.0 if self._since_s is None else self._clock() - self._since_s
+        elapsed_s = self._spent_s + running_s
+        pace = elapsed_s / self._cost_done_s if self._cost_done_s > 0 else 1.0
+        return elapsed_s, pace * max(self._cost_left_s, 0.0)
+
+    def _cost_s(self, shot: Shot) -> float:
+        return (shot.exposure_ms + self._latency_ms) / 1000.0

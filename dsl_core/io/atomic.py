@@ -1,0 +1,71 @@
+"""Files that are there whole or not at all, also after a crash or a power cut."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+from dsl_core.errors import StoreError
+
+PARTIAL_SUFFIX = ".partial"
+_DISK_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
+
+
+def write_atomic(path: Path, data: bytes | bytearray | memoryview) -> None:
+    """Write a file through a neighbour that is synced and renamed; raises `StoreError`.
+
+    When anything goes wrong the file keeps its old content (or stays absent) and nothing is left behind.
+    """
+    partial = path.with_name(path.name + PARTIAL_SUFFIX)
+    try:
+        descriptor = os.open(
+            partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o644
+        )
+        try:
+            write_all(descriptor, data)
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+        os.replace(partial, path)
+        sync_folder(path.parent)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise store_error(path, error) from error
+
+
+def write_all(descriptor: int, data: bytes | bytearray | memoryview) -> None:
+    """Write every byte to an open file; the system may take them in several pieces."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[os.write(descriptor, rest) :]
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames and new names in a folder durable; Windows does so by itself."""
+    if os.name == "nt":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def remove_partials(folder: Path) -> None:
+    """Delete what an interrupted `write_atomic` left in a folder."""
+    for leftover in folder.glob("*" + PARTIAL_SUFFIX):
+        leftover.unlink(missing_ok=True)
+
+
+def store_error(path: Path, error: OSError) -> StoreError:
+    """The sentence for a failed write."""
+    if error.errno in _DISK_FULL:
+        return StoreError(
+            f"The disk is full: {path} could not be written. Nothing stored before is lost;"
+            " free some space and resume."
+        )
+    reason = error.strerror or str(error)
+    return StoreError(
+        f"{path} could not be written ({reason}). Check the folder's permissions and its drive."
+    )

@@ -1,0 +1,93 @@
+"""The capture log: one line of JSON for every frame that is safely on disk.
+
+Lines are only ever appended. A line cut off by a crash is the last one and is dropped; of two lines
+for one shot the later one counts.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import store_error, write_all
+from dsl_core.model.base import Record
+
+
+class LogEntry(Record):
+    """How a stored frame was taken.
+
+    ``run`` counts how often the session was opened for writing: frame numbers and clocks of a camera
+    start anew with it. ``attempts`` above one means that the frame was taken again before it was kept.
+    """
+
+    shot: int = Field(ge=0)
+    exposure_ms: float
+    timestamp_s: float
+    frame_id: int
+    crc32: int
+    attempts: int = 1
+    run: int = 0
+    darkest_dn: int = 0
+    brightest_dn: int = 65535
+
+
+def read_log(path: Path) -> tuple[list[LogEntry], int]:
+    """All whole lines of a log, and how many bytes of the file they fill; raises `StoreError`."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return [], 0
+    entries: list[LogEntry] = []
+    good = 0
+    lines = data.split(b"\n")
+    for number, line in enumerate(lines[:-1], start=1):
+        try:
+            entries.append(LogEntry.model_validate_json(line))
+        except ValidationError as error:
+            if number == len(lines) - 1:
+                break
+            raise StoreError(
+                f"Line {number} of {path} is damaged. Restore the file from a copy, or delete that line"
+                " and resume: its frame is then taken again."
+            ) from error
+        good += len(line) + 1
+    return entries, good
+
+
+class CaptureLog:
+    """A log open for appending."""
+
+    def __init__(self, path: Path) -> None:
+        """Open or create the log and cut off what a crash left of a last line; raises `StoreError`."""
+        self.path = path
+        self.entries, self._size = read_log(path)
+        flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
+        try:
+            self._descriptor: int | None = os.open(path, flags, 0o644)
+            os.ftruncate(self._descriptor, self._size)
+        except OSError as error:
+            raise store_error(path, error) from error
+
+    def append(self, entry: LogEntry) -> None:
+        """Add a line and wait until it is on disk; a line that does not fit is taken back."""
+        if self._descriptor is None:
+            raise StoreError(f"{self.path} is closed; open the session again before writing to it.")
+        line = entry.model_dump_json().encode() + b"\n"
+        try:
+            os.lseek(self._descriptor, self._size, os.SEEK_SET)
+            write_all(self._descriptor, line)
+            os.fsync(self._descriptor)
+        except OSError as error:
+            os.ftruncate(self._descriptor, self._size)
+            raise store_error(self.path, error) from error
+        self._size += len(line)
+        self.entries.append(entry)
+
+    def close(self) -> None:
+        """Close the file; a second call does nothing."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None

@@ -1,0 +1,150 @@
+"""Raw mosaics on disk: a Zarr v3 array with one frame a chunk, written safely and read fast.
+
+The chunks are written and read here directly, because Zarr's own local store does not sync its files
+and costs more than the decompression; any Zarr v3 reader opens the folder as an ordinary array.
+Format: https://zarr-specs.readthedocs.io/en/latest/v3/core/index.html, chunk header:
+https://github.com/Blosc/c-blosc/blob/main/README_CHUNK_FORMAT.rst
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_atomic
+
+#: Blocks of 256 KiB decompress 1.7 times faster than Blosc's own choice for Zstandard, at the same size.
+_BLOSC = {"typesize": 2, "cname": "zstd", "clevel": 1, "shuffle": "bitshuffle", "blocksize": 1 << 18}
+_BITSHUFFLE = 2
+_HEADER = struct.Struct("<BBBBIII")
+_PIXEL = np.dtype("<u2")
+
+
+def checksum(pixels: NDArray[np.uint16]) -> int:
+    """CRC-32 of a mosaic's pixels, little-endian, row by row."""
+    return zlib.crc32(np.ascontiguousarray(pixels, _PIXEL).data)
+
+
+class ChunkError(Exception):
+    """What is wrong with the file of a frame, as half a sentence; `SessionReader` makes it whole."""
+
+
+@dataclass(frozen=True)
+class FrameStore:
+    """The frames folder of a session: ``count`` mosaics of ``height_px`` x ``width_px``."""
+
+    folder: Path
+    count: int
+    height_px: int
+    width_px: int
+
+    def create(self) -> None:
+        """Write the array's metadata; frames follow one by one."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(self._metadata_path, json.dumps(self._metadata(), indent=2).encode())
+
+    def check(self) -> None:
+        """Raise `StoreError` unless the metadata on disk describe exactly this array."""
+        try:
+            found = json.loads(self._metadata_path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise StoreError(
+                f"{self._metadata_path} is missing or damaged, so the frames cannot be read."
+                " Restore it from a copy of the session."
+            ) from error
+        wanted = self._metadata()
+        for key in ("zarr_format", "shape", "data_type", "chunk_grid", "chunk_key_encoding", "codecs"):
+            if found.get(key) != wanted[key]:
+                raise StoreError(
+                    f"{self._metadata_path} gives {key} as {found.get(key)}, but the plan needs"
+                    f" {wanted[key]}. The frames do not belong to this plan;"
+                    " restore the file from a copy of the session."
+                )
+
+    def path(self, index: int) -> Path:
+        """The file of a frame."""
+        return self.folder / f"c.{index}.0.0"
+
+    def stored(self) -> set[int]:
+        """Indices of all frame files in the folder, also of those that the plan does not know."""
+        names = (path.name.split(".") for path in self.folder.glob("c.*.0.0"))
+        return {int(name[1]) for name in names if name[1].isdigit()}
+
+    def write(self, index: int, pixels: NDArray[np.uint16]) -> None:
+        """Store a mosaic, shape (height, width), so that it survives a power cut; raises `StoreError`."""
+        if pixels.shape != (self.height_px, self.width_px) or pixels.dtype != np.uint16:
+            raise StoreError(
+                f"Frame {index} is {pixels.dtype} of shape {pixels.shape}, but the session takes uint16"
+                f" of shape {(self.height_px, self.width_px)}. Make a plan for this camera's size."
+            )
+        from numcodecs import blosc  # type: ignore[import-untyped]
+
+        codec = blosc.Blosc(
+            cname=_BLOSC["cname"], clevel=_BLOSC["clevel"], shuffle=_BITSHUFFLE, blocksize=_BLOSC["blocksize"]
+        )
+        write_atomic(self.path(index), codec.encode(np.ascontiguousarray(pixels, _PIXEL)))
+
+    def read(self, index: int, out: NDArray[np.uint16] | None = None) -> NDArray[np.uint16]:
+        """Load a mosaic, shape (height, width), into ``out`` if given; raises `ChunkError`."""
+        try:
+            chunk = self.path(index).read_bytes()
+        except OSError as error:
+            raise ChunkError(f"its file {self.path(index)} cannot be read ({error.strerror})") from error
+        self._check_header(index, chunk)
+        if out is None:
+            out = np.empty((self.height_px, self.width_px), np.uint16)
+        from numcodecs import blosc
+
+        try:
+            blosc.decompress(chunk, out)
+        except (RuntimeError, ValueError) as error:
+            raise ChunkError(f"its file {self.path(index)} does not decompress ({error})") from error
+        return out
+
+    def _check_header(self, index: int, chunk: bytes) -> None:
+        """Refuse a chunk that is cut off or holds another size or type, before the decoder touches it."""
+        path = self.path(index)
+        if len(chunk) < _HEADER.size:
+            raise ChunkError(f"its file {path} is cut off after {len(chunk)} bytes")
+        _, _, _, typesize, raw_bytes, _, chunk_bytes = _HEADER.unpack_from(chunk)
+        if chunk_bytes != len(chunk):
+            raise ChunkError(f"its file {path} has {len(chunk)} of {chunk_bytes} bytes")
+        wanted = self.height_px * self.width_px * _PIXEL.itemsize
+        if typesize != _PIXEL.itemsize or raw_bytes != wanted:
+            raise ChunkError(
+                f"its file {path} holds {raw_bytes} bytes of {8 * typesize} bit values"
+                f" instead of {wanted} bytes of 16 bit values"
+            )
+
+    @property
+    def _metadata_path(self) -> Path:
+        return self.folder / "zarr.json"
+
+    def _metadata(self) -> dict[str, Any]:
+        return {
+            "zarr_format": 3,
+            "node_type": "array",
+            "shape": [self.count, self.height_px, self.width_px],
+            "data_type": "uint16",
+            "chunk_grid": {
+                "name": "regular",
+                "configuration": {"chunk_shape": [1, self.height_px, self.width_px]},
+            },
+            # Flat names: one folder to sync instead of three new ones a frame.
+            "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
+            "fill_value": 0,
+            "codecs": [
+                {"name": "bytes", "configuration": {"endian": "little"}},
+                {"name": "blosc", "configuration": _BLOSC},
+            ],
+            "attributes": {"unit": "DN"},
+            "dimension_names": ["shot", "y", "x"],
+        }

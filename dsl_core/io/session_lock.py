@@ -1,0 +1,59 @@
+"""One writer a session: a lock of the operating system, which dies with its process."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from pathlib import Path
+
+from dsl_core.errors import StoreError
+
+#: Windows locks byte ranges for reading too, so the locked byte lies behind the text.
+_LOCK_BYTE = 1 << 20
+
+
+class SessionLock:
+    """Held from construction to `release`; a lock left by a killed process is free at once."""
+
+    def __init__(self, path: Path) -> None:
+        """Take the lock; raises `StoreError` that names the process holding it."""
+        self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            _lock(self._descriptor)
+        except OSError as error:
+            owner = os.read(self._descriptor, 32).decode(errors="replace").strip() or "unknown"
+            os.close(self._descriptor)
+            self._descriptor = None
+            raise StoreError(
+                f"{path.parent} is being written by another process (number {owner})."
+                " Wait until it ends, or end it, and try again."
+            ) from error
+        with contextlib.suppress(OSError):  # the number is a courtesy; a full disk must not cost the lock
+            os.ftruncate(self._descriptor, 0)
+            os.write(self._descriptor, f"{os.getpid()}\n".encode())
+
+    def release(self) -> None:
+        """Give the lock back; a second call does nothing."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+
+if sys.platform == "win32":
+
+    def _lock(descriptor: int) -> None:
+        import msvcrt
+
+        os.lseek(descriptor, _LOCK_BYTE, os.SEEK_SET)
+        try:
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        finally:
+            os.lseek(descriptor, 0, os.SEEK_SET)
+
+else:
+
+    def _lock(descriptor: int) -> None:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

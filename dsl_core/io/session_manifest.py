@@ -1,0 +1,109 @@
+"""What a session knows about itself: plan, rig, devices, versions, origin."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError
+
+import dsl_core
+from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.model.base import Record
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+
+MANIFEST_NAME = "manifest.json"
+
+
+class Manifest(Record):
+    """Written once, before the first frame; never changed afterwards."""
+
+    schema_version: Literal[1] = 1
+    created: str
+    versions: dict[str, str]
+    plan: CapturePlan
+    rig_name: str = ""
+    camera: CameraInfo | None = None
+    projector: ProjectorInfo | None = None
+    calibration: Rig | None = None
+    notes: dict[str, str] = Field(default_factory=dict)
+
+
+def describe_scan(plan: CapturePlan, rig: DeviceRig | None, notes: dict[str, str] | None = None) -> Manifest:
+    """The manifest of a scan that starts now; notes of the caller come after those of the rig."""
+    own = notes or {}
+    return Manifest(
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions={"dsl_core": dsl_core.__version__, "python": platform.python_version()},
+        plan=plan,
+        rig_name=rig.name if rig else "",
+        camera=rig.camera.info if rig else None,
+        projector=rig.projector.info if rig else None,
+        calibration=rig.calibration if rig else None,
+        notes={**rig.notes, **own} if rig else own,
+    )
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Store the manifest atomically; raises `StoreError`."""
+    write_atomic(folder / MANIFEST_NAME, manifest.model_dump_json(indent=2).encode())
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """Load the manifest of a session folder; raises `StoreError`."""
+    path = folder / MANIFEST_NAME
+    try:
+        return Manifest.model_validate_json(path.read_bytes())
+    except FileNotFoundError as error:
+        raise StoreError(
+            f"{folder} is not a session: it has no {MANIFEST_NAME}."
+            " Give the folder that a scan made (NAME.dsl)."
+        ) from error
+    except OSError as error:
+        raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise StoreError(
+            f"{path} is damaged or from another version: {where}: {first['msg']}. Restore it from a copy."
+        ) from error
+
+
+def refuse_other_scan(folder: Path, stored: Manifest, given: Manifest) -> None:
+    """Raise `StoreError` naming every field in which a resumed scan differs from the stored one."""
+    differences = list(_differences(stored.plan.model_dump(), given.plan.model_dump(), "plan"))
+    for name, old, new in (
+        ("camera", stored.camera, given.camera),
+        ("projector", stored.projector, given.projector),
+    ):
+        if old and new and (old.model, old.serial) != (new.model, new.serial):
+            differences.append(
+                f"{name} is {old.model} {old.serial} in the session and {new.model} {new.serial} now"
+            )
+    if differences:
+        raise StoreError(
+            f"{folder} belongs to another scan: {'; '.join(differences)}."
+            " Resume with the plan and devices it was started with, or choose a new name."
+        )
+
+
+def _differences(old: Any, new: Any, where: str) -> Iterator[str]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [*old, *(k for k in new if k not in old)]:
+            yield from _differences(old.get(key), new.get(key), f"{where}.{key}")
+    elif isinstance(old, tuple) and isinstance(new, tuple) and len(old) == len(new):
+        for i, (a, b) in enumerate(zip(old, new, strict=True)):
+            yield from _differences(a, b, f"{where}[{i}]")
+    elif old != new:
+        yield f"{where} is {_short(old)} in the session and {_short(new)} now"
+
+
+def _short(value: Any) -> str:
+    text = "absent" if value is None else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
