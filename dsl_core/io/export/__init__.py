@@ -1,0 +1,58 @@
+"""Results for other programs: one file a format, found by name in `formats`.
+
+Every exporter writes whole files or nothing, replaces files only with ``overwrite=True``, names the scan
+and the program's version where the format has room for it, and keeps pixels without an answer
+recognisable: NaN, or what the format has in its place.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from dsl_core.errors import StoreError
+from dsl_core.io.export.csv import export_csv
+from dsl_core.io.export.envi import export_envi
+from dsl_core.io.export.exr import export_exr
+from dsl_core.io.export.ply import export_ply
+from dsl_core.io.export.png import export_png
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "Exporter",
+    "export",
+    "export_csv",
+    "export_envi",
+    "export_exr",
+    "export_ply",
+    "export_png",
+    "formats",
+]
+
+
+class Exporter(Protocol):
+    """What every format offers; some take more keywords, all of them optional here."""
+
+    def __call__(self, result: xr.Dataset, path: Path, *, overwrite: bool = False) -> list[Path]:
+        """Write the result and return the files written; raises `StoreError`."""
+
+
+def formats() -> dict[str, Exporter]:
+    """Exporters by the name of their format."""
+    return {
+        "csv": export_csv,
+        "envi": export_envi,
+        "exr": export_exr,
+        "ply": export_ply,
+        "png": export_png,
+    }
+
+
+def export(result: xr.Dataset, path: Path, name: str, *, overwrite: bool = False) -> list[Path]:
+    """Write a result in the named format; raises `StoreError` for a name that is not in `formats`."""
+    known = formats()
+    if name not in known:
+        raise StoreError(f"There is no export format {name!r}. Choose one of {', '.join(known)}.")
+    return known[name](result, path, overwrite=overwrite)

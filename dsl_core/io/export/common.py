@@ -1,0 +1,59 @@
+"""What all exporters share: names of bands, what must be there, and where the data come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+import dsl_core
+from dsl_core.errors import StoreError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def require(result: xr.Dataset, format_name: str, *names: str) -> None:
+    """Raise `StoreError` when the result lacks a variable that a format cannot do without."""
+    missing = [name for name in names if name not in result.variables]
+    if missing:
+        has = ", ".join(str(name) for name in result.data_vars) or "nothing"
+        raise StoreError(
+            f"{format_name} needs {' and '.join(missing)}, but the result holds only {has}."
+            " Reconstruct the scan completely, or choose another format."
+        )
+
+
+def require_suffix(path: Path, *suffixes: str) -> None:
+    """Raise `StoreError` when a path does not end as other programs expect of the format."""
+    if path.suffix.lower() not in suffixes:
+        raise StoreError(
+            f"{path.name!r} does not end in {' or '.join(suffixes)}. Add the ending to the name."
+        )
+
+
+def plane(result: xr.Dataset, name: str) -> NDArray[np.float32]:
+    """A variable as float32, dimensions as in the result; NaN where there is no answer."""
+    return np.asarray(result[name].values, np.float32)
+
+
+def wavelengths_nm(result: xr.Dataset) -> list[float]:
+    """Band centres of the result."""
+    return [float(w) for w in result["wavelength_nm"].values]
+
+
+def provenance(result: xr.Dataset) -> dict[str, str]:
+    """Every plain attribute of the result as text, and the version of the program that exports."""
+    plain = {
+        str(key): " ".join(str(value).split())
+        for key, value in result.attrs.items()
+        if isinstance(value, str | int | float | np.number)
+    }
+    return {**plain, "exported_by": f"dsl-scan {dsl_core.__version__}"}
+
+
+def ascii_text(text: str) -> str:
+    """Text for headers that know only ASCII; other characters become ``?``."""
+    return text.encode("ascii", "replace").decode("ascii")

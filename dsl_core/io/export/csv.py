@@ -1,0 +1,102 @@
+"""Spectra of chosen pixels as a table: one row a pixel and band, units in the names of the columns.
+
+Lines that begin with ``#`` say where the data come from; ``pandas.read_csv(..., comment="#")`` skips them.
+What has no answer is written as ``nan``.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.errors import StoreError
+from dsl_core.io.export.common import provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.staging import staged
+from dsl_core.model.result import Reach, reasons
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: (x, y) of a pixel: column and row, counted from 0.
+Pixel = tuple[int, int]
+
+HEADER = (
+    "x_px",
+    "y_px",
+    "depth_mm",
+    "depth_std_mm",
+    "wavelength_nm",
+    "reflectance",
+    "reflectance_std",
+    "data_share",
+    "reach",
+    "flags",
+    "reasons",
+)
+
+
+def export_csv(
+    result: xr.Dataset, path: Path, *, overwrite: bool = False, pixels: Sequence[Pixel] = ()
+) -> list[Path]:
+    """Write the spectra of pixels given as (x, y).
+
+    Raises `StoreError` when no pixel is given or one lies outside the image.
+    """
+    require_suffix(path, ".csv")
+    require(result, "A table of spectra", "reflectance", "wavelength_nm")
+    _check_pixels(result, pixels)
+    with (
+        staged([path], overwrite=overwrite) as (draft,),
+        draft.open("w", newline="", encoding="utf-8") as file,
+    ):
+        file.writelines(f"# {key}: {value}\n" for key, value in provenance(result).items())
+        writer = csv.writer(file)
+        writer.writerow(HEADER)
+        for pixel in pixels:
+            writer.writerows(_rows(result, pixel))
+    return [path]
+
+
+def _check_pixels(result: xr.Dataset, pixels: Sequence[Pixel]) -> None:
+    width, height = result.sizes["x"], result.sizes["y"]
+    if not pixels:
+        raise StoreError(
+            f"A table of spectra needs pixels: give at least one as x,y within {width} x {height}."
+        )
+    outside = [f"({x}, {y})" for x, y in pixels if not (0 <= x < width and 0 <= y < height)]
+    if outside:
+        raise StoreError(
+            f"No such pixel: {', '.join(outside)}. The image has {width} x {height} pixels: x runs from 0 to"
+            f" {width - 1}, y from 0 to {height - 1}."
+        )
+
+
+def _rows(result: xr.Dataset, pixel: Pixel) -> Iterator[tuple[object, ...]]:
+    x, y = pixel
+    spot = result.isel(x=x, y=y).load()
+    flags = int(spot["flags"]) if "flags" in spot else 0
+    depth = [_number(spot, "depth_mm"), _number(spot, "depth_std_mm")]
+    for band, wavelength in enumerate(wavelengths_nm(result)):
+        reach = _reach_in_words(int(spot["reach"][band])) if "reach" in spot else ""
+        spectrum = [_number(spot, name, band) for name in ("reflectance", "reflectance_std", "data_share")]
+        yield x, y, *depth, f"{wavelength:g}", *spectrum, reach, flags, "; ".join(reasons(flags))
+
+
+def _number(spot: xr.Dataset, name: str, band: int | None = None) -> str:
+    """Shortest text that reads back as the same float32; ``nan`` for what the result does not hold."""
+    if name not in spot:
+        return "nan"
+    values = spot[name].values
+    return str(values if band is None else values[band])
+
+
+def _reach_in_words(reach: int) -> str:
+    """Which light measured a band.
+
+    >>> _reach_in_words(3)
+    '+1 and -1'
+    """
+    words = {Reach.PLUS_ONE: "+1", Reach.MINUS_ONE: "-1", Reach.ZERO_ONLY: "zero order only"}
+    return " and ".join(word for bit, word in words.items() if reach & bit) or "none"

@@ -1,0 +1,72 @@
+"""Spectral cube as ENVI (band sequential, float32, little endian), written by the `spectral` package.
+
+Pixels and bands without an answer hold the header's ``data ignore value``, because many readers of ENVI
+files do not expect NaN.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dsl_core.io.export.common import ascii_text, plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.staging import staged
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+IGNORE_VALUE = -9999.0
+
+
+def export_envi(
+    result: xr.Dataset, path: Path, *, overwrite: bool = False, with_std: bool = True
+) -> list[Path]:
+    """Write ``NAME.hdr`` with its data ``NAME.img``, and ``NAME_std.*`` where the result has a deviation.
+
+    ``path`` is the header's. Raises `StoreError`.
+    """
+    require_suffix(path, ".hdr")
+    require(result, "An ENVI cube", "reflectance", "wavelength_nm")
+    cubes = {"reflectance": path}
+    if with_std and "reflectance_std" in result:
+        cubes["reflectance_std"] = path.with_name(f"{path.stem}_std.hdr")
+    targets = [target for header in cubes.values() for target in (header, header.with_suffix(".img"))]
+    with staged(targets, overwrite=overwrite) as drafts:
+        for name, draft in zip(cubes, drafts[::2], strict=True):
+            _write_cube(result, name, draft)
+    return targets
+
+
+def _write_cube(result: xr.Dataset, name: str, header: Path) -> None:
+    from spectral.io import envi
+
+    cube = plane(result, name).copy()
+    cube[np.isnan(cube)] = IGNORE_VALUE
+    centres = wavelengths_nm(result)
+    metadata = {
+        "description": _description(result, name),
+        "wavelength": [f"{w:g}" for w in centres],
+        "wavelength units": "Nanometers",
+        "band names": [f"{name} {w:g} nm" for w in centres],
+        "data ignore value": f"{IGNORE_VALUE:g}",
+        "z plot titles": ["Wavelength (nm)", f"{name} (1)"],
+    }
+    envi.save_image(
+        str(header),
+        np.moveaxis(cube, 0, -1),
+        dtype=np.float32,
+        interleave="bsq",
+        byteorder=0,
+        ext=".img",
+        metadata=metadata,
+    )
+
+
+def _description(result: xr.Dataset, name: str) -> str:
+    long_name = str(result[name].attrs.get("long_name", name))
+    sources = [f"{key}: {value}" for key, value in provenance(result).items()]
+    # Braces and commas structure an ENVI header.
+    text = "; ".join([f"{long_name} (unit 1)", *sources])
+    return ascii_text(text.translate(str.maketrans("{},", "();")))

@@ -1,0 +1,68 @@
+"""Spectral OpenEXR: reflectance as channels ``T.430,000000nm``, a preview, and depth.
+
+Layout: A. Fichet, R. Pacanowski, A. Wilkie, An OpenEXR Layout for Spectral Images, JCGT 10(3), 2021. The
+decimal comma is theirs, since a dot separates layers; ``T`` is a reflective or transmissive quantity. All
+channels are float32, so NaN stays NaN. The preview is linear, as OpenEXR expects, and ``Z`` is in mm.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.staging import staged
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def channel_name(wavelength_nm: float) -> str:
+    """Name of a band's channel.
+
+    >>> channel_name(432.5)
+    'T.432,500000nm'
+    """
+    return f"T.{wavelength_nm:.6f}nm".replace(".", ",").replace(",", ".", 1)
+
+
+def export_exr(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> list[Path]:
+    """Write all bands, linear R, G, B and depth into one file; raises `StoreError`."""
+    require_suffix(path, ".exr")
+    require(result, "A spectral OpenEXR file", "reflectance", "wavelength_nm")
+    import OpenEXR
+
+    cube = plane(result, "reflectance")
+    channels: dict[str, NDArray[np.float32]] = {
+        channel_name(w): np.ascontiguousarray(band)
+        for w, band in zip(wavelengths_nm(result), cube, strict=True)
+    }
+    if "rgb" in result:
+        linear = linear_from_srgb(plane(result, "rgb"))
+        channels |= {name: np.ascontiguousarray(c) for name, c in zip("RGB", linear, strict=True)}
+    if "depth_mm" in result:
+        channels["Z"] = np.ascontiguousarray(plane(result, "depth_mm"))
+    header: dict[str, Any] = {
+        **provenance(result),
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "spectralLayoutVersion": "1.0",
+        "EV": 0.0,
+        "depthUnit": "mm",
+    }
+    with staged([path], overwrite=overwrite) as (draft,):
+        try:
+            OpenEXR.File(header, channels).write(str(draft))
+        except (RuntimeError, ValueError, TypeError) as error:
+            raise StoreError(f"{path} could not be written as OpenEXR ({error}).") from error
+    return [path]
+
+
+def linear_from_srgb(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Linear light of sRGB values, both 0..1 (IEC 61966-2-1)."""
+    steep = ((np.maximum(values, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(values <= 0.04045, values / 12.92, steep).astype(np.float32)

@@ -1,0 +1,74 @@
+"""Point cloud as binary little-endian PLY, with spectra as ``scalar_`` properties.
+
+Layout: G. Turk, The PLY Polygon File Format (1994); the prefix ``scalar_`` is how CloudCompare names and
+recognises scalar fields. Only pixels with a point are written; a band without an answer is NaN, a
+colour without an answer is black (``uchar`` has no NaN).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.io.export.common import ascii_text, plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.staging import staged
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_PLY_NAMES = {"<f4": "float", "|u1": "uchar"}
+
+
+def export_ply(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> list[Path]:
+    """Write the points in mm with normals, colours, spectra, depth's standard deviation and flags.
+
+    What the result lacks is left out, points excepted. Raises `StoreError`.
+    """
+    require_suffix(path, ".ply")
+    require(result, "A PLY file", "points_mm")
+    lit: NDArray[np.bool_] = np.asarray(np.isfinite(plane(result, "points_mm")).all(axis=0))
+    columns = _columns(result, lit)
+    table = np.empty(int(lit.sum()), [(name, column.dtype.str) for name, column in columns.items()])
+    for name, column in columns.items():
+        table[name] = column
+    with staged([path], overwrite=overwrite) as (draft,), draft.open("wb") as file:
+        file.write(_header(table, provenance(result)))
+        table.tofile(file)
+    return [path]
+
+
+def _columns(result: xr.Dataset, lit: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
+    """Properties in the order they are written, each with one value per lit pixel."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name, properties in (("points_mm", ("x", "y", "z")), ("normals", ("nx", "ny", "nz"))):
+        if name in result:
+            columns.update(zip(properties, plane(result, name)[:, lit].astype("<f4"), strict=True))
+    if "rgb" in result:
+        levels = np.nan_to_num(np.clip(plane(result, "rgb")[:, lit], 0, 1)) * 255
+        columns.update(zip(("red", "green", "blue"), np.rint(levels).astype("u1"), strict=True))
+    if "reflectance" in result:
+        for band, wavelength in enumerate(wavelengths_nm(result)):
+            values = np.asarray(result["reflectance"][band].values, "<f4")
+            columns[f"scalar_{wavelength:g}nm"] = values[lit]
+    if "depth_std_mm" in result:
+        columns["scalar_depth_std_mm"] = plane(result, "depth_std_mm")[lit].astype("<f4")
+    if "flags" in result:
+        # Readers differ on short integers; float32 holds every combination of flags exactly.
+        columns["scalar_flags"] = result["flags"].values[lit].astype("<f4")
+    return columns
+
+
+def _header(table: NDArray[Any], comments: dict[str, str]) -> bytes:
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        "comment unit mm, camera frame: x right, y down, z forward",
+    ]
+    lines += [f"comment {ascii_text(key)}: {ascii_text(value)}" for key, value in comments.items()]
+    lines.append(f"element vertex {len(table)}")
+    assert table.dtype.names is not None
+    lines += [f"property {_PLY_NAMES[table.dtype[name].str]} {name}" for name in table.dtype.names]
+    return ("\n".join([*lines, "end_header"]) + "\n").encode("ascii")

@@ -1,0 +1,172 @@
+"""Pictures for people: colour, depth with a colour bar, one band, and flags with a legend.
+
+Pixels without an answer are neutral grey, in the grey picture of a band dark blue. Provenance is kept in
+the PNG's text chunks (PNG specification, 3rd edition, section 11.3.4).
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
+from dsl_core.io.staging import staged
+from dsl_core.model.result import Flag
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Image = NDArray[np.uint8]
+
+GREY = (128, 128, 128)
+_MARGIN_PX = 110
+# Distinct hues for the flags, in the order of their bits (after P. Green-Armytage, 2010), R, G, B.
+_FLAG_COLOURS = (
+    (0, 0, 0),
+    (240, 50, 50),
+    (0, 117, 220),
+    (255, 164, 5),
+    (148, 255, 181),
+    (194, 0, 136),
+    (255, 255, 128),
+    (0, 153, 143),
+    (116, 10, 255),
+    (255, 204, 153),
+)
+
+
+def export_png(
+    result: xr.Dataset, path: Path, *, overwrite: bool = False, band_nm: float | None = None
+) -> list[Path]:
+    """Write ``NAME_rgb``, ``NAME_depth``, ``NAME_550nm``, ``NAME_flags.png``, as far as the result has them.
+
+    ``path`` is ``NAME.png``; ``band_nm`` picks the band (the middle one if not given). Raises `StoreError`,
+    also when the result has no band within half a band's distance of ``band_nm``.
+    """
+    require_suffix(path, ".png")
+    pictures: dict[str, Image] = {}
+    if "rgb" in result:
+        pictures["rgb"] = rgb_picture(plane(result, "rgb"))
+    if "depth_mm" in result:
+        pictures["depth"] = depth_picture(plane(result, "depth_mm"))
+    if "reflectance" in result:
+        band, wavelength = nearest_band(result, band_nm)
+        pictures[f"{wavelength:g}nm"] = band_picture(np.asarray(result["reflectance"][band].values))
+    if "flags" in result:
+        pictures["flags"] = flags_picture(result["flags"].values)
+    if not pictures:
+        require(result, "A picture", "rgb")
+    targets = {path.with_name(f"{path.stem}_{name}.png"): picture for name, picture in pictures.items()}
+    with staged(list(targets), overwrite=overwrite) as drafts:
+        for draft, picture in zip(drafts, targets.values(), strict=True):
+            draft.write_bytes(png_bytes(picture, provenance(result)))
+    return list(targets)
+
+
+def nearest_band(result: xr.Dataset, band_nm: float | None) -> tuple[int, float]:
+    """Index and centre (nm) of the band closest to a wavelength, of the middle band for None."""
+    centres = wavelengths_nm(result)
+    if band_nm is None:
+        return len(centres) // 2, centres[len(centres) // 2]
+    best = int(np.argmin(np.abs(np.array(centres) - band_nm)))
+    reach = max(np.diff(centres).max() / 2, 0.5) if len(centres) > 1 else 0.5
+    if not abs(centres[best] - band_nm) <= reach:
+        raise StoreError(
+            f"There is no band at {band_nm:g} nm; the bands run from {centres[0]:g} to {centres[-1]:g} nm."
+        )
+    return best, centres[best]
+
+
+def rgb_picture(rgb: NDArray[np.float32]) -> Image:
+    """SRGB values 0..1, shape (3, rows, columns), as an 8-bit image."""
+    lit: NDArray[np.bool_] = np.asarray(np.isfinite(rgb).all(axis=0))
+    picture = np.rint(np.clip(np.nan_to_num(rgb), 0, 1) * 255).astype(np.uint8)
+    return _blank(np.moveaxis(picture, 0, -1), lit)
+
+
+def band_picture(reflectance: NDArray[np.float32]) -> Image:
+    """Reflectance 0..1 as grey levels, straight (no gamma); no answer is marked dark blue, not grey."""
+    levels = np.rint(np.clip(np.nan_to_num(reflectance), 0, 1) * 255).astype(np.uint8)
+    picture = np.repeat(levels[..., None], 3, axis=-1)
+    picture[~np.isfinite(reflectance)] = (0, 0, 96)
+    return picture
+
+
+def depth_picture(depth_mm: NDArray[np.float32]) -> Image:
+    """Depth in colours (near is red, far is blue), with a bar that says how many mm they mean."""
+    lit = np.isfinite(depth_mm)
+    near, far = (float(depth_mm[lit].min()), float(depth_mm[lit].max())) if lit.any() else (0.0, 0.0)
+    shares = (far - np.where(lit, depth_mm, far)) / max(far - near, 1e-9)
+    picture = _blank(_turbo(shares), lit)
+    margin = np.full((picture.shape[0], _MARGIN_PX, 3), 255, np.uint8)
+    margin[:, 8:24] = _turbo(np.linspace(1, 0, picture.shape[0]))[:, None]
+    for share in np.linspace(0, 1, max(2, min(6, picture.shape[0] // 40))):
+        row = share * (picture.shape[0] - 1)
+        _write(
+            margin,
+            f"{near + share * (far - near):.1f} mm",
+            28,
+            int(np.clip(row + 4, 10, picture.shape[0] - 3)),
+        )
+    return np.hstack([picture, margin])
+
+
+def flags_picture(flags: NDArray[Any]) -> Image:
+    """The first reason (lowest bit) of every pixel as a colour, white where all is well, and a legend."""
+    picture = np.full((*flags.shape, 3), 255, np.uint8)
+    present = [
+        (flag, colour) for flag, colour in zip(Flag, _FLAG_COLOURS, strict=True) if np.any(flags & flag)
+    ]
+    for flag, colour in reversed(present):
+        picture[(flags & flag) != 0] = colour
+    if not present:
+        return picture
+    legend = np.full((18 * len(present) + 4, max(picture.shape[1], 240), 3), 255, np.uint8)
+    for place, (flag, colour) in enumerate(present):
+        top = 18 * place + 4
+        legend[top : top + 12, 4:16] = colour
+        share = 100 * np.count_nonzero(flags & flag) / flags.size
+        _write(legend, f"{str(flag.name).lower()}  {share:.1f} %", 22, top + 11)
+    padding = legend.shape[1] - picture.shape[1]
+    return np.vstack([np.pad(picture, ((0, 0), (0, padding), (0, 0)), constant_values=255), legend])
+
+
+def png_bytes(picture: Image, texts: dict[str, str]) -> bytes:
+    """A PNG file of an R, G, B image with an ``iTXt`` chunk for every text."""
+    import cv2
+
+    data = cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
+    chunks = b"".join(_text_chunk(key, text) for key, text in texts.items())
+    after_header = 8 + 25  # signature, then the header chunk IHDR of fixed length
+    return data[:after_header] + chunks + data[after_header:]
+
+
+def _text_chunk(key: str, text: str) -> bytes:
+    keyword = key.encode("latin-1", "replace")[:79]
+    body = b"iTXt" + keyword + b"\0\0\0\0\0" + text.encode("utf-8")
+    return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+
+
+def _turbo(shares: NDArray[Any]) -> Image:
+    import cv2
+
+    levels = np.rint(np.clip(shares, 0, 1) * 255).astype(np.uint8)
+    coloured = cv2.applyColorMap(levels.reshape(-1, 1), cv2.COLORMAP_TURBO)
+    return np.ascontiguousarray(np.asarray(coloured, np.uint8).reshape(*levels.shape, 3)[..., ::-1])
+
+
+def _blank(picture: Image, lit: NDArray[np.bool_]) -> Image:
+    picture[~lit] = GREY
+    return picture
+
+
+def _write(picture: Image, text: str, x: int, y: int) -> None:
+    import cv2
+
+    cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (0, 0, 0), 1, cv2.LINE_AA)

@@ -1,0 +1,167 @@
+"""A result on disk: a zarr v3 folder that xarray, or any zarr reader, opens on its own.
+
+Cubes are chunked one band a chunk and kept in one file a variable, so that a band is read without its
+neighbours and few files need syncing. The three large cubes are stored as integers with a CF
+``scale_factor``: reflectance and its standard deviation in steps of 0.00005, the data share in steps
+of 1/250. Half a step is far below the noise of a scan; a cube that does not fit the integer range is
+stored as float32 instead. NaN is kept.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.staging import staged
+from dsl_core.model.result import SCHEMA_VERSION
+
+if TYPE_CHECKING:
+    import xarray as xr
+    import zarr
+
+
+@dataclass(frozen=True)
+class _Packing:
+    """Stored integer = value / step; ``fill`` stands for NaN."""
+
+    dtype: type[np.signedinteger[Any] | np.unsignedinteger[Any]]
+    step: float
+    lowest: int
+    highest: int
+    fill: int
+
+
+_PACKINGS = {
+    "reflectance": _Packing(np.int16, 5e-5, -32767, 32767, -32768),
+    "reflectance_std": _Packing(np.uint16, 5e-5, 0, 65534, 65535),
+    "data_share": _Packing(np.uint8, 1 / 250, 0, 254, 255),
+}
+# Number of bits that flags need; the model may hold them in any integer type.
+_INTEGERS: dict[str, type[np.unsignedinteger[Any]]] = {"flags": np.uint16, "reach": np.uint8}
+
+
+def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> Path:
+    """Store a result as a folder, whole or not at all, and return its path.
+
+    Raises `StoreError` when the folder exists already (unless ``overwrite``), the disk fails, or the
+    dataset is not a result of this version.
+    """
+    _check_version(result.attrs.get("schema_version"), path)
+    import zarr
+
+    with staged([path], overwrite=overwrite) as (draft,):
+        attributes = {key: _plain(value) for key, value in result.attrs.items()}
+        labels = {str(n): c.values.tolist() for n, c in result.coords.items() if c.dtype.kind in "UO"}
+        group = zarr.create_group(draft, zarr_format=3, attributes={**attributes, "labels": labels})
+        for name, variable in result.variables.items():
+            if str(name) not in labels:
+                _write_variable(group, str(name), variable)
+    return path
+
+
+def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
+    """Open a stored result; bands are read when they are looked at unless ``lazy`` is false.
+
+    Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
+    """
+    import xarray as xr
+
+    labels = _read_labels(path)
+    try:
+        raw = xr.open_zarr(path, chunks=None, consolidated=False, mask_and_scale=False)
+        for variable in raw.variables.values():
+            # A scale factor read from JSON is a Python float, from which xarray would decode to float64.
+            if "scale_factor" in variable.attrs:
+                variable.attrs["scale_factor"] = np.float32(variable.attrs["scale_factor"])
+        result = xr.decode_cf(raw).assign_coords({n: (n, np.array(v)) for n, v in labels.items()})
+        del result.attrs["labels"]
+        return result if lazy else result.load()
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
+        raise StoreError(
+            f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames."
+        ) from error
+
+
+def _read_labels(path: Path) -> dict[str, list[str]]:
+    """Names along the axes without numbers, after checking that this is a result that can be read."""
+    if not (path / "zarr.json").is_file():
+        raise StoreError(f"{path} is not a result: a folder with a file zarr.json is wanted.")
+    try:
+        attributes = json.loads((path / "zarr.json").read_text("utf-8"))["attributes"]
+        version, labels = attributes.get("schema_version"), dict(attributes.get("labels", {}))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise StoreError(
+            f"{path / 'zarr.json'} is damaged ({error}). Reconstruct the result again from the scan's frames."
+        ) from error
+    _check_version(version, path)
+    return labels
+
+
+def _check_version(version: object, path: Path) -> None:
+    if version == SCHEMA_VERSION:
+        return
+    if version is None:
+        raise StoreError(f"{path}: a dataset without schema_version is not a result of this program.")
+    raise StoreError(
+        f"{path} is a result of schema version {version}; this program knows version {SCHEMA_VERSION}."
+        " Use the version of the program that wrote it, or reconstruct the scan again."
+    )
+
+
+def _write_variable(group: zarr.Group, name: str, variable: xr.Variable) -> None:
+    from zarr.codecs import BloscCodec
+
+    values, encoding = _encode(name, variable)
+    plane = values.shape[-2:]
+    one_band = (1,) * (values.ndim - len(plane)) + plane
+    array = group.create_array(
+        name,
+        shape=values.shape,
+        dtype=values.dtype,
+        chunks=one_band,
+        shards=values.shape if values.ndim > 2 else None,
+        compressors=BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle"),
+        dimension_names=[str(d) for d in variable.dims],
+        attributes={**{str(k): _plain(v) for k, v in variable.attrs.items()}, **encoding},
+        # Looking for chunks that hold only the fill value costs more than writing them.
+        config={"write_empty_chunks": True},
+    )
+    array[...] = values
+
+
+def _encode(name: str, variable: xr.Variable) -> tuple[NDArray[Any], dict[str, float | int]]:
+    """Stored array of a variable, and the CF attributes that undo the packing."""
+    values: NDArray[Any] = np.asarray(variable.values)
+    packing = _PACKINGS.get(name)
+    if packing is not None and _fits(values, packing):
+        return _pack(values, packing), {"scale_factor": packing.step, "_FillValue": packing.fill}
+    if values.dtype.kind == "f" and variable.ndim > 1:
+        return values.astype(np.float32, copy=False), {}
+    return values.astype(_INTEGERS.get(name, values.dtype), copy=False), {}
+
+
+def _fits(values: NDArray[Any], packing: _Packing) -> bool:
+    lowest, highest = np.fmin.reduce(values, axis=None), np.fmax.reduce(values, axis=None)
+    if np.isnan(lowest):  # nothing but NaN
+        return True
+    return bool(lowest >= packing.lowest * packing.step and highest <= packing.highest * packing.step)
+
+
+def _pack(values: NDArray[Any], packing: _Packing) -> NDArray[Any]:
+    packed: NDArray[Any] = np.empty(values.shape, packing.dtype)
+    for band, out in zip(values, packed, strict=True):
+        steps = np.rint(band / np.float32(packing.step))
+        steps[np.isnan(band)] = packing.fill
+        out[...] = steps
+    return packed
+
+
+def _plain(value: object) -> Any:
+    """A value that JSON can hold."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value

@@ -1,0 +1,238 @@
+"""Exports are opened by readers that nobody here wrote, and hold the result's values."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import StoreError
+from dsl_core.io.export import export, export_csv, export_envi, export_exr, export_ply, export_png, formats
+from dsl_core.io.export.exr import linear_from_srgb
+from dsl_core.io.export.png import GREY, flags_picture
+from dsl_core.model.result import Flag, reasons
+from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result
+
+SUFFIX = {"csv": ".csv", "envi": ".hdr", "exr": ".exr", "ply": ".ply", "png": ".png"}
+
+
+def test_ply_in_meshio(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    result = small_result()
+    (path,) = export_ply(result, tmp_path / "cloud.ply")
+    mesh = meshio.read(path)
+    lit = np.isfinite(result["depth_mm"].values)
+    assert len(mesh.points) == ROWS * COLUMNS - 2
+    np.testing.assert_array_equal(mesh.points.T, result["points_mm"].values[:, lit])
+    fields = mesh.point_data
+    for axis, name in enumerate(("nx", "ny", "nz")):
+        np.testing.assert_array_equal(fields[name], result["normals"].values[axis, lit])
+    for channel, name in enumerate(("red", "green", "blue")):
+        # meshio 5.3.5 takes uchar for a signed byte.
+        levels = fields[name].astype(np.uint8)
+        np.testing.assert_allclose(levels, result["rgb"].values[channel, lit] * 255, atol=0.5)
+    for band, wavelength in enumerate(("430", "432.5", "550", "655", "660")):
+        np.testing.assert_array_equal(
+            fields[f"scalar_{wavelength}nm"], result["reflectance"].values[band, lit]
+        )
+    np.testing.assert_array_equal(fields["scalar_depth_std_mm"], result["depth_std_mm"].values[lit])
+    np.testing.assert_array_equal(fields["scalar_flags"], result["flags"].values[lit])
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_ply_in_pyvista(tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    result = small_result()
+    (path,) = export_ply(result, tmp_path / "cloud.ply")
+    lit = np.isfinite(result["depth_mm"].values)
+    np.testing.assert_array_equal(pyvista.read(path).points.T, result["points_mm"].values[:, lit])
+
+
+def test_ply_keeps_a_missing_band_as_nan_and_names_the_scan(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    result = small_result()
+    result["reflectance"][1, 2, 2] = np.nan
+    (path,) = export_ply(result, tmp_path / "cloud.ply")
+    assert np.isnan(meshio.read(path).point_data["scalar_432.5nm"]).sum() == 1
+    header = path.read_bytes().split(b"end_header")[0].decode("ascii")
+    assert "comment scan_id: 2026-05-04-chart\n" in header
+    assert "comment calibration: twin ?-rig\n" in header
+    assert "comment exported_by: dsl-scan" in header
+
+
+def test_ply_of_depth_alone(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    (path,) = export_ply(small_result()[["points_mm"]], tmp_path / "cloud.ply")
+    mesh = meshio.read(path)
+    assert len(mesh.points) == ROWS * COLUMNS - 2
+    assert mesh.point_data == {}
+
+
+def test_envi_in_spectral(tmp_path: Path) -> None:
+    from spectral.io import envi
+
+    result = small_result()
+    files = export_envi(result, tmp_path / "cube.hdr")
+    assert [f.name for f in files] == ["cube.hdr", "cube.img", "cube_std.hdr", "cube_std.img"]
+    for name, header in (("reflectance", files[0]), ("reflectance_std", files[2])):
+        image = envi.open(str(header))
+        cube = np.moveaxis(np.asarray(image.load()), -1, 0)
+        expected = result[name].values
+        missing = np.isnan(expected)
+        np.testing.assert_array_equal(cube[~missing], expected[~missing])
+        assert missing.any()
+        assert np.all(cube[missing] == float(image.metadata["data ignore value"]))
+        assert image.bands.centers == list(WAVELENGTHS_NM)
+        assert image.bands.band_unit == "Nanometers"
+        assert "scan_id: 2026-05-04-chart" in image.metadata["description"]
+    assert export_envi(result, tmp_path / "lone.hdr", with_std=False) == [
+        tmp_path / "lone.hdr",
+        tmp_path / "lone.img",
+    ]
+
+
+def test_exr_in_openexr(tmp_path: Path) -> None:
+    import OpenEXR
+
+    result = small_result()
+    (path,) = export_exr(result, tmp_path / "cube.exr")
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        header, channels = file.header(), file.channels()
+        bands = [f"T.{w},000000nm" for w in (430, 550, 655, 660)] + ["T.432,500000nm"]
+        assert set(channels) == {*bands, "R", "G", "B", "Z"}
+        for name, band in zip(bands, (0, 2, 3, 4, 1), strict=True):
+            assert channels[name].pixels.dtype == np.float32
+            np.testing.assert_array_equal(channels[name].pixels, result["reflectance"].values[band])
+        np.testing.assert_array_equal(channels["Z"].pixels, result["depth_mm"].values)
+        red = result["rgb"].values[0]
+        np.testing.assert_allclose(channels["R"].pixels, linear_from_srgb(red), rtol=1e-6)
+        assert header["spectralLayoutVersion"] == "1.0"
+        assert header["scan_id"] == "2026-05-04-chart"
+
+
+def test_linear_light_of_srgb() -> None:
+    # IEC 61966-2-1: 0.5 encodes 0.21404, 0.04 lies on the straight piece.
+    np.testing.assert_allclose(
+        linear_from_srgb(np.array([0, 0.04, 0.5, 1], np.float32)), [0, 0.04 / 12.92, 0.214041, 1], rtol=1e-5
+    )
+
+
+def test_csv_in_the_csv_module(tmp_path: Path) -> None:
+    result = small_result()
+    y, x = WARNED
+    (path,) = export_csv(result, tmp_path / "spectra.csv", pixels=[(x, y), (UNLIT[1], UNLIT[0])])
+    lines = path.read_text("utf-8").splitlines()
+    assert "# calibration: twin μ-rig" in lines
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    assert len(rows) == 2 * len(WAVELENGTHS_NM)
+    for band, row in enumerate(rows[:5]):
+        assert (row["x_px"], row["y_px"]) == (str(x), str(y))
+        assert float(row["wavelength_nm"]) == WAVELENGTHS_NM[band]
+        for name in ("reflectance", "reflectance_std", "data_share"):
+            assert np.float32(row[name]) == result[name].values[band, y, x]
+        assert np.float32(row["depth_mm"]) == result["depth_mm"].values[y, x]
+        assert row["reasons"] == reasons(Flag.BANDS_UNREACHED)[0]
+    assert [row["reach"] for row in rows[3:5]] == ["+1", "zero order only"]
+    assert rows[9]["reach"] == "+1 and -1"
+    assert rows[5]["reflectance"] == "nan"
+    assert rows[5]["reasons"] == reasons(Flag.NO_LIGHT)[0]
+
+
+@pytest.mark.parametrize(
+    ("pixels", "says"),
+    [
+        ([], "needs pixels"),
+        ([(9, 0)], r"\(9, 0\).*9 x 6"),
+        ([(0, 0), (-1, 0), (0, 6)], r"\(-1, 0\), \(0, 6\)"),
+    ],
+)
+def test_csv_refuses_pixels_that_are_not_there(
+    tmp_path: Path, pixels: list[tuple[int, int]], says: str
+) -> None:
+    with pytest.raises(StoreError, match=says):
+        export_csv(small_result(), tmp_path / "spectra.csv", pixels=pixels)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_png_in_opencv(tmp_path: Path) -> None:
+    import cv2
+
+    result = small_result()
+    files = export_png(result, tmp_path / "view.png", band_nm=655)
+    assert [f.name for f in files] == ["view_rgb.png", "view_depth.png", "view_655nm.png", "view_flags.png"]
+    rgb, depth, band, flags = (np.asarray(cv2.imread(str(f)))[..., ::-1] for f in files)
+    lit = np.isfinite(result["depth_mm"].values)
+    np.testing.assert_allclose(rgb[lit], np.moveaxis(result["rgb"].values, 0, -1)[lit] * 255, atol=0.5)
+    assert tuple(rgb[UNLIT]) == tuple(depth[UNLIT]) == GREY
+    np.testing.assert_allclose(band[lit][:, 1], result["reflectance"].values[3][lit] * 255, atol=0.5)
+    assert tuple(band[UNLIT]) == (0, 0, 96)
+    red, blue = depth[5, 0, [0, 2]], depth[0, 8, [0, 2]]  # nearest and farthest pixel
+    assert red[0] > red[1]
+    assert blue[1] > blue[0]
+    assert tuple(flags[0, 0]) == (255, 255, 255)
+    assert tuple(flags[UNLIT]) == (0, 0, 0)
+    assert tuple(flags[UNSURE]) == (0, 117, 220)
+    assert b"scan_id\0\0\0\0\0" + b"2026-05-04-chart" in files[0].read_bytes()
+
+
+def test_png_text_is_read_by_another_library(tmp_path: Path) -> None:
+    pil = pytest.importorskip("PIL.Image")
+    files = export_png(small_result(), tmp_path / "view.png")
+    with pil.open(files[0]) as image:
+        image.load()
+        assert image.text["calibration"] == "twin μ-rig"
+
+
+def test_pictures_of_nothing_and_of_the_middle_band(tmp_path: Path) -> None:
+    result = small_result()
+    result["depth_mm"][...] = np.nan
+    files = export_png(result, tmp_path / "view.png")
+    assert files[2].name == "view_550nm.png"
+    assert flags_picture(np.zeros((3, 4), np.uint16)).shape == (3, 4, 3)
+    with pytest.raises(StoreError, match=r"no band at 800 nm.*430 to 660"):
+        export_png(result, tmp_path / "other.png", band_nm=800)
+    with pytest.raises(StoreError, match="needs rgb"):
+        export_png(result[["shading"]], tmp_path / "other.png")
+
+
+@pytest.mark.parametrize("name", sorted(formats()))
+def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: str) -> None:
+    exporter = formats()[name]
+    if name == "csv":
+        exporter = lambda result, path, *, overwrite=False: export_csv(  # noqa: E731
+            result, path, overwrite=overwrite, pixels=[(0, 0)]
+        )
+    path = tmp_path / "new" / f"x{SUFFIX[name]}"
+    files = exporter(small_result(), path)
+    assert files
+    assert all(f.stat().st_size > 0 for f in files)
+    assert sorted(f.name for f in path.parent.iterdir()) == sorted(f.name for f in files)
+    files[-1].write_bytes(b"mine")
+    with pytest.raises(StoreError, match="exists already"):
+        exporter(small_result(), path)
+    assert files[-1].read_bytes() == b"mine"
+    exporter(small_result(), path, overwrite=True)
+    assert files[-1].read_bytes() != b"mine"
+
+
+@pytest.mark.parametrize("name", sorted(formats()))
+def test_every_format_refuses_wrong_endings_and_places(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StoreError, match="does not end in"):
+        export(small_result(), tmp_path / "x.doc", name)
+    (tmp_path / "file").write_text("x")
+    if name != "csv":
+        with pytest.raises(StoreError, match="could not be written"):
+            export(small_result(), tmp_path / "file" / f"x{SUFFIX[name]}", name)
+
+
+@pytest.mark.parametrize("name", ["csv", "envi", "exr", "ply"])
+def test_every_format_says_what_the_result_lacks(tmp_path: Path, name: str) -> None:
+    with pytest.raises(StoreError, match="holds only shading"):
+        export(small_result()[["shading"]], tmp_path / f"x{SUFFIX[name]}", name)
+
+
+def test_an_unknown_format(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="csv, envi, exr, ply, png"):
+        export(small_result(), tmp_path / "x.las", "las")

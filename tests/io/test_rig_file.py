@@ -1,0 +1,90 @@
+"""Rigs survive the disk to the last digit, and wrong ones are refused field by field."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.io.rig_file import check_rig_fits, load_rig, save_rig
+from dsl_core.model.plan import CapturePlan
+from tests.cases.small_rig import small_rig
+
+
+def test_a_rig_comes_back_unchanged(tmp_path: Path) -> None:
+    rig = small_rig()
+    path = save_rig(rig, tmp_path / "new" / "rig.json")
+    assert load_rig(path) == rig
+    assert [p.name for p in path.parent.iterdir()] == ["rig.json"]
+
+
+def test_a_rig_is_replaced_only_when_allowed(tmp_path: Path) -> None:
+    path = save_rig(small_rig(), tmp_path / "rig.json")
+    other = small_rig().model_copy(update={"name": "other"})
+    with pytest.raises(StoreError, match="exists already"):
+        save_rig(other, path)
+    assert load_rig(path).name == "small"
+    save_rig(other, path, overwrite=True)
+    assert load_rig(path).name == "other"
+
+
+def _edited(tmp_path: Path, *steps: str | int, value: object) -> Path:
+    content: Any = json.loads(small_rig().model_dump_json())
+    spot = content
+    for step in steps[:-1]:
+        spot = spot[step]
+    spot[steps[-1]] = value
+    path = tmp_path / "rig.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("steps", "value", "says"),
+    [
+        (("camera", "fx_px"), -3, r"camera\.fx_px: .*greater than 0 \(given -3\)"),
+        (("film", "distance_mm"), "far", r"film\.distance_mm: .*\(given 'far'\)"),
+        (("response", 1, "values"), [1.0], r"response\.1: .*one value per wavelength"),
+        (("pose", "rotation"), [[1, 0, 0], [0, 1, 0], [0, 0, 2]], "pose: .*orthonormal"),
+        (("white_scale",), float("nan"), r"white_scale: .*finite"),
+        (("colour",), "red", "colour: .*not permitted"),
+        (("schema_version",), 2, "schema version 2; this program knows version 1"),
+    ],
+)
+def test_errors_name_the_field(
+    tmp_path: Path, steps: tuple[str | int, ...], value: object, says: str
+) -> None:
+    with pytest.raises(CalibrationError, match=says):
+        load_rig(_edited(tmp_path, *steps, value=value))
+
+
+def test_many_problems_are_told_at_once_but_not_all(tmp_path: Path) -> None:
+    (tmp_path / "rig.json").write_text("{}")
+    with pytest.raises(CalibrationError, match=r"name: Field required.*camera: .*and 4 more"):
+        load_rig(tmp_path / "rig.json")
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(b"{", "not JSON"), (b"[]", "JSON object"), (b"\xff\xfe", "cannot be read"), (b"", "not JSON")],
+)
+def test_files_that_are_no_rig(tmp_path: Path, content: bytes, says: str) -> None:
+    (tmp_path / "rig.json").write_bytes(content)
+    with pytest.raises(CalibrationError, match=says):
+        load_rig(tmp_path / "rig.json")
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(CalibrationError, match=r"nowhere\.json cannot be read"):
+        load_rig(tmp_path / "nowhere.json")
+
+
+def test_a_rig_for_another_size_is_refused_with_both_sizes() -> None:
+    check_rig_fits(small_rig(), CapturePlan())
+    with pytest.raises(CalibrationError, match=r"camera .* 890 x 580 px, .* 445 x 290 px\. Use"):
+        check_rig_fits(small_rig(), CapturePlan(camera_size_px=(445, 290)))
+    with pytest.raises(CalibrationError, match=r"camera .* 890 x 580 .* and the projector .* 1024 x 768 px"):
+        check_rig_fits(small_rig(), CapturePlan(camera_size_px=(1, 1), projector_size_px=(1024, 768)))
