@@ -7,22 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.errors import PlanError
 from dsl_core.simulation import materials as spectra
+from dsl_core.simulation.options import ENDLESS, IMAGE_CENTRE_MM, check_range
 from dsl_core.simulation.surfaces import Paint, tilted, uniform
 from dsl_core.simulation.truth import Materials, Scene
 
-#: The optical centre of the published camera lies beside the middle of its image; at 700 mm by this much.
-_IMAGE_CENTRE_MM = (6.0, -2.0)
-_ENDLESS = (math.inf, math.inf)
 _STAGE_POSITIONS_MM = tuple(np.linspace(600.0, 900.0, 15).tolist())
-
-
-def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Raise `PlanError` unless ``low <= value <= high``."""
-    if not low <= value <= high:
-        wanted = f"{low:g} and {high:g} {unit}".rstrip()
-        raise PlanError(f"Option {name} must lie between {wanted}, not {value:g}.")
 
 
 def plane(
@@ -33,7 +23,7 @@ def plane(
     check_range("tilt_x_deg", tilt_x_deg, -75, 75, "degrees")
     check_range("tilt_y_deg", tilt_y_deg, -75, 75, "degrees")
     check_range("reflectance", reflectance, 0, 1)
-    surface = tilted((0.0, 0.0, depth_mm), tilt_x_deg, tilt_y_deg, _ENDLESS, uniform(0))
+    surface = tilted((0.0, 0.0, depth_mm), tilt_x_deg, tilt_y_deg, ENDLESS, uniform(0))
     palette = Materials.of({"diffuser": spectra.flat(reflectance)})
     return Scene("plane", f"flat white diffuser at {depth_mm:g} mm", (surface,), palette)
 
@@ -70,6 +60,52 @@ def color_checker(depth_mm: float = 700.0, tilt_x_deg: float = 0.0, tilt_y_deg: 
     palette = Materials.of({**patches, "frame": spectra.flat(spectra.DARK), "wall": spectra.flat(0.2)})
     frame, wall = len(patches), len(patches) + 1
     painter = patch_grid(6, 4, 52.0, 44.0, frame)
-    chart = tilted((*_IMAGE_CENTRE_MM, depth_mm), tilt_x_deg, tilt_y_deg, (161.0, 109.0), painter)
-    behind = tilted((0.0, 0.0, depth_mm + 80.0), 0.0, 0.0, _ENDLESS, uniform(wall))
+    chart = tilted((*IMAGE_CENTRE_MM, depth_mm), tilt_x_deg, tilt_y_deg, (161.0, 109.0), painter)
+    behind = tilted((0.0, 0.0, depth_mm + 80.0), 0.0, 0.0, ENDLESS, uniform(wall))
     return Scene("color-checker", f"Color Checker at {depth_mm:g} mm", (chart, behind), palette)
+
+
+#: Centres of the nine filters, nm, in reading order.
+FILTER_CENTRES_NM = tuple(range(450, 651, 25))
+
+
+def _discs(columns: int, rows: int, pitch_mm: float, radius_mm: float, background: int) -> Paint:
+    """Discs in reading order (materials 0, 1, ...) on the material ``background``."""
+
+    def paint(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.int32]:
+        x, y = u / pitch_mm + columns / 2, v / pitch_mm + rows / 2
+        column = np.clip(np.floor(x), 0, columns - 1)
+        row = np.clip(np.floor(y), 0, rows - 1)
+        inside = np.hypot(x - column - 0.5, y - row - 0.5) <= radius_mm / pitch_mm
+        return np.where(inside, row * columns + column, background).astype(np.int32)
+
+    return paint
+
+
+def filters(depth_mm: float = 700.0, background: float = 0.03, fwhm_nm: float = 10.0) -> Scene:
+    """Nine narrow band-pass filters as reflectors, 450 to 650 nm every 25 nm, on a dark or white board."""
+    check_range("depth_mm", depth_mm, 300, 2000, "mm")
+    check_range("background", background, 0, 1)
+    check_range("fwhm_nm", fwhm_nm, 2, 100, "nm")
+    names = {f"{nm} nm": spectra.bandpass(nm, fwhm_nm) for nm in FILTER_CENTRES_NM}
+    palette = Materials.of({**names, "board": spectra.flat(background)})
+    painter = _discs(3, 3, 68.0, 29.0, len(names))
+    board = tilted((*IMAGE_CENTRE_MM, depth_mm), 0.0, 0.0, ENDLESS, painter)
+    return Scene("filters", f"nine {fwhm_nm:g} nm filters at {depth_mm:g} mm", (board,), palette)
+
+
+def _leaf_outlines(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.int32]:
+    """A leaf left (0) and one right (1) of the middle on a board (2): two arcs that meet at the tips."""
+    across = np.abs(np.abs(u) - 75.0)
+    inside = across < 52.0 * (1.0 - (v / 95.0) ** 2)
+    return np.where(inside, (u > 0).astype(np.int32), 2).astype(np.int32)
+
+
+def leaves(depth_mm: float = 700.0) -> Scene:
+    """A real leaf (left) and a dyed one (right): one colour under D65, two spectra (metamers)."""
+    check_range("depth_mm", depth_mm, 300, 2000, "mm")
+    palette = Materials.of(
+        {"real leaf": spectra.leaf(), "dyed leaf": spectra.dyed_leaf(), "board": spectra.flat(0.5)}
+    )
+    board = tilted((*IMAGE_CENTRE_MM, depth_mm), 0.0, 0.0, ENDLESS, _leaf_outlines)
+    return Scene("leaves", f"real and dyed leaf at {depth_mm:g} mm", (board,), palette)

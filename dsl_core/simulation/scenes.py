@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dsl_core.errors import PlanError
-from dsl_core.simulation import scene_flat
+from dsl_core.simulation import scene_flat, scene_solid
 from dsl_core.simulation.truth import Materials, Scene, SceneTruth
 
 __all__ = ["Materials", "Scene", "SceneEntry", "SceneTruth", "make_scene", "scene_catalogue"]
@@ -17,7 +17,14 @@ Option = str | float | int
 _BUILDERS: dict[str, Callable[..., Scene]] = {
     "plane": scene_flat.plane,
     "stage": scene_flat.stage,
+    "steps": scene_solid.steps,
+    "sphere": scene_solid.sphere,
+    "box": scene_solid.box,
     "color-checker": scene_flat.color_checker,
+    "filters": scene_flat.filters,
+    "leaves": scene_flat.leaves,
+    "relief": scene_solid.relief,
+    "face": scene_solid.face,
 }
 
 
