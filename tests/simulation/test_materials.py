@@ -7,7 +7,7 @@ import pytest
 
 from dsl_core.optics.colour import colour_library, delta_e_2000, reflectance_to_lab
 from dsl_core.simulation import materials
-from dsl_core.simulation.materials import FINE_NM
+from dsl_core.simulation.truth import FINE_NM
 
 
 def at(spectrum: materials.Spectrum, wavelength_nm: float) -> float:

@@ -58,7 +58,7 @@ def test_truth_is_complete_and_consistent(name: str) -> None:
     assert set(np.unique(truth.material)) == set(range(len(truth.materials.names)))
     np.testing.assert_allclose(np.linalg.norm(truth.normals, axis=0)[solid], 1.0, atol=1e-9)
     assert (np.einsum("ihw,ihw->hw", truth.normals, pixel_rays(CAMERA))[solid] <= 1e-12).all()
-    assert 500 < np.nanmin(truth.depth_mm)
+    assert np.nanmin(truth.depth_mm) > 500
     assert np.nanmax(truth.depth_mm) < 1000
     assert truth.lit.mean() > 0.9
     spectra = truth.materials.reflectance
@@ -189,7 +189,7 @@ def test_sphere_shadow_is_the_closed_form() -> None:
 
 def test_chart_patches_are_in_reading_order_and_large() -> None:
     truth = make_scene("color-checker").render(FULL, CENTRE)
-    rows, columns = np.indices(truth.material.shape)
+    rows, columns = np.mgrid[:580, :890]
     middles = []
     for patch in range(24):
         where = truth.material == patch
