@@ -176,14 +176,16 @@ def read_stamp(venv: Path) -> dict[str, str]:
 def make_venv(venv: Path) -> None:
     """Make the virtual environment; one made by another Python is made anew, anything else is left alone."""
     config = venv / "pyvenv.cfg"
-    if venv.exists() and not config.exists() and any(venv.iterdir()):
+    if venv.exists() and not config.exists() and (not venv.is_dir() or any(venv.iterdir())):
         raise SetupError(f"{venv} is not a virtual environment. Name another folder with --venv.")
     version = ".".join(map(str, sys.version_info[:2]))
     if config.exists() and venv_program(venv, "python").exists() and f" = {version}." in config.read_text():
         return
     with timed(f"Making a virtual environment in {venv}"):
-        made = subprocess.run([sys.executable, "-m", "venv", "--clear", str(venv)], check=False)
+        command = [sys.executable, "-m", "venv", "--clear", str(venv)]
+        made = subprocess.run(command, capture_output=True, text=True, check=False)
     if made.returncode != 0:
+        say((made.stdout + made.stderr).strip())
         raise SetupError(
             f"Python {version} could not make a virtual environment in {venv}. Is the folder writable? "
             "On Debian and Ubuntu the module is a package of its own: apt-get install python3-venv"

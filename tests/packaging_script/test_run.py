@@ -112,6 +112,8 @@ def test_a_folder_that_is_no_environment_is_left_alone(tmp_path: Path) -> None:
     precious.write_text("years of work")
     with pytest.raises(run.SetupError, match="not a virtual environment"):
         run.make_venv(tmp_path)
+    with pytest.raises(run.SetupError, match="not a virtual environment"):
+        run.make_venv(precious)
     assert precious.read_text() == "years of work"
 
 
