@@ -1,0 +1,223 @@
+"""Merge the settings of a bracket into one linear frame with a variance per pixel.
+
+A raw value of setting i is ``raw_i = black_i + g_i L + noise`` with the gain ``g_i = exposure x pattern
+radiance`` and the radiance ``L`` in DN per ms at full projector drive. Black is subtracted with its
+sign: clipping would bias the dark pixels that hold the first orders.
+
+The default weights are the inverse variances ``g_i^2 / (floor_i + g_i L / K)`` with K electrons per
+DN. ``L`` in them is not the pixel's own noisy value, which would favour values that happen to be low:
+it is the ratio ``sum (raw_i - black_i) / sum g_i`` over the unsaturated settings, and only the ratio
+of the weights of two settings matters, which hardly depends on it. What remains is less than 0.15
+standard deviations, and only where a setting is within its noise of saturation.
+
+The option "trapezoid" follows section 1.1 of the supplement of "Dispersed Structured Light" (Shin et
+al., CVPR 2024). Its weights do depend on the noisy values: near black it is biased upwards by about 0.6
+standard deviations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import DecodeError
+from dsl_core.model.plan import Setting
+from dsl_core.model.rig import ProjectorResponse, Sensor
+from dsl_core.optics.sensor import bayer_channels, raw_variance
+
+Array = NDArray[np.float32]
+
+#: Rows merged at a time, so that all buffers stay in the processor's cache; even, to keep the Bayer phase.
+_BLOCK_ROWS = 32
+
+#: Corners of the trapezoid, fractions of full scale: up in the black-subtracted frame, down in the raw one.
+_RISE = (0.0, 0.02)
+_FALL = (0.85, 0.97)
+
+
+@dataclass(frozen=True)
+class BlackFrame:
+    """What a setting shows without a pattern: mean (DN) and the variance of that mean (DN^2)."""
+
+    mean: Array
+    variance: Array
+
+
+@dataclass(frozen=True)
+class MergedFrame:
+    """A merged mosaic, arrays of shape (rows, columns).
+
+    ``radiance`` is in DN per ms at full projector drive, black subtracted, and may be negative by noise.
+    Where ``saturated``, every setting is: ``variance`` is infinite and ``radiance`` a lower bound
+    (reason `Flag.SATURATED`).
+    """
+
+    radiance: Array
+    variance: Array
+    saturated: NDArray[np.bool_]
+
+
+def black_frame(frames: Sequence[NDArray[np.unsignedinteger]], sensor: Sensor) -> BlackFrame:
+    """Mean of one or more black frames of a setting; its variance follows from the sensor's noise."""
+    if not frames:
+        raise DecodeError("A setting has no black frame. Capture one: all else is measured from it.")
+    mean: Array = np.asarray(np.mean(np.stack(frames), axis=0, dtype=np.float32))
+    variance = raw_variance(sensor, np.asarray(mean - sensor.black_level_dn)) / len(frames)
+    return BlackFrame(mean, np.asarray(variance, np.float32))
+
+
+def setting_gains_ms(settings: Sequence[Setting], response: ProjectorResponse) -> NDArray[np.float64]:
+    """Exposure x pattern radiance above the projector's black, ms at full drive, shape (settings,)."""
+    black = response.radiance(0.0)
+    return np.array([s.exposure_ms * float(response.radiance(s.level) - black) for s in settings])
+
+
+class HdrMerger:
+    """Merges frame by frame; keeps its buffers, so one merger serves one thread."""
+
+    def __init__(
+        self,
+        gains_ms: Sequence[float] | NDArray[np.float64],
+        blacks: Sequence[BlackFrame],
+        sensor: Sensor,
+        *,
+        channel_ratios: NDArray[np.float64] | None = None,
+        weighting: Literal["inverse_variance", "trapezoid"] = "inverse_variance",
+        saturation_margin_dn: float | None = None,
+    ) -> None:
+        """Prepare for frames of one size.
+
+        ``channel_ratios``, shape (settings, 3), multiplies the gains per colour (see
+        `normalisation.channel_ratios`). A raw value counts as saturated within ``saturation_margin_dn`` of
+        full scale; by default 2 % of it, several sigmas of shot noise.
+        """
+        if len(gains_ms) != len(blacks) or not blacks:
+            raise DecodeError(f"{len(gains_ms)} settings need as many black frames, given {len(blacks)}.")
+        if not np.all(np.asarray(gains_ms) > 0):
+            raise DecodeError(
+                f"Exposure x pattern radiance must be positive, given {np.asarray(gains_ms).tolist()} ms."
+            )
+        self.shape = blacks[0].mean.shape
+        self._full_dn = sensor.full_scale_dn
+        margin = 0.02 * self._full_dn if saturation_margin_dn is None else saturation_margin_dn
+        self._limit_dn = int(np.ceil(self._full_dn - margin))
+        self._weighting = weighting
+        ratios = np.ones((len(blacks), 3)) if channel_ratios is None else channel_ratios
+        colours = bayer_channels(sensor.bayer, _BLOCK_ROWS, self.shape[1])
+        # Gains repeat from block to block of rows, as the mosaic does.
+        self._gain = [
+            (gain * ratio[colours]).astype(np.float32) for gain, ratio in zip(gains_ms, ratios, strict=True)
+        ]
+        self._shot = [gain / np.float32(sensor.electrons_per_dn) for gain in self._gain]
+        for black in blacks:
+            self._check_shape(black.mean)
+        self._black = [black.mean for black in blacks]
+        self._floor = [
+            (raw_variance(sensor, black.mean - sensor.black_level_dn) + black.variance).astype(np.float32)
+            for black in blacks
+        ]
+        block = (_BLOCK_ROWS, self.shape[1])
+        self._signal = [np.empty(block, np.float32) for _ in blacks]
+        self._open = [np.empty(block, np.float32) for _ in blacks]
+        self._work = [np.empty(block, np.float32) for _ in range(4)]
+
+    def merge(
+        self, raws: Sequence[NDArray[np.unsignedinteger]], out: MergedFrame | None = None
+    ) -> MergedFrame:
+        """Merge one raw mosaic per setting, in the order of the gains; writes into ``out`` if given.
+
+        Raises `DecodeError` when a frame is missing, has another size, or is not of whole numbers.
+        """
+        if len(raws) != len(self._black):
+            raise DecodeError(f"The bracket has {len(self._black)} settings, given {len(raws)} frames.")
+        for raw in raws:
+            self._check_shape(raw)
+            if not np.issubdtype(raw.dtype, np.unsignedinteger):
+                raise DecodeError(f"Raw frames hold unsigned whole numbers, given {raw.dtype}.")
+        if out is None:
+            out = MergedFrame(
+                np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
+            )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for start in range(0, self.shape[0], _BLOCK_ROWS):
+                rows = slice(start, min(start + _BLOCK_ROWS, self.shape[0]))
+                block = MergedFrame(out.radiance[rows], out.variance[rows], out.saturated[rows])
+                self._merge_block([raw[rows] for raw in raws], rows, block)
+        return out
+
+    def _merge_block(self, raws: list[NDArray[np.unsignedinteger]], rows: slice, out: MergedFrame) -> None:
+        count = rows.stop - rows.start
+        signal, gains = [a[:count] for a in self._signal], [a[:count] for a in self._open]
+        total, weight, term, expected = (a[:count] for a in self._work)
+        total[...] = 0
+        weight[...] = 0
+        for i, raw in enumerate(raws):
+            np.subtract(raw, self._black[i][rows], out=signal[i])
+            # The gain of a saturated value is zero, so that it drops out of every sum.
+            np.multiply(self._gain[i][:count], raw < self._limit_dn, out=gains[i])
+            weight += gains[i]
+            np.greater(gains[i], 0, out=term)
+            term *= signal[i]
+            total += term
+        np.equal(weight, 0, out=out.saturated)
+        np.divide(total, weight, out=expected)
+        total[...] = 0
+        # Negative becomes zero, and so does what is saturated everywhere and not a number here.
+        np.fmax(expected, total, out=expected)
+        weight[...] = 0
+        for i in range(len(raws)):
+            np.multiply(expected, self._shot[i][:count], out=term)
+            term += self._floor[i][rows]
+            np.divide(gains[i], term, out=term)
+            weight += np.multiply(term, gains[i], out=gains[i])
+            term *= signal[i]
+            total += term
+        np.divide(total, weight, out=out.radiance)
+        np.divide(1, weight, out=out.variance)
+        if self._weighting == "trapezoid":
+            self._reweight(raws, rows, expected, out)
+        if out.saturated.any():
+            self._bound(rows, out)
+
+    def _reweight(
+        self, raws: list[NDArray[np.unsignedinteger]], rows: slice, expected: Array, out: MergedFrame
+    ) -> None:
+        """Replace the merge by the seed's; where all its weights vanish the inverse-variance merge stays."""
+        count = rows.stop - rows.start
+        weights = [self._trapezoid(r, s[:count]) for r, s in zip(raws, self._signal, strict=True)]
+        sum_ = np.sum(weights, axis=0)
+        radiance = np.zeros_like(expected)
+        variance = np.zeros_like(expected)
+        for i, weight in enumerate(weights):
+            share = weight / (sum_ * self._gain[i][:count])
+            radiance += share * self._signal[i][:count]
+            variance += share**2 * (self._floor[i][rows] + expected * self._shot[i][:count])
+        np.copyto(out.radiance, radiance, where=sum_ > 0)
+        np.copyto(out.variance, variance, where=sum_ > 0)
+
+    def _trapezoid(self, raw: NDArray[np.unsignedinteger], signal: Array) -> Array:
+        """The smaller of a ramp up in the black-subtracted and a ramp down in the raw frame."""
+        rise = (signal / self._full_dn - _RISE[0]) / (_RISE[1] - _RISE[0])
+        fall = (_FALL[1] - raw / np.float32(self._full_dn)) / (_FALL[1] - _FALL[0])
+        inside = np.clip(np.minimum(rise, fall), 0, 1)
+        return np.where(raw < self._limit_dn, inside, np.float32(0)).astype(np.float32)
+
+    def _bound(self, rows: slice, out: MergedFrame) -> None:
+        """The least radiance that saturates every setting, where every setting is saturated."""
+        count = rows.stop - rows.start
+        bounds = [
+            (self._limit_dn - black[rows]) / gain[:count]
+            for black, gain in zip(self._black, self._gain, strict=True)
+        ]
+        np.copyto(out.radiance, np.max(bounds, axis=0), where=out.saturated)
+
+    def _check_shape(self, image: NDArray[np.generic]) -> None:
+        if image.shape != self.shape:
+            raise DecodeError(
+                f"A frame has shape {image.shape}, wanted {self.shape}."
+                " All frames of a bracket come from one camera and crop."
+            )
