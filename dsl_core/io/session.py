@@ -49,6 +49,7 @@ FRAMES_NAME = "frames"
 #: noise), and what is left free beside them.
 COMPRESSED_SHARE = 0.6
 MARGIN_BYTES = 64 << 20
+_FRAMES_A_BLOCK = 8
 
 
 def _store(folder: Path, plan: CapturePlan) -> FrameStore:
@@ -117,10 +118,11 @@ class SessionReader:
     ) -> Iterator[tuple[Shot, NDArray[np.uint16]]]:
         """Shots with their mosaics, in the order asked, a few read ahead by ``threads`` threads."""
         pending: deque[tuple[Shot, Future[NDArray[np.uint16]]]] = deque()
+        buffers = self._buffers()
         with ThreadPoolExecutor(threads) as pool:
             try:
                 for shot in shots:
-                    pending.append((shot, pool.submit(self.read, shot, None, verify)))
+                    pending.append((shot, pool.submit(self.read, shot, next(buffers), verify)))
                     if len(pending) > 2 * threads:
                         first, future = pending.popleft()
                         yield first, future.result()
@@ -154,6 +156,12 @@ class SessionReader:
                 for future in futures:
                     future.cancel()
         return out
+
+    def _buffers(self) -> Iterator[NDArray[np.uint16]]:
+        """Empty mosaics, cut from blocks that huge pages fit in."""
+        # First touching a lone mosaic of 1 MB, in small pages, takes longer than decompressing into it.
+        while True:
+            yield from np.empty((_FRAMES_A_BLOCK, self.store.height_px, self.store.width_px), np.uint16)
 
     def _mismatch(self, shot: Shot, found: int) -> str:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]

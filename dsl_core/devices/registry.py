@@ -1,0 +1,105 @@
+"""Rigs by name: any installed package adds one through the entry-point group ``dsl_scan.rigs``.
+
+The value of an entry point is a function ``open(options: dict[str, str]) -> DeviceRig`` whose
+docstring starts with one line for the list of rigs.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points
+
+import dsl_core
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError, DslError
+
+GROUP = "dsl_scan.rigs"
+#: Rigs of this package, so that they are there in a source tree or a frozen app without metadata too.
+BUILT_IN = (
+    EntryPoint("replay", "dsl_core.io.replay:open_replay", GROUP),
+    EntryPoint("twin", "dsl_core.simulation.sim_devices:open_twin", GROUP),
+)
+OpenRig = Callable[[dict[str, str]], DeviceRig]
+
+
+@dataclass(frozen=True)
+class RigEntry:
+    """A rig that can be opened by name, or ``error``: why it cannot."""
+
+    name: str
+    package: str
+    version: str
+    description: str = ""
+    error: str = ""
+
+
+def list_rigs() -> list[RigEntry]:
+    """All rigs of all installed packages by name; a broken one is listed with its error."""
+    return [_describe(point) for point in _points()]
+
+
+def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
+    """Open the devices of a rig.
+
+    Raises `DeviceError` when there is no rig of that name (and says which there are), when its package
+    is broken, and when its devices cannot be opened.
+    """
+    points = [point for point in _points() if point.name == name]
+    if not points:
+        known = ", ".join(sorted({point.name for point in _points()})) or "none"
+        raise DeviceError(
+            f"There is no rig {name!r}; installed rigs: {known}."
+            " Install the package that brings it, or choose one of these."
+        )
+    if len(points) > 1:
+        packages = " and ".join(_package(point)[0] for point in points)
+        raise DeviceError(f"The packages {packages} both bring a rig {name!r}. Uninstall one of them.")
+    try:
+        rig = _load(points[0])(dict(options or {}))
+    except DslError:
+        raise
+    except Exception as error:
+        raise DeviceError(_fault(points[0], f"failed to open: {type(error).__name__}: {error}")) from error
+    if not isinstance(rig, DeviceRig):
+        raise DeviceError(_fault(points[0], f"opened as {type(rig).__name__} instead of DeviceRig"))
+    return rig
+
+
+def _points() -> list[EntryPoint]:
+    unique = {(point.name, point.value): point for point in (*BUILT_IN, *entry_points(group=GROUP))}
+    return [unique[key] for key in sorted(unique)]
+
+
+def _package(point: EntryPoint) -> tuple[str, str]:
+    if point.dist is None:
+        return "dsl-scan", dsl_core.__version__
+    return point.dist.name, point.dist.version
+
+
+def _load(point: EntryPoint) -> OpenRig:
+    """Import the function behind an entry point; whatever its package raises becomes a `DeviceError`."""
+    try:
+        function = point.load()
+    except Exception as error:
+        reason = f"cannot be loaded from {point.value} ({type(error).__name__}: {error})"
+        raise DeviceError(_fault(point, reason)) from error
+    if not callable(function):
+        raise DeviceError(_fault(point, f"is {point.value}, which is not a function"))
+    return function  # type: ignore[no-any-return]
+
+
+def _fault(point: EntryPoint, what: str) -> str:
+    name, version = _package(point)
+    return f"The rig {point.name!r} of package {name} {version} {what}. Update or reinstall that package."
+
+
+def _describe(point: EntryPoint) -> RigEntry:
+    package, version = _package(point)
+    try:
+        function = _load(point)
+    except DeviceError as error:
+        return RigEntry(point.name, package, version, error=str(error))
+    lines = (inspect.getdoc(function) or "").splitlines()
+    return RigEntry(point.name, package, version, description=lines[0] if lines else "")

@@ -1,0 +1,102 @@
+"""A rig that plays a finished scan back, shot by shot, as if it were taken again."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
+from dsl_core.errors import DeviceError
+from dsl_core.model.frames import Frame, FrameSource
+from dsl_core.model.plan import Shot
+from dsl_core.model.rig import BayerPattern, Rig
+
+
+class ReplayCamera(Camera):
+    """Delivers the frame of the shot that was announced, at the time it would have been taken."""
+
+    def __init__(self, source: FrameSource, bayer: BayerPattern = "RGGB", bit_depth: int = 12) -> None:
+        """Play back ``source``; it stays open and belongs to the caller."""
+        self._source = source
+        self._shots: tuple[Shot, ...] = tuple(source.plan.shots())
+        width, height = source.plan.camera_size_px
+        exposures = [setting.exposure_ms for setting in source.plan.settings]
+        self._info = CameraInfo(
+            "replay", source.plan.name, width, height, bayer, bit_depth, (min(exposures), max(exposures))
+        )
+        self._exposure_ms = exposures[0]
+        self._index = 0
+        self._taken = 0
+        self._time_s = 0.0
+
+    @property
+    def info(self) -> CameraInfo:
+        """Size, mosaic and exposures of the scan."""
+        return self._info
+
+    def configure(self, exposure_ms: float) -> float:
+        """Choose among the exposures of the scan; raises `DeviceError` outside their range."""
+        low, high = self._info.exposure_range_ms
+        if not low <= exposure_ms <= high:
+            raise DeviceError(
+                f"The replayed scan has exposures from {low:g} to {high:g} ms, not {exposure_ms:g} ms."
+                " Use the plan of that scan."
+            )
+        self._exposure_ms = exposure_ms
+        return exposure_ms
+
+    def prepare(self, shot_index: int, attempt: int = 0) -> None:
+        """Choose the frame that `snap` delivers; raises `DeviceError` when the scan has none."""
+        if not 0 <= shot_index < len(self._shots):
+            raise DeviceError(
+                f"The replayed scan has {len(self._shots)} shots; shot {shot_index} is not one of them."
+                " Use the plan of that scan."
+            )
+        self._index = shot_index
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        """The stored frame; raises `StoreError` when it is damaged."""
+        pixels = self._source.read(self._shots[self._index]).copy()
+        self._taken += 1
+        self._time_s += self._exposure_ms / 1000.0
+        return Frame(pixels, self._exposure_ms, self._time_s, self._taken)
+
+
+class ReplayProjector(Projector):
+    """Accepts the patterns of the scan and shows them nowhere."""
+
+    def __init__(self, source: FrameSource, frame_period_ms: float) -> None:
+        """Have the projector size of the scan."""
+        width, height = source.plan.projector_size_px
+        self._info = ProjectorInfo("replay", source.plan.name, width, height, 0.0, frame_period_ms)
+
+    @property
+    def info(self) -> ProjectorInfo:
+        """Logical size of the scan's projector."""
+        return self._info
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Accept an image; raises `DeviceError` for another size or type."""
+        wanted = (self._info.height_px, self._info.width_px)
+        if image.dtype != np.uint8 or image.shape not in (wanted, (*wanted, 3)):
+            raise DeviceError(
+                f"The projector was given {image.dtype} of shape {image.shape} instead of uint8"
+                f" of shape {wanted} or {(*wanted, 3)}. Make the pattern with the projector's size."
+            )
+
+
+def replay_rig(source: FrameSource, calibration: Rig | None = None) -> DeviceRig:
+    """A rig whose camera plays back ``source``; it waits for nothing.
+
+    Raises `DeviceError` from its devices when asked for a shot or size that the scan does not have.
+    """
+    sensor = calibration.sensor if calibration else None
+    camera = ReplayCamera(source, sensor.bayer, sensor.bit_depth) if sensor else ReplayCamera(source)
+    period_ms = calibration.frame_period_ms if calibration else 1000.0 / 60.0
+    return DeviceRig(
+        name="replay",
+        camera=camera,
+        projector=ReplayProjector(source, period_ms),
+        calibration=calibration,
+        sleep=lambda seconds: None,
+    )

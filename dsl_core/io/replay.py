@@ -1,0 +1,20 @@
+"""The rig ``replay``: a session on disk, played back by name."""
+
+from __future__ import annotations
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.replay import replay_rig
+from dsl_core.errors import DeviceError
+from dsl_core.io.session import SessionReader
+
+
+def open_replay(options: dict[str, str]) -> DeviceRig:
+    """Plays a stored scan back; option ``session`` is its folder.
+
+    Raises `DeviceError` for other options, `StoreError` when the folder is not a session.
+    """
+    if set(options) != {"session"}:
+        given = ", ".join(sorted(options)) or "none"
+        raise DeviceError(f"The rig 'replay' takes one option, session=NAME.dsl; given: {given}.")
+    reader = SessionReader(options["session"])
+    return replay_rig(reader, reader.calibration)
