@@ -128,7 +128,7 @@ def pip_settings(listing: str) -> dict[str, list[str]]:
     for line in listing.splitlines():
         key, _, value = line.partition("=")
         name = key.rpartition(".")[2].strip()
-        if name in ("find-links", "index-url"):
+        if name in ("cert", "find-links", "index-url"):
             settings[name] = str(ast.literal_eval(value)).split()
     return settings
 
@@ -208,6 +208,8 @@ def install(venv: Path, torch: str) -> None:
         if "index-url" in settings and "UV_DEFAULT_INDEX" not in os.environ:
             options += ["--default-index", settings["index-url"][0]]
         variables = {key: value for key, value in os.environ.items() if key != "UV_FIND_LINKS"}
+        if "cert" in settings:
+            variables.setdefault("SSL_CERT_FILE", settings["cert"][0])
         command = [python, "-m", "uv", "pip", "install", "--python", python, *options, *constraints]
         command += ["--build-constraints", str(CONSTRAINTS), "--editable", f"{ROOT}[test]"]
         with timed("Installing dsl-scan and what it needs"):

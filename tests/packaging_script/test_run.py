@@ -83,7 +83,7 @@ def test_what_ldconfig_does_not_list_is_missing() -> None:
 
 
 def test_a_later_setting_of_pip_wins_and_others_are_left_out() -> None:
-    listing = "global.find-links='a'\nglobal.cert='c'\n:env:.find-links='b\\nb2'\nglobal.index-url='i'"
+    listing = "global.find-links='a'\nglobal.timeout='9'\n:env:.find-links='b\\nb2'\nglobal.index-url='i'"
     assert run.pip_settings(listing) == {"find-links": ["b", "b2"], "index-url": ["i"]}
 
 
