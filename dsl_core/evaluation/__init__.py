@@ -1,0 +1,1 @@
+"""Results against truth: depth, spectra, honesty of the uncertainties, cost, and a report of it all."""

@@ -57,7 +57,8 @@ def color_checker(depth_mm: float = 700.0, tilt_x_deg: float = 0.0, tilt_y_deg: 
     check_range("tilt_x_deg", tilt_x_deg, -45, 45, "degrees")
     check_range("tilt_y_deg", tilt_y_deg, -45, 45, "degrees")
     patches = spectra.chart_spectra()
-    palette = Materials.of({**patches, "frame": spectra.flat(spectra.DARK), "wall": spectra.flat(0.2)})
+    around = {"frame": spectra.flat(spectra.DARK), "wall": spectra.flat(0.2)}
+    palette = Materials.of({**patches, **around}, tuple(around))
     frame, wall = len(patches), len(patches) + 1
     painter = patch_grid(6, 4, 52.0, 44.0, frame)
     chart = tilted((*IMAGE_CENTRE_MM, depth_mm), tilt_x_deg, tilt_y_deg, (161.0, 109.0), painter)
@@ -88,7 +89,7 @@ def filters(depth_mm: float = 700.0, background: float = 0.03, fwhm_nm: float = 
     check_range("background", background, 0, 1)
     check_range("fwhm_nm", fwhm_nm, 2, 100, "nm")
     names = {f"{nm} nm": spectra.bandpass(nm, fwhm_nm) for nm in FILTER_CENTRES_NM}
-    palette = Materials.of({**names, "board": spectra.flat(background)})
+    palette = Materials.of({**names, "board": spectra.flat(background)}, ("board",))
     painter = _discs(3, 3, 68.0, 29.0, len(names))
     board = tilted((*IMAGE_CENTRE_MM, depth_mm), 0.0, 0.0, ENDLESS, painter)
     return Scene("filters", f"nine {fwhm_nm:g} nm filters at {depth_mm:g} mm", (board,), palette)
@@ -105,7 +106,8 @@ def leaves(depth_mm: float = 700.0) -> Scene:
     """A real leaf (left) and a dyed one (right): one colour under D65, two spectra (metamers)."""
     check_range("depth_mm", depth_mm, 300, 2000, "mm")
     palette = Materials.of(
-        {"real leaf": spectra.leaf(), "dyed leaf": spectra.dyed_leaf(), "board": spectra.flat(0.5)}
+        {"real leaf": spectra.leaf(), "dyed leaf": spectra.dyed_leaf(), "board": spectra.flat(0.5)},
+        ("board",),
     )
     board = tilted((*IMAGE_CENTRE_MM, depth_mm), 0.0, 0.0, ENDLESS, _leaf_outlines)
     return Scene("leaves", f"real and dyed leaf at {depth_mm:g} mm", (board,), palette)

@@ -35,7 +35,7 @@ def steps(depth_mm: float = 640.0, step_mm: float = 25.0, count: int = 5) -> Sce
         )
         for i in range(count)
     ]
-    palette = Materials.of({"plaster": spectra.flat(0.85), "wall": spectra.flat(0.3)})
+    palette = Materials.of({"plaster": spectra.flat(0.85), "wall": spectra.flat(0.3)}, ("wall",))
     return Scene("steps", f"{count} steps of {step_mm:g} mm", (*blocks, _wall(back, 1)), palette)
 
 

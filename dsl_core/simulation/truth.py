@@ -20,16 +20,23 @@ class Materials:
     """A palette of reflectance spectra on the Spectralon scale.
 
     ``wavelengths_nm`` has shape (L,), ``reflectance`` shape (M, L), 0..1, one row per name.
+    ``surroundings`` names the materials that are in view but not what the scene is about.
     """
 
     names: tuple[str, ...]
     wavelengths_nm: NDArray[np.float64]
     reflectance: NDArray[np.float64]
+    surroundings: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, spectra: dict[str, NDArray[np.float64]]) -> Materials:
+    def of(cls, spectra: dict[str, NDArray[np.float64]], surroundings: tuple[str, ...] = ()) -> Materials:
         """Make a palette from named spectra on the fine grid, in the order of the dictionary."""
-        return cls(tuple(spectra), FINE_NM, np.stack(list(spectra.values())))
+        return cls(tuple(spectra), FINE_NM, np.stack(list(spectra.values())), surroundings)
+
+    @property
+    def targets(self) -> tuple[int, ...]:
+        """Indices of the materials that the scene is about."""
+        return tuple(i for i, name in enumerate(self.names) if name not in self.surroundings)
 
     def at(self, wavelengths_nm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Reflectance at other wavelengths (nm), linear between samples, shape (M, bands)."""

@@ -1,0 +1,84 @@
+"""Seconds and peak memory of each stage of a computation."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+#: Memory is read this often; shorter peaks can be missed.
+_INTERVAL_S = 0.01
+
+
+@dataclass(frozen=True)
+class StageCost:
+    """What a stage took: wall seconds, and the largest resident memory of the process while it ran."""
+
+    name: str
+    seconds: float
+    peak_bytes: int
+    start_bytes: int
+
+
+@dataclass
+class StageTimer:
+    """Collects the cost of stages; the same timer may be used from several places in turn.
+
+    >>> timer = StageTimer()
+    >>> with timer.stage("decode"):
+    ...     total = sum(range(1000))
+    >>> timer.stages[0].name
+    'decode'
+    """
+
+    stages: list[StageCost] = field(default_factory=list)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Measure a block; its cost is kept also when it fails."""
+        watch = _MemoryWatch()
+        started = time.perf_counter()
+        try:
+            yield
+        finally:
+            seconds = time.perf_counter() - started
+            self.stages.append(StageCost(name, seconds, watch.stop(), watch.first))
+
+    @property
+    def total_seconds(self) -> float:
+        """Seconds of all stages together."""
+        return sum(stage.seconds for stage in self.stages)
+
+    @property
+    def peak_bytes(self) -> int:
+        """Largest resident memory of any stage, 0 before the first."""
+        return max((stage.peak_bytes for stage in self.stages), default=0)
+
+
+class _MemoryWatch:
+    """Reads the resident memory of this process in a thread until it is stopped."""
+
+    def __init__(self) -> None:
+        import psutil
+
+        self._process = psutil.Process()
+        self.first = self._read()
+        self._peak = self.first
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True, name="memory watch")
+        self._thread.start()
+
+    def _read(self) -> int:
+        return int(self._process.memory_info().rss)
+
+    def _run(self) -> None:
+        while not self._done.wait(_INTERVAL_S):
+            self._peak = max(self._peak, self._read())
+
+    def stop(self) -> int:
+        """End the thread and return the largest value seen, bytes."""
+        self._done.set()
+        self._thread.join()
+        return max(self._peak, self._read())

@@ -1,0 +1,111 @@
+"""Reflectance spectra against truth: errors with and without a free scale, and widths of peaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import DecodeError
+from dsl_core.optics.colour import delta_e_2000, reflectance_to_lab
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SpectralErrors:
+    """Errors of n spectra, each array of shape (n,); ``scaled`` errors are those left after a free scale.
+
+    ``rmse`` over bands on the reflectance scale; ``angle_rad`` does not depend on scale; ``delta_e`` is
+    CIEDE2000 under D65; ``scale`` is the factor that brings the measurement closest to the truth.
+    """
+
+    rmse: Floats
+    angle_rad: Floats
+    delta_e: Floats
+    scale: Floats
+    rmse_scaled: Floats
+    delta_e_scaled: Floats
+
+
+def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> SpectralErrors:
+    """Compare spectra (bands, n) with truth (bands, n) or (bands, 1).
+
+    Raises `DecodeError` for shapes that do not fit or values that are not finite.
+    """
+    bands = len(wavelengths_nm)
+    if measured.ndim != 2 or len(measured) != bands or truth.shape[0] != bands:
+        raise DecodeError(
+            f"Spectra of shape {measured.shape} and truth of shape {truth.shape} do not fit {bands} bands;"
+            " resample the truth to the bands of the result."
+        )
+    if not (np.isfinite(measured).all() and np.isfinite(truth).all()):
+        raise DecodeError("A spectrum to compare holds values that are not finite; leave such pixels out.")
+    measured, truth = np.broadcast_arrays(np.asarray(measured, np.float64), np.asarray(truth, np.float64))
+    # einsum, because products of all pixels and bands would need as much memory as the cube.
+    product = np.einsum("bn,bn->n", measured, truth)
+    power, truth_power = np.einsum("bn,bn->n", measured, measured), np.einsum("bn,bn->n", truth, truth)
+    # A spectrum that is zero has no direction: its angle is a right one, its best scale is 1.
+    norm = np.sqrt(power * truth_power)
+    cosine = np.divide(product, norm, out=np.zeros_like(product), where=norm > 0)
+    scale = np.divide(product, power, out=np.ones_like(product), where=power > 0)
+    lab = reflectance_to_lab(truth, wavelengths_nm)
+    return SpectralErrors(
+        rmse=_rmse(measured, truth),
+        angle_rad=np.arccos(np.clip(cosine, -1.0, 1.0)),
+        delta_e=delta_e_2000(reflectance_to_lab(measured, wavelengths_nm), lab),
+        scale=scale,
+        rmse_scaled=_rmse(measured * scale, truth),
+        delta_e_scaled=delta_e_2000(reflectance_to_lab(measured * scale, wavelengths_nm), lab),
+    )
+
+
+def _rmse(measured: Floats, truth: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.mean((measured - truth) ** 2, axis=0)))
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A peak of a spectrum; ``complete`` is false when one flank ends at the edge of the bands."""
+
+    centre_nm: float
+    height: float
+    baseline: float
+    fwhm_nm: float
+    complete: bool
+
+
+def peak_width(wavelengths_nm: Floats, values: Floats, baseline: float | None = None) -> Peak:
+    """Full width at half maximum above a baseline, linear between samples, both arrays of shape (bands,).
+
+    The maximum is that of the samples, nothing is fitted. The baseline is the median of all samples
+    unless given, which is right for peaks narrower than half the bands. Where a flank does not come
+    down to half height, the other one counts twice and ``complete`` is false. Raises `DecodeError` for
+    values that are not finite or a curve without a peak.
+    """
+    curve = np.asarray(values, np.float64)
+    if not np.isfinite(curve).all():
+        raise DecodeError("A spectrum with values that are not finite has no width; leave such pixels out.")
+    floor = float(np.median(curve)) if baseline is None else baseline
+    top = int(curve.argmax())
+    half = (curve[top] + floor) / 2.0
+    left = _half_width(wavelengths_nm[top::-1], curve[top::-1], half)
+    right = _half_width(wavelengths_nm[top:], curve[top:], half)
+    flanks = [flank for flank in (left, right) if flank is not None]
+    if curve[top] <= floor or not flanks:
+        raise DecodeError("The spectrum does not come down to half its maximum, so that it has no width.")
+    low, high = flanks[0], flanks[-1]
+    centre = float(wavelengths_nm[top]) + (high - low) / 2
+    return Peak(centre, float(curve[top]), floor, low + high, len(flanks) == 2)
+
+
+def _half_width(wavelengths_nm: Floats, values: Floats, level: float) -> float | None:
+    """Distance in nm from the first sample to where the values have come down to a level."""
+    below = np.flatnonzero(values <= level)
+    if below.size == 0 or below[0] == 0:
+        return None
+    i = int(below[0])
+    share = (values[i - 1] - level) / (values[i - 1] - values[i])
+    crossing = wavelengths_nm[i - 1] + share * (wavelengths_nm[i] - wavelengths_nm[i - 1])
+    return float(abs(crossing - wavelengths_nm[0]))

@@ -1,0 +1,246 @@
+"""All figures of one result against its truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import DecodeError
+from dsl_core.evaluation.depth import DepthScore, depth_score
+from dsl_core.evaluation.spectral import Peak, peak_width, spectral_errors
+from dsl_core.evaluation.uncertainty import DECIDED_FROM, Calibration, calibration
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Floats = NDArray[np.float64]
+#: Pixels this close to another material are left out of a patch: their light is mixed.
+_MARGIN_PX = 3
+#: Pixels of a material that enter its figures.
+_MAX_PIXELS = 20000
+#: Truth with a narrower peak than this has its width compared.
+_PEAKED_NM = 40.0
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is known of a scene, as plain arrays; leave out what is not known.
+
+    ``depth_mm`` (h, w), NaN where there is none; ``material`` (h, w), index into ``names`` and ``spectra``
+    (materials, bands of the result), -1 where there is none; ``lit`` (h, w); ``targets``: the materials whose
+    spectra count (default all).
+    """
+
+    depth_mm: Floats | None = None
+    lit: NDArray[np.bool_] | None = None
+    material: NDArray[np.int32] | None = None
+    names: tuple[str, ...] = ()
+    spectra: Floats | None = None
+    targets: tuple[int, ...] | None = None
+
+
+@dataclass(frozen=True)
+class PatchScore:
+    """Spectra of one material: errors of the mean spectrum, and the RMSE of its single pixels.
+
+    ``truth``, ``mean``, ``std`` (scatter from pixel to pixel), ``posterior_std`` (mean, as the result states
+    it) and ``data_share`` have shape (bands,); ``coverage`` is the measured share of the patch's lit pixels.
+    """
+
+    name: str
+    pixels: int
+    coverage: float
+    truth: Floats
+    mean: Floats
+    std: Floats
+    posterior_std: Floats | None
+    data_share: Floats | None
+    rmse: float
+    angle_rad: float
+    delta_e: float
+    scale: float
+    rmse_scaled: float
+    delta_e_scaled: float
+    pixel_rmse: float
+    pixel_angle_rad: float
+    truth_peak: Peak | None
+    peak: Peak | None
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Figures of a result; None where truth or measurement of that kind is absent.
+
+    ``unmeasured`` names the materials that are in view and lit but have no measured pixel.
+    """
+
+    depth: DepthScore | None
+    depth_calibration: Calibration | None
+    patches: tuple[PatchScore, ...]
+    unmeasured: tuple[str, ...]
+    spectral_calibration: Calibration | None
+
+    def mean(self, figure: str) -> float:
+        """Mean of a figure of `PatchScore` over the patches; raises `DecodeError` when there are none."""
+        if not self.patches:
+            raise DecodeError("There is no patch with a known spectrum to average over.")
+        return float(np.mean([getattr(patch, figure) for patch in self.patches]))
+
+    @property
+    def mean_fwhm_nm(self) -> float | None:
+        """Mean measured width over the patches whose truth is a narrow peak."""
+        widths = [patch.peak.fwhm_nm for patch in self.patches if patch.peak]
+        return float(np.mean(widths)) if widths else None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and lists, ready for JSON."""
+        return {key: _plain(value) for key, value in asdict(self).items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
+    """Compare a result with what is known; parts without truth or measurement are left out.
+
+    Raises `DecodeError` when truth and result have different sizes or no lit pixel was measured.
+    """
+    depth, depth_calibration = _depth(result, truth)
+    if truth.material is None or truth.spectra is None or "reflectance" not in result:
+        return Evaluation(depth, depth_calibration, (), (), None)
+    chosen = _chosen(result, truth.material, truth.lit)
+    samples = [
+        _Sample.take(result, chosen & (truth.material == index), truth.names[index], truth.spectra[index])
+        for index in (range(len(truth.names)) if truth.targets is None else truth.targets)
+    ]
+    samples = [sample for sample in samples if sample.wanted]
+    measured = [sample for sample in samples if sample.measured]
+    bands = result["wavelength_nm"].values.astype(np.float64)
+    return Evaluation(
+        depth,
+        depth_calibration,
+        tuple(_score(sample, bands) for sample in measured),
+        tuple(sample.name for sample in samples if not sample.measured),
+        _spectral_calibration(measured),
+    )
+
+
+def _depth(result: xr.Dataset, truth: Truth) -> tuple[DepthScore | None, Calibration | None]:
+    if truth.depth_mm is None or "depth_mm" not in result:
+        return None, None
+    measured = result["depth_mm"].values
+    score = depth_score(measured, truth.depth_mm, truth.lit)
+    if "depth_std_mm" not in result:
+        return score, None
+    return score, calibration(measured, truth.depth_mm, result["depth_std_mm"].values, truth.lit)
+
+
+def interior(material: NDArray[np.int32], margin_px: int = _MARGIN_PX) -> NDArray[np.bool_]:
+    """Pixels (h, w) whose neighbourhood up to ``margin_px`` is all of their own material."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    size = 2 * margin_px + 1
+    low = minimum_filter(material, size, mode="nearest")
+    return np.asarray(low == maximum_filter(material, size, mode="nearest"))
+
+
+def _chosen(
+    result: xr.Dataset, material: NDArray[np.int32], lit: NDArray[np.bool_] | None
+) -> NDArray[np.bool_]:
+    """Lit pixels away from the borders between materials."""
+    size = result["reflectance"].shape[1:]
+    if material.shape != size:
+        raise DecodeError(
+            f"The result has {size} pixels and the truth {material.shape};"
+            " render the truth for the camera that took the scan."
+        )
+    chosen = interior(material) & (material >= 0)
+    return chosen if lit is None else chosen & lit
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Measured spectra (bands, n) of one material: ``measured`` of the ``wanted`` pixels have one."""
+
+    name: str
+    truth: Floats
+    wanted: int
+    measured: int
+    reflectance: Floats
+    std: Floats | None
+    share: Floats | None
+
+    @classmethod
+    def take(cls, result: xr.Dataset, where: NDArray[np.bool_], name: str, truth: Floats) -> _Sample:
+        wanted = np.flatnonzero(where)
+        cube = result["reflectance"].values
+        good = wanted[np.isfinite(cube.reshape(len(cube), -1)[:, wanted]).all(axis=0)]
+        # Evenly thinned: more pixels would take memory and change no figure.
+        used = good[:: -(-good.size // _MAX_PIXELS) or 1]
+
+        def pick(variable: str) -> Floats:
+            values = result[variable].values
+            return np.asarray(values.reshape(len(values), -1)[:, used], np.float64)
+
+        std = pick("reflectance_std") if "reflectance_std" in result else None
+        share = pick("data_share") if "data_share" in result else None
+        return cls(name, truth, wanted.size, good.size, pick("reflectance"), std, share)
+
+
+def _score(sample: _Sample, bands: Floats) -> PatchScore:
+    truth = sample.truth[:, None]
+    mean = sample.reflectance.mean(axis=1)
+    ours = spectral_errors(mean[:, None], truth, bands)
+    pixels = spectral_errors(sample.reflectance, truth, bands)
+    truth_peak = _narrow_peak(bands, sample.truth)
+    return PatchScore(
+        name=sample.name,
+        pixels=sample.measured,
+        coverage=sample.measured / sample.wanted,
+        truth=sample.truth,
+        mean=mean,
+        std=sample.reflectance.std(axis=1),
+        posterior_std=None if sample.std is None else np.nanmean(sample.std, axis=1, dtype=np.float64),
+        data_share=None if sample.share is None else np.nanmean(sample.share, axis=1, dtype=np.float64),
+        rmse=float(ours.rmse[0]),
+        angle_rad=float(ours.angle_rad[0]),
+        delta_e=float(ours.delta_e[0]),
+        scale=float(ours.scale[0]),
+        rmse_scaled=float(ours.rmse_scaled[0]),
+        delta_e_scaled=float(ours.delta_e_scaled[0]),
+        pixel_rmse=float(np.sqrt(np.mean(pixels.rmse**2))),
+        pixel_angle_rad=float(pixels.angle_rad.mean()),
+        truth_peak=truth_peak,
+        peak=peak_width(bands, mean) if truth_peak else None,
+    )
+
+
+def _narrow_peak(bands: Floats, truth: Floats) -> Peak | None:
+    """The peak of a true spectrum that is one narrow line."""
+    if truth.max() <= 4 * np.median(truth):
+        return None
+    peak = peak_width(bands, truth)
+    return peak if peak.fwhm_nm < _PEAKED_NM else None
+
+
+def _spectral_calibration(samples: list[_Sample]) -> Calibration | None:
+    """Calibration over the bands that data decide, over all samples together."""
+    known = [sample for sample in samples if sample.std is not None]
+    if not known:
+        return None
+    values = np.concatenate([sample.reflectance for sample in known], axis=1)
+    truth = np.concatenate([np.broadcast_to(s.truth[:, None], s.reflectance.shape) for s in known], axis=1)
+    std = np.concatenate([sample.std for sample in known if sample.std is not None], axis=1)
+    shares = [sample.share for sample in known if sample.share is not None]
+    decided = np.concatenate(shares, axis=1) >= DECIDED_FROM if len(shares) == len(known) else None
+    return calibration(values, truth, std, decided)

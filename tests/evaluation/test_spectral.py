@@ -1,0 +1,98 @@
+"""Spectral figures in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import DecodeError
+from dsl_core.evaluation.spectral import peak_width, spectral_errors
+
+GRID = np.arange(430.0, 661.0, 5.0)
+TRUTH = (0.5 + 0.3 * np.sin(GRID / 40))[:, None]
+
+
+def bandpass(centre: float, width: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.asarray(0.8 / (1 + (2 * np.abs(GRID - centre) / width) ** 6))
+
+
+def test_equal_spectra_have_no_error() -> None:
+    errors = spectral_errors(TRUTH, TRUTH, GRID)
+    for figure in (errors.rmse, errors.delta_e, errors.rmse_scaled, errors.delta_e_scaled):
+        assert figure[0] == pytest.approx(0, abs=1e-9)
+    assert errors.angle_rad[0] == pytest.approx(0, abs=1e-7)
+    assert errors.scale[0] == pytest.approx(1)
+
+
+def test_a_wrong_scale_is_an_error_only_without_free_scale() -> None:
+    errors = spectral_errors(0.8 * TRUTH, TRUTH, GRID)
+    assert errors.rmse[0] == pytest.approx(0.2 * np.sqrt(np.mean(TRUTH**2)))
+    assert errors.delta_e[0] > 3
+    assert errors.angle_rad[0] == pytest.approx(0, abs=1e-7)
+    assert errors.scale[0] == pytest.approx(1.25)
+    assert errors.rmse_scaled[0] == pytest.approx(0, abs=1e-12)
+    assert errors.delta_e_scaled[0] == pytest.approx(0, abs=1e-9)
+
+
+def test_angle_of_orthogonal_parts() -> None:
+    measured = TRUTH.copy()
+    other = np.zeros_like(TRUTH)
+    other[0], other[1] = TRUTH[1], -TRUTH[0]
+    measured += other * np.linalg.norm(TRUTH) / np.linalg.norm(other)
+    assert spectral_errors(measured, TRUTH, GRID).angle_rad[0] == pytest.approx(np.pi / 4)
+
+
+def test_a_black_measurement_is_at_right_angles() -> None:
+    errors = spectral_errors(np.zeros_like(TRUTH), TRUTH, GRID)
+    assert errors.angle_rad[0] == pytest.approx(np.pi / 2)
+    assert errors.scale[0] == 1.0
+
+
+def test_many_pixels_against_one_truth() -> None:
+    noise = np.random.default_rng(0).normal(0, 0.02, (47, 2000))
+    errors = spectral_errors(TRUTH + noise, TRUTH, GRID)
+    assert errors.rmse.shape == (2000,)
+    assert np.sqrt(np.mean(errors.rmse**2)) == pytest.approx(0.02, rel=0.01)
+
+
+def test_shapes_and_nan_are_refused() -> None:
+    with pytest.raises(DecodeError, match="47 bands"):
+        spectral_errors(TRUTH[:40], TRUTH, GRID)
+    with pytest.raises(DecodeError, match="finite"):
+        spectral_errors(TRUTH * np.nan, TRUTH, GRID)
+
+
+def test_width_of_a_triangle_is_exact() -> None:
+    triangle = np.clip(1 - np.abs(GRID - 545) / 30, 0, None)
+    peak = peak_width(GRID, triangle)
+    assert peak.fwhm_nm == pytest.approx(30)
+    assert peak.centre_nm == pytest.approx(545)
+    assert peak.complete
+
+
+def test_width_counts_from_the_baseline() -> None:
+    triangle = 0.2 + np.clip(1 - np.abs(GRID - 545) / 30, 0, None)
+    assert peak_width(GRID, triangle).fwhm_nm == pytest.approx(30)
+    assert peak_width(GRID, triangle).baseline == pytest.approx(0.2)
+    # Half of 1.2 lies 0.4 above the foot.
+    assert peak_width(GRID, triangle, baseline=0.0).fwhm_nm == pytest.approx(36)
+
+
+@pytest.mark.parametrize("centre", range(450, 651, 25))
+@pytest.mark.parametrize("width", [10.0, 15.0, 20.0])
+def test_sampled_filters_keep_their_width(centre: int, width: float) -> None:
+    peak = peak_width(GRID, bandpass(centre, width))
+    assert peak.fwhm_nm == pytest.approx(width, abs=0.7)
+    assert peak.centre_nm == pytest.approx(centre, abs=0.1)
+    assert peak.height == pytest.approx(0.8)
+
+
+def test_a_flank_beyond_the_bands_is_mirrored_and_said() -> None:
+    peak = peak_width(GRID, bandpass(660, 20))
+    assert not peak.complete
+    assert peak.fwhm_nm == pytest.approx(20, abs=0.7)
+
+
+def test_a_flat_curve_has_no_width() -> None:
+    with pytest.raises(DecodeError, match="half"):
+        peak_width(GRID, np.full(47, 0.4))
