@@ -146,15 +146,18 @@ def torch_options(choice: str, links: Sequence[str], platform: str = sys.platfor
     CUDA on macOS, which has none.
     """
     local = [option for link in links for option in ("--find-links", link)]
+    if choice == "default":
+        return local
+    anew = ["--reinstall-package", "torch"]  # the other build has the same version and would be kept
+    linux = platform.startswith("linux")
     if choice == "cuda":
         if platform == "darwin":
             raise SetupError("There is no CUDA build of torch for macOS; leave out --torch cuda.")
         # Local wheels are left out: one of the CPU build would win over the registry's.
-        return [] if platform.startswith("linux") else ["--torch-backend", "cu130"]
+        return anew if linux else [*anew, "--torch-backend", "cu130"]
     has_local_cpu = any(list(Path(link).glob("torch-*+cpu-*.whl")) for link in links)
-    if choice == "cpu" and platform.startswith("linux") and not has_local_cpu:
-        return [*local, "--torch-backend", "cpu"]
-    return local
+    backend = ["--torch-backend", "cpu"] if linux and not has_local_cpu else []
+    return [*anew, *local, *backend]
 
 
 def digest(torch: str) -> str:

@@ -94,15 +94,18 @@ def test_links_of_pip_and_uv_are_joined_once(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_torch_comes_from_a_local_folder_where_there_is_one(tmp_path: Path) -> None:
     links = [str(tmp_path)]
-    assert run.torch_options("cpu", links, "linux") == ["--find-links", links[0], "--torch-backend", "cpu"]
+    anew = ["--reinstall-package", "torch"]
+    local = ["--find-links", links[0]]
+    assert run.torch_options("cpu", links, "linux") == [*anew, *local, "--torch-backend", "cpu"]
+    assert run.torch_options("cpu", links, "win32") == [*anew, *local]
     (tmp_path / "torch-2.13.0+cpu-cp311-cp311-manylinux_2_28_x86_64.whl").touch()
-    assert run.torch_options("cpu", links, "linux") == ["--find-links", links[0]]
-    assert run.torch_options("default", links, "linux") == ["--find-links", links[0]]
+    assert run.torch_options("cpu", links, "linux") == [*anew, *local]
+    assert run.torch_options("default", links, "linux") == local
 
 
 def test_cuda_is_never_taken_from_a_local_cpu_folder(tmp_path: Path) -> None:
-    assert run.torch_options("cuda", [str(tmp_path)], "linux") == []
-    assert run.torch_options("cuda", [], "win32") == ["--torch-backend", "cu130"]
+    assert str(tmp_path) not in run.torch_options("cuda", [str(tmp_path)], "linux")
+    assert run.torch_options("cuda", [], "win32")[-2:] == ["--torch-backend", "cu130"]
     with pytest.raises(run.SetupError, match="macOS"):
         run.torch_options("cuda", [], "darwin")
 
