@@ -4,9 +4,10 @@ Data: github.com/bllanos/chromatic-aberration, demo_data (Boost licence), as pre
 shared/data/colorchecker_bandpass. Run this file as ``python -m tests.cases.bandpass_chart`` for the table.
 
 The reference is the chart's white patch, the only patch whose spectrum is used. The light falls
-differently through each filter (by up to a factor of two across the chart), so each filter gets a flat field from the
-white board around the chart, relative to one filter; what all filters share is left to the one scale per
-patch that the comparison allows. The board lies on three sides only, hence a flat field of second order.
+differently through each filter (by up to a factor of two across the chart), so each filter gets a flat
+field from the white board around the chart, relative to one filter; what all filters share is left to
+the one scale per patch that the comparison allows. The board lies on three sides only, hence a flat field
+of second order.
 """
 
 from __future__ import annotations
