@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 #: Pixels this close to another material are left out of a patch: their light is mixed.
 _MARGIN_PX = 3
 #: Pixels of a material that enter its figures.
-_MAX_PIXELS = 20000
+_MAX_PIXELS = 4000
 #: Truth with a narrower peak than this has its width compared.
 _PEAKED_NM = 40.0
 

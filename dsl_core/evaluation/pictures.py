@@ -1,0 +1,110 @@
+"""Maps of a result as pictures with legends, ready to be put into a page."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from io import BytesIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.result import REASONS, Flag
+
+Floats = NDArray[np.float64] | NDArray[np.float32]
+Rgba = NDArray[np.uint8]
+
+#: Larger pictures are thinned by whole steps to at most this width, px.
+_MAX_WIDTH_PX = 1000
+_STOPS = 17
+#: One colour per flag, in the order of `Flag`; told apart by the common kinds of colour blindness
+#: (after P. Tol, "Colour schemes", 2021, bright and muted).
+_FLAG_COLOURS = (
+    "#332288", "#cc3311", "#aa4499", "#882255", "#ddcc77",
+    "#999933", "#88ccee", "#44aa99", "#ee7733", "#555555",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Key:
+    """A line of a legend: a colour, words and a share of the pixels."""
+
+    colour: str
+    text: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture (data URI) with a caption and either a colour bar (CSS gradient, ends) or keys."""
+
+    title: str
+    caption: str
+    uri: str
+    gradient: str = ""
+    low: str = ""
+    high: str = ""
+    keys: tuple[Key, ...] = ()
+    pins: tuple[tuple[float, float, str], ...] = ()
+
+
+def png_uri(rgba: Rgba) -> str:
+    """A PNG data URI of RGB or RGBA bytes, shape (h, w, 3 or 4)."""
+    from matplotlib.image import imsave
+
+    step = -(-rgba.shape[1] // _MAX_WIDTH_PX)
+    buffer = BytesIO()
+    imsave(buffer, np.ascontiguousarray(rgba[::step, ::step]), format="png")
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def colour_picture(rgb: Floats, title: str, caption: str) -> Picture:
+    """The sRGB image (3, h, w), 0..1; pixels without colour are transparent."""
+    solid = np.isfinite(rgb).all(axis=0)
+    pixels = np.nan_to_num(np.moveaxis(rgb, 0, -1)).clip(0, 1)
+    rgba = np.dstack([(pixels * 255 + 0.5).astype(np.uint8), np.where(solid, 255, 0).astype(np.uint8)])
+    return Picture(title, caption, png_uri(rgba))
+
+
+def value_picture(
+    values: Floats, title: str, caption: str, unit: str, colours: str = "viridis", symmetric: bool = False
+) -> Picture:
+    """A map (h, w) in false colour between its 1st and 99th percentile; NaN is transparent.
+
+    ``symmetric`` centres the colours on zero, for signed errors.
+    """
+    from matplotlib import colormaps
+
+    known = values[np.isfinite(values)]
+    low, high = np.percentile(known, (1, 99)) if known.size else (0.0, 1.0)
+    if symmetric:
+        low, high = -max(abs(low), abs(high)), max(abs(low), abs(high))
+    # A constant map still needs a range.
+    high = high if high > low else low + 1e-6 * max(abs(low), 1.0)
+    scheme = colormaps[colours]
+    shade = np.nan_to_num((values - low) / (high - low)).clip(0, 1)
+    rgba = scheme(shade, bytes=True)
+    rgba[..., 3] = np.where(np.isfinite(values), 255, 0)
+    stops = scheme(np.linspace(0, 1, _STOPS), bytes=True)[:, :3]
+    gradient = ", ".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in stops.tolist())
+    return Picture(title, caption, png_uri(rgba), gradient, f"{low:.4g} {unit}", f"{high:.4g} {unit}")
+
+
+def flag_picture(flags: NDArray[np.integer], title: str, caption: str) -> Picture:
+    """The flags (h, w), each pixel in the colour of its gravest flag, with words for those that occur."""
+    rgba = np.zeros((*flags.shape, 4), np.uint8)
+    keys = []
+    # Flags are declared from the gravest to the mildest, except for the last, which outranks all.
+    order = [Flag.NON_FINITE, *(flag for flag in Flag if flag is not Flag.NON_FINITE)]
+    for flag in reversed(order):
+        rgba[(flags & int(flag)) != 0] = (*bytes.fromhex(_colour(flag)[1:]), 255)
+    for flag in Flag:
+        share = float(np.mean((flags & int(flag)) != 0))
+        if share > 0:
+            keys.append(Key(_colour(flag), REASONS[flag], share))
+    keys.append(Key("transparent", "nothing to remark", float(np.mean(flags == 0))))
+    return Picture(title, caption, png_uri(rgba), keys=tuple(keys))
+
+
+def _colour(flag: Flag) -> str:
+    return _FLAG_COLOURS[list(Flag).index(flag)]

@@ -1,0 +1,99 @@
+"""Figures against goals, in words a person can check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dsl_core.evaluation.summary import Evaluation
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A figure with its unit, what was wanted of it, and whether it got there (None: nothing was wanted)."""
+
+    figure: str
+    value: str
+    unit: str = ""
+    wanted: str = ""
+    passed: bool | None = None
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is wanted of a figure: at most ``limit``, or at least where ``at_least``."""
+
+    limit: float
+    at_least: bool = False
+
+    def met(self, value: float) -> bool:
+        """Whether a value is good enough."""
+        return value >= self.limit if self.at_least else value <= self.limit
+
+
+#: name -> (words, unit, format) of every figure, in the order of the table.
+_FIGURES = {
+    "depth_rmse_mm": ("Depth, RMSE per pixel", "mm", ".3f"),
+    "depth_bias_mm": ("Depth, bias", "mm", "+.3f"),
+    "depth_coverage": ("Lit pixels with a depth", "%", ".2%"),
+    "depth_within_1_mm": ("Lit pixels right to 1 mm", "%", ".2%"),
+    "depth_coverage_95": ("True depth inside the 95 % band", "%", ".1%"),
+    "spectral_rmse": ("Reflectance, mean RMSE of patches", "", ".4f"),
+    "spectral_worst_rmse": ("Reflectance, worst patch", "", ".4f"),
+    "spectral_pixel_rmse": ("Reflectance, RMSE of single pixels", "", ".4f"),
+    "spectral_rmse_scaled": ("Reflectance, mean RMSE with a free scale", "", ".4f"),
+    "spectral_angle_rad": ("Mean spectral angle", "rad", ".4f"),
+    "delta_e": ("Mean colour difference CIEDE2000", "", ".2f"),
+    "fwhm_nm": ("Mean width of narrow peaks", "nm", ".2f"),
+    "spectral_coverage_95": ("True reflectance inside the 95 % band, where data decide", "%", ".1%"),
+}
+
+
+def figures(evaluation: Evaluation) -> dict[str, float]:
+    """Every figure an evaluation has, by name, in SI-like units as named."""
+    found: dict[str, float] = {}
+    if (depth := evaluation.depth) is not None:
+        found |= {
+            "depth_rmse_mm": depth.rmse_mm,
+            "depth_bias_mm": depth.bias_mm,
+            "depth_coverage": depth.coverage,
+            "depth_within_1_mm": depth.within_1_mm,
+        }
+    if evaluation.depth_calibration is not None:
+        found["depth_coverage_95"] = evaluation.depth_calibration.coverage_95
+    if evaluation.patches:
+        found |= {
+            "spectral_rmse": evaluation.mean("rmse"),
+            "spectral_worst_rmse": max(patch.rmse for patch in evaluation.patches),
+            "spectral_pixel_rmse": evaluation.mean("pixel_rmse"),
+            "spectral_rmse_scaled": evaluation.mean("rmse_scaled"),
+            "spectral_angle_rad": evaluation.mean("angle_rad"),
+            "delta_e": evaluation.mean("delta_e"),
+        }
+    if evaluation.mean_fwhm_nm is not None:
+        found["fwhm_nm"] = evaluation.mean_fwhm_nm
+    if evaluation.spectral_calibration is not None:
+        found["spectral_coverage_95"] = evaluation.spectral_calibration.coverage_95
+    return found
+
+
+def verdicts(evaluation: Evaluation, goals: Mapping[str, Goal] | None = None) -> tuple[Verdict, ...]:
+    """The figures of an evaluation as rows of a table, judged where there is a goal.
+
+    Raises ``KeyError`` for a goal whose figure does not exist.
+    """
+    goals = goals or {}
+    for name in goals:
+        _FIGURES[name]
+    rows = []
+    for name, value in figures(evaluation).items():
+        words, unit, form = _FIGURES[name]
+        goal = goals.get(name)
+        wanted = "" if goal is None else f"{'≥' if goal.at_least else '≤'} {goal.limit * _factor(form):.4g}"
+        passed = None if goal is None else goal.met(value)
+        rows.append(Verdict(words, format(value, form).rstrip("%"), unit, wanted, passed))
+    return tuple(rows)
+
+
+def _factor(form: str) -> float:
+    return 100.0 if form.endswith("%") else 1.0

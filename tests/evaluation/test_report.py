@@ -1,0 +1,168 @@
+"""The report holds what it claims, refers to nothing outside itself, and survives poor results."""
+
+from __future__ import annotations
+
+import base64
+import re
+from html.parser import HTMLParser
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from dsl_core.evaluation.cost import StageCost
+from dsl_core.evaluation.pictures import flag_picture, value_picture
+from dsl_core.evaluation.report import ReportContent, render_report
+from dsl_core.evaluation.summary import evaluate
+from dsl_core.evaluation.verdict import Goal, verdicts
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result import REASONS, Flag
+
+
+class Page(HTMLParser):
+    """Collects references and text, and checks that every tag is closed."""
+
+    VOID = frozenset({"meta", "img", "br", "link", "stop", "line", "rect", "polyline", "polygon"})
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.references: list[str] = []
+        self.open: list[str] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.references += [value or "" for name, value in attrs if name in ("src", "href", "srcset")]
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def pixels_of(uri: str) -> Any:
+    return imread(BytesIO(base64.b64decode(uri.removeprefix("data:image/png;base64,"))))
+
+
+@pytest.fixture
+def full(known: Any) -> ReportContent:
+    evaluation = evaluate(known.result, known.truth)
+    return ReportContent(
+        title="Scan of <a> & b",
+        result=known.result,
+        summary="All is known here.",
+        evaluation=evaluation,
+        truth=known.truth,
+        verdicts=verdicts(evaluation, {"spectral_rmse": Goal(0.015)}),
+        costs=[StageCost("decode", 1.5, 300_000_000, 1), StageCost("spectra", 4.5, 900_000_000, 1)],
+        plan=CapturePlan(),
+        provenance={"Rig": "published"},
+        pixels=[(20, 10)],
+    )
+
+
+def test_full_report_is_one_well_formed_page(full: ReportContent) -> None:
+    html = render_report(full)
+    page = Page(html)
+    assert page.open == []
+    assert page.references
+    assert all(reference.startswith("data:image/png;base64,") for reference in page.references)
+    assert "http" not in html.replace("http-equiv", "")
+    assert re.search(r"\bnan\b", page.text, re.IGNORECASE) is None
+    assert re.search(r'points="[^"]*nan', html) is None
+
+
+def test_full_report_says_what_was_found(full: ReportContent) -> None:
+    page = Page(render_report(full))
+    for words in (
+        "Scan of <a> & b",
+        "All is known here.",
+        "missed",
+        "Error of depth",
+        REASONS[Flag.NO_LIGHT],
+        "filter",
+        "Pixel 1",
+        "6.00",
+        "900",
+        f"{CapturePlan().shot_count} (38 code, 318 spectral patterns)",
+        "published",
+    ):
+        assert words in page.text
+    assert REASONS[Flag.SATURATED] not in page.text
+
+
+def test_both_themes_are_there(full: ReportContent) -> None:
+    assert "prefers-color-scheme: dark" in render_report(full)
+
+
+def test_depth_only_report(known: Any) -> None:
+    html = render_report(ReportContent(title="Depth", result=known.result[["depth_mm", "flags"]]))
+    page = Page(html)
+    assert "Spectra" not in page.text
+    assert len(page.references) == 2
+
+
+def test_without_truth_pixels_of_a_grid_are_shown(known: Any) -> None:
+    text = Page(render_report(ReportContent(title="Plain", result=known.result))).text
+    # Eight places, two of them in shadow.
+    assert len(re.findall(r"Pixel \d", text)) == 6
+
+
+def test_a_result_without_any_value_still_gives_a_page(known: Any) -> None:
+    empty = known.result.copy(deep=True)
+    for name in ("depth_mm", "depth_std_mm", "reflectance", "reflectance_std", "rgb"):
+        empty[name].values[:] = np.nan
+    page = Page(render_report(ReportContent(title="Nothing", result=empty)))
+    assert page.open == []
+    assert "Depth" in page.text
+
+
+def test_value_picture_maps_values_to_colours_and_nan_to_nothing() -> None:
+    values = np.tile(np.linspace(600.0, 700.0, 200), (20, 1))
+    values[0, 0] = np.nan
+    picture = value_picture(values, "Depth", "", "mm")
+    rgba = pixels_of(picture.uri)
+    assert rgba.shape == (20, 200, 4)
+    assert rgba[0, 0, 3] == 0.0
+    assert rgba[1, 0, 3] == 1.0
+    # viridis runs from dark violet to bright yellow.
+    np.testing.assert_allclose(rgba[1, 0, :3], [0.267, 0.005, 0.329], atol=0.01)
+    np.testing.assert_allclose(rgba[1, -1, :3], [0.993, 0.906, 0.144], atol=0.01)
+    assert picture.low == "601 mm"
+    assert picture.high == "699 mm"
+
+
+def test_signed_picture_is_centred_on_zero() -> None:
+    picture = value_picture(np.linspace(-1.0, 3.0, 500)[None], "Error", "", "mm", "RdBu_r", symmetric=True)
+    assert float(picture.low.split()[0]) == -float(picture.high.split()[0])
+
+
+def test_flag_picture_shows_the_gravest_and_counts_all() -> None:
+    flags = np.zeros((4, 4), np.int64)
+    flags[0, 0] = Flag.NO_LIGHT | Flag.POOR_FIT
+    flags[1, :2] = Flag.POOR_FIT
+    flags[2, 0] = Flag.NO_LIGHT | Flag.NON_FINITE
+    picture = flag_picture(flags, "Remarks", "")
+    shares = {key.text: key.share for key in picture.keys}
+    assert shares[REASONS[Flag.POOR_FIT]] == pytest.approx(3 / 16)
+    assert shares[REASONS[Flag.NO_LIGHT]] == pytest.approx(2 / 16)
+    assert shares["nothing to remark"] == pytest.approx(12 / 16)
+    colour = {key.text: key.colour for key in picture.keys}
+    image = (pixels_of(picture.uri)[..., :3] * 255 + 0.5).astype(int)
+    seen = "#{:02x}{:02x}{:02x}"
+    assert seen.format(*image[0, 0]) == colour[REASONS[Flag.NO_LIGHT]]
+    assert seen.format(*image[1, 0]) == colour[REASONS[Flag.POOR_FIT]]
+    assert seen.format(*image[2, 0]) == colour[REASONS[Flag.NON_FINITE]]
+
+
+def test_large_pictures_are_thinned() -> None:
+    assert pixels_of(value_picture(np.zeros((30, 2500)), "", "", "").uri).shape == (10, 834, 4)

@@ -1,0 +1,122 @@
+"""Figures of a whole result, and their verdicts."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import DecodeError
+from dsl_core.evaluation.summary import Evaluation, Truth, evaluate, interior
+from dsl_core.evaluation.verdict import Goal, figures, verdicts
+
+
+def test_depth_is_judged_over_lit_pixels(known: Any) -> None:
+    depth = evaluate(known.result, known.truth).depth
+    assert depth is not None
+    assert depth.coverage == 1.0
+    assert depth.pixels == 36 * 70
+    assert depth.bias_mm == pytest.approx(0.25, abs=0.03)
+    assert depth.rmse_mm == pytest.approx(np.hypot(0.25, 0.5), rel=0.05)
+
+
+def test_patches_have_the_errors_that_were_put_in(known: Any) -> None:
+    ramp, narrow = evaluate(known.result, known.truth).patches
+    assert (ramp.name, narrow.name) == ("ramp", "filter")
+    # The first four rows hold nothing, three pixels at each border are mixed.
+    assert ramp.pixels == (40 - 4 - 3) * (40 - 3)
+    assert ramp.coverage == 1.0
+    assert ramp.scale == pytest.approx(1 / 0.9, rel=1e-3)
+    assert ramp.rmse == pytest.approx(0.1 * np.sqrt(np.mean(ramp.truth**2)), rel=0.01)
+    assert ramp.rmse_scaled < 0.001
+    assert ramp.pixel_rmse == pytest.approx(np.hypot(ramp.rmse, 0.01), rel=0.01)
+    assert ramp.delta_e > 2 > ramp.delta_e_scaled
+    assert ramp.peak is None
+    assert narrow.truth_peak is not None
+    assert narrow.peak is not None
+    assert narrow.peak.fwhm_nm == pytest.approx(narrow.truth_peak.fwhm_nm, abs=0.1)
+
+
+def test_calibration_counts_only_bands_that_data_decide(known: Any) -> None:
+    only_filter = replace(known.truth, targets=(1,))
+    decided = evaluate(known.result, only_filter).spectral_calibration
+    assert decided is not None
+    assert decided.coverage_95 == pytest.approx(0.95, abs=0.01)
+    assert decided.share == pytest.approx(42 / 47)
+    everything = evaluate(known.result.drop_vars("data_share"), only_filter).spectral_calibration
+    assert everything is not None
+    assert everything.coverage_95 == pytest.approx(0.95 * 42 / 47, abs=0.01)
+
+
+def test_targets_choose_the_materials(known: Any) -> None:
+    assert [p.name for p in evaluate(known.result, replace(known.truth, targets=(0,))).patches] == ["ramp"]
+
+
+def test_a_material_without_measurement_is_named(known: Any) -> None:
+    known.result["reflectance"].values[:, :, 40:] = np.nan
+    evaluation = evaluate(known.result, known.truth)
+    assert evaluation.unmeasured == ("filter",)
+    assert [patch.name for patch in evaluation.patches] == ["ramp"]
+
+
+def test_coverage_counts_missing_pixels(known: Any) -> None:
+    known.result["reflectance"].values[3, 20:, :40] = np.nan
+    ramp = evaluate(known.result, known.truth).patches[0]
+    assert ramp.coverage == pytest.approx((20 - 4 - 3) / (40 - 4 - 3))
+
+
+def test_depth_only_result_has_only_depth(known: Any) -> None:
+    evaluation = evaluate(known.result[["depth_mm"]], known.truth)
+    assert evaluation.depth is not None
+    assert evaluation.depth_calibration is None
+    assert evaluation.patches == ()
+    with pytest.raises(DecodeError, match="no patch"):
+        evaluation.mean("rmse")
+
+
+def test_nothing_known_nothing_said(known: Any) -> None:
+    assert evaluate(known.result, Truth()) == Evaluation(None, None, (), (), None)
+
+
+def test_truth_of_another_size_is_refused(known: Any) -> None:
+    wrong = replace(known.truth, depth_mm=None, material=known.truth.material[:, :-1])
+    with pytest.raises(DecodeError, match="render the truth"):
+        evaluate(known.result, wrong)
+
+
+def test_interior_leaves_out_borders() -> None:
+    material = np.zeros((20, 20), np.int32)
+    material[:, 10:] = 1
+    inside = interior(material, 2)
+    np.testing.assert_array_equal(np.flatnonzero(~inside[5]), [8, 9, 10, 11])
+
+
+def test_everything_goes_to_json(known: Any) -> None:
+    text = json.dumps(evaluate(known.result, known.truth).as_dict())
+    assert json.loads(text)["patches"][1]["peak"]["complete"] is True
+
+
+def test_verdicts_follow_their_goals(known: Any) -> None:
+    evaluation = evaluate(known.result, known.truth)
+    goals = {
+        "depth_rmse_mm": Goal(1.0),
+        "depth_coverage": Goal(0.99, at_least=True),
+        "spectral_rmse": Goal(0.015),
+        "fwhm_nm": Goal(13.0),
+    }
+    rows = {row.figure: row for row in verdicts(evaluation, goals)}
+    assert rows["Depth, RMSE per pixel"].passed is True
+    assert rows["Lit pixels with a depth"].value == "100.00"
+    assert rows["Lit pixels with a depth"].wanted == "≥ 99"
+    assert rows["Reflectance, mean RMSE of patches"].passed is False
+    assert rows["Mean width of narrow peaks"].passed is True
+    assert rows["Depth, bias"].passed is None
+    assert len(rows) == len(figures(evaluation)) == 13
+
+
+def test_a_goal_for_an_unknown_figure_is_refused(known: Any) -> None:
+    with pytest.raises(KeyError):
+        verdicts(evaluate(known.result, known.truth), {"beauty": Goal(1.0)})
