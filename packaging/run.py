@@ -182,10 +182,11 @@ def make_venv(venv: Path) -> None:
     if venv.exists() and not config.exists() and (not venv.is_dir() or any(venv.iterdir())):
         raise SetupError(f"{venv} is not a virtual environment. Name another folder with --venv.")
     version = ".".join(map(str, sys.version_info[:2]))
-    if config.exists() and venv_program(venv, "python").exists() and f" = {version}." in config.read_text():
-        return
-    with timed(f"Making a virtual environment in {venv}"):
-        command = [sys.executable, "-m", "venv", "--clear", str(venv)]
+    python = venv_program(venv, "python")
+    command = [sys.executable, "-m", "venv", "--clear", str(venv)]
+    if config.exists() and python.exists() and f" = {version}." in config.read_text():
+        command = [str(python), "-m", "ensurepip"]  # does nothing, unless the making was broken off
+    with timed(f"Preparing the virtual environment in {venv}"):
         made = subprocess.run(command, capture_output=True, text=True, check=False)
     if made.returncode != 0:
         say((made.stdout + made.stderr).strip())

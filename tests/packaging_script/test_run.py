@@ -120,6 +120,16 @@ def test_a_folder_that_is_no_environment_is_left_alone(tmp_path: Path) -> None:
     assert precious.read_text() == "years of work"
 
 
+def test_an_environment_whose_making_was_broken_off_gets_its_pip(tmp_path: Path) -> None:
+    venv = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(venv)], check=True)
+    (venv / "kept.txt").touch()
+    run.make_venv(venv)
+    python = str(run.venv_program(venv, "python"))
+    subprocess.run([python, "-m", "pip", "--version"], check=True, capture_output=True)
+    assert (venv / "kept.txt").exists()
+
+
 def test_a_change_of_the_pins_or_of_torch_asks_for_a_new_installation(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
