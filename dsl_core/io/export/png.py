@@ -99,9 +99,13 @@ def band_picture(reflectance: NDArray[np.float32]) -> Image:
 
 
 def depth_picture(depth_mm: NDArray[np.float32]) -> Image:
-    """Depth in colours (near is red, far is blue), with a bar that says how many mm they mean."""
+    """Depth in colours (near is red, far is blue), with a bar that says how many mm they mean.
+
+    The bar spans all but the nearest and farthest half percent, so that single outliers leave colours to
+    the rest; what lies beyond has the colour of the bar's end.
+    """
     lit = np.isfinite(depth_mm)
-    near, far = (float(depth_mm[lit].min()), float(depth_mm[lit].max())) if lit.any() else (0.0, 0.0)
+    near, far = np.percentile(depth_mm[lit], (0.5, 99.5)) if lit.any() else (0.0, 0.0)
     shares = (far - np.where(lit, depth_mm, far)) / max(far - near, 1e-9)
     picture = _blank(_turbo(shares), lit)
     margin = np.full((picture.shape[0], _MARGIN_PX, 3), 255, np.uint8)

@@ -1,0 +1,100 @@
+"""The published calibration as a whole: where its files are, which are missing, and what they hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsl_core.io.published.layout import FileRecord
+from dsl_core.io.published.stereo import Size, Stereo, load_stereo, save_stereo
+from dsl_core.io.published.tables import (
+    FIRST_ORDER_NAME,
+    TABLE_NAMES,
+    SpectralTables,
+    find_table,
+    load_tables,
+    save_tables,
+)
+from dsl_core.model.rig import Provenance, Rig
+from dsl_core.model.spectral import WavelengthGrid
+
+STEREO_NAME = Path("calibration", "calibration_propcam.xml")
+TABLE_FOLDER = Path("dataset", "image_formation")
+
+
+@dataclass(frozen=True)
+class PublishedCalibration:
+    """Everything the published files hold; the film's shape and the absolute scale are not in them."""
+
+    stereo: Stereo
+    tables: SpectralTables
+
+    def rig(self, base: Rig) -> Rig:
+        """A rig with these lenses, pose and curves; film, sensor and scales are those of ``base``."""
+        return base.model_copy(
+            update={
+                "name": "published",
+                "camera": self.stereo.camera,
+                "projector": self.stereo.projector,
+                "pose": self.stereo.pose,
+                "response": self.tables.response,
+                "emission": self.tables.emission,
+                "efficiency": self.tables.efficiency,
+                "correspondence": None,
+                "provenance": Provenance(
+                    source="published calibration layout",
+                    notes=f"film, sensor and scales from {base.name!r}",
+                ),
+            }
+        )
+
+
+def load_calibration(
+    root: Path, projector_size_px: Size = (640, 360), camera_size_px: Size | None = None
+) -> PublishedCalibration:
+    """Read lenses, pose and spectral tables below ``root``; raises `CalibrationError`."""
+    return PublishedCalibration(
+        stereo=load_stereo(root / STEREO_NAME, projector_size_px, camera_size_px),
+        tables=load_tables(root / TABLE_FOLDER),
+    )
+
+
+def export_calibration(
+    rig: Rig, root: Path, grid: WavelengthGrid | None = None, *, overwrite: bool = False
+) -> list[Path]:
+    """Write a rig's lenses, pose and curves in the published layout below ``root``; raises `StoreError`."""
+    stereo = Stereo(camera=rig.camera, projector=rig.projector, pose=rig.pose)
+    return [
+        *save_tables(rig, root / TABLE_FOLDER, grid, overwrite=overwrite),
+        save_stereo(stereo, root / STEREO_NAME, overwrite=overwrite),
+    ]
+
+
+def check_calibration(root: Path) -> list[FileRecord]:
+    """What of a published calibration is there, missing or misnamed, and what to do."""
+    records = [_stereo_record(root)]
+    for name, (expected, _) in TABLE_NAMES.items():
+        found = find_table(root / TABLE_FOLDER, name)
+        records.append(_record(root, TABLE_FOLDER / expected, found, f"the {name} cannot be imported"))
+    lines = root / TABLE_FOLDER / FIRST_ORDER_NAME
+    advice = "optional: the first-order lines of the analytic model are used instead"
+    return [
+        *records,
+        _record(root, TABLE_FOLDER / FIRST_ORDER_NAME, lines if lines.is_file() else None, advice),
+    ]
+
+
+def _stereo_record(root: Path) -> FileRecord:
+    folder = root / STEREO_NAME.parent
+    others = sorted(folder.glob("*.xml")) + sorted(folder.glob("*.yml"))
+    found = root / STEREO_NAME if (root / STEREO_NAME).is_file() else next(iter(others), None)
+    return _record(root, STEREO_NAME, found, "lenses and pose cannot be imported")
+
+
+def _record(root: Path, expected: Path, found: Path | None, loss: str) -> FileRecord:
+    if found is None:
+        return FileRecord(expected.as_posix(), None, "missing", f"{loss}; put the file there")
+    name = found.relative_to(root).as_posix()
+    if name == expected.as_posix():
+        return FileRecord(name, name, "ok", "")
+    return FileRecord(expected.as_posix(), name, "misnamed", f"rename {name} to {expected.name}")

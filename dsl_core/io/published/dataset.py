@@ -1,0 +1,193 @@
+"""A published dataset as a source of frames, and a scan written as a published dataset.
+
+The published frames are demosaiced, this engine works on raw mosaics. On import a mosaic is put
+together again from the channel that the Bayer pattern has at each pixel; where the demosaicing kept
+measured samples (ours does; OpenCV's bilinear one does away from the border) this is the raw frame. The
+published frames are cropped, so the pattern may start at any phase: it is an argument, not a guess. Values
+are left-aligned in 16 bit in the files and right-aligned in ``bit_depth`` bits here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.published.layout import (
+    DEPTH_NAME,
+    FileRecord,
+    Place,
+    Survey,
+    file_name,
+    find_folder,
+    folder_name,
+    survey,
+)
+from dsl_core.io.published.png_probe import PngInfo, probe_png
+from dsl_core.io.staging import staged
+from dsl_core.model.frames import FrameSource
+from dsl_core.model.plan import CapturePlan, Setting, Shot
+from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.demosaic import demosaic
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.progress import NoProgress, Progress
+
+#: Our addition to the layout, so that patterns and settings need not be told again.
+PLAN_NAME = "plan.json"
+PUBLISHED_SETTINGS = (Setting(exposure_ms=160, level=0.2), Setting(exposure_ms=320, level=0.8))
+_CONTAINER_BITS = 16
+
+
+@dataclass(frozen=True)
+class PublishedScan:
+    """A `FrameSource` that reads the files of a published dataset when they are asked for."""
+
+    root: Path
+    plan: CapturePlan
+    bayer: BayerPattern
+    bit_depth: int
+    found: Survey = field(repr=False)
+
+    @property
+    def table(self) -> list[FileRecord]:
+        """Every file that the plan wants or that is in its way."""
+        return self.found.records
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The mosaic of a shot, shape (rows, columns), DN; raises `StoreError` when it is not there."""
+        image = self.read_rgb(shot)
+        channels = bayer_channels(self.bayer, *image.shape[:2])
+        return np.take_along_axis(image, channels[..., None], axis=-1)[..., 0]
+
+    def read_rgb(self, shot: Shot) -> NDArray[np.uint16]:
+        """The demosaiced image of a shot, shape (rows, columns, 3), DN; raises `StoreError`."""
+        import cv2
+
+        place: Place = (shot.role, shot.setting, shot.pattern)
+        path = self.found.files.get(place)
+        if path is None:
+            record = self.found.by_place.get(place)
+            if record is None:
+                raise StoreError(f"The plan of {self.root} has no {shot.role} pattern {shot.pattern}.")
+            raise StoreError(f"{self.root / record.expected} is {record.status}: {record.advice}.")
+        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        if image is None or image.ndim != 3:
+            raise StoreError(f"{path} is damaged: it cannot be decoded. Copy it again or capture it again.")
+        return _right_aligned(np.asarray(image)[..., ::-1], self.bit_depth)
+
+    def points_mm(self) -> NDArray[np.float32]:
+        """Points of ``depth.npy``, shape (3, rows, columns), mm, camera frame, NaN where there is none.
+
+        Raises `StoreError` when the file is missing or has another shape.
+        """
+        path = self.root / DEPTH_NAME
+        try:
+            points = np.load(path, allow_pickle=False)
+        except (OSError, ValueError, EOFError) as error:
+            raise StoreError(
+                f"{path} cannot be read ({error}). Copy it again, or decode depth anew."
+            ) from error
+        width, height = self.plan.camera_size_px
+        if points.shape != (height, width, 3):
+            raise StoreError(
+                f"{path} has shape {points.shape}; {(height, width, 3)} is wanted (x, y, z in metres)."
+            )
+        millimetres: NDArray[np.float32] = np.moveaxis(points.astype(np.float32), -1, 0) * np.float32(1000)
+        millimetres[:, ~(np.isfinite(millimetres).all(axis=0) & (millimetres[2] > 0))] = np.nan
+        return millimetres
+
+
+def open_dataset(
+    root: Path, plan: CapturePlan | None = None, bayer: BayerPattern = "RGGB", bit_depth: int = 12
+) -> PublishedScan:
+    """Open a dataset folder; look at ``table`` for what is missing or misnamed.
+
+    Without a plan, that of ``plan.json`` is taken, otherwise the published one (640 x 360 projector, 318
+    lines, 160 ms at level 0.2 and 320 ms at 0.8) with the size of the first scan-line image. Raises
+    `StoreError` when the folder holds no such image.
+    """
+    if not root.is_dir():
+        raise StoreError(
+            f"{root} is not a folder. Give the folder that holds ldr_exposure1 and its neighbours."
+        )
+    plan = plan or _stored_plan(root) or _published_plan(root)
+    return PublishedScan(root, plan, bayer, bit_depth, survey(root, plan))
+
+
+def export_dataset(
+    source: FrameSource,
+    folder: Path,
+    *,
+    bayer: BayerPattern = "RGGB",
+    bit_depth: int = 12,
+    points_mm: NDArray[np.floating] | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> list[Path]:
+    """Write a scan in the published layout, points (3, rows, columns) as ``depth.npy``; return the files.
+
+    The published code reads two settings; more are numbered on. Raises `StoreError`, also for frames the
+    source does not have, and `Cancelled`; then nothing is written.
+    """
+    progress = progress or NoProgress()
+    plan = source.plan
+    with staged([folder], overwrite=overwrite) as (draft,):
+        for shot in plan.shots():
+            progress.report("export", shot.index, plan.shot_count)
+            target = draft / folder_name(shot.role, shot.setting) / file_name(shot.role, shot.pattern)
+            _write_rgb(source.read(shot), target, bayer, bit_depth)
+        (draft / PLAN_NAME).write_text(plan.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        if points_mm is not None:
+            np.save(draft / DEPTH_NAME, np.moveaxis(points_mm, 0, -1) / 1000, allow_pickle=False)
+        names = sorted(file.relative_to(draft) for file in draft.rglob("*") if file.is_file())
+    return [folder / name for name in names]
+
+
+def _write_rgb(mosaic: NDArray[np.uint16], path: Path, bayer: BayerPattern, bit_depth: int) -> None:
+    import cv2
+
+    # float32 holds 16 bit exactly, so measured samples come back to the bit.
+    image = np.moveaxis(demosaic(mosaic.astype(np.float32), bayer), 0, -1)
+    values = np.left_shift(np.rint(image).astype(np.uint16), np.uint16(_CONTAINER_BITS - bit_depth))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    data = cv2.imencode(".png", np.ascontiguousarray(values[..., ::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
+    path.write_bytes(data.tobytes())
+
+
+def _right_aligned(image: NDArray[np.generic], bit_depth: int) -> NDArray[np.uint16]:
+    stored_bits = 8 * image.dtype.itemsize
+    values = image.astype(np.uint16)
+    if stored_bits >= bit_depth:
+        return np.right_shift(values, np.uint16(stored_bits - bit_depth))
+    return np.left_shift(values, np.uint16(bit_depth - stored_bits))
+
+
+def _stored_plan(root: Path) -> CapturePlan | None:
+    path = root / PLAN_NAME
+    if not path.is_file():
+        return None
+    try:
+        return CapturePlan.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise StoreError(f"{path} is not a capture plan ({error}). Correct it, or delete it.") from error
+
+
+def _published_plan(root: Path) -> CapturePlan:
+    for setting, values in enumerate(PUBLISHED_SETTINGS):
+        folder = find_folder(root, "spectral", setting, values)
+        for path in sorted(folder.glob("*.png")) if folder else []:
+            info = probe_png(path)
+            if isinstance(info, PngInfo):
+                return CapturePlan(
+                    name=root.name,
+                    camera_size_px=(info.width_px, info.height_px),
+                    settings=PUBLISHED_SETTINGS,
+                )
+    raise StoreError(
+        f"{root} is not a published dataset: no image was found in ldr_exposure1 or ldr_exposure2."
+        " Give the folder that holds them."
+    )

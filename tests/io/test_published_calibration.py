@@ -1,0 +1,151 @@
+"""The published calibration folder: tables, lenses, and what is missing of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.io.published import (
+    check_calibration,
+    export_calibration,
+    load_calibration,
+    load_tables,
+    open_first_order_lines,
+    save_tables,
+)
+from dsl_core.model.spectral import WavelengthGrid
+from tests.cases.small_rig import small_rig
+
+BANDS = WavelengthGrid().centres_nm
+
+
+def test_a_rig_comes_back_from_the_published_files(tmp_path: Path) -> None:
+    rig = small_rig()
+    files = export_calibration(rig, tmp_path)
+    assert [f.relative_to(tmp_path).as_posix() for f in files] == [
+        "dataset/image_formation/CRF.npy",
+        "dataset/image_formation/PEF.npy",
+        "dataset/image_formation/DG.npy",
+        "calibration/calibration_propcam.xml",
+    ]
+    again = load_calibration(tmp_path).rig(rig.model_copy(update={"white_scale": 7.0}))
+    assert (again.camera, again.projector, again.pose) == (rig.camera, rig.projector, rig.pose)
+    assert again.white_scale == 7.0
+    assert "small" in again.provenance.notes
+    for name in ("response", "emission"):
+        for old, new in zip(getattr(rig, name), getattr(again, name), strict=True):
+            np.testing.assert_allclose(new.at(BANDS), old.at(BANDS), rtol=1e-12)
+    for order in (-1, 0, 1):
+        np.testing.assert_allclose(
+            again.efficiency[order].at(BANDS), rig.efficiency[order].at(BANDS), rtol=1e-12
+        )
+    assert {r.status for r in check_calibration(tmp_path)} == {"ok", "missing"}
+
+
+def test_tables_have_the_shapes_that_the_published_code_reads(tmp_path: Path) -> None:
+    rig = small_rig()
+    save_tables(rig, tmp_path)
+    response, emission, efficiency = (np.load(tmp_path / f"{name}.npy") for name in ("CRF", "PEF", "DG"))
+    assert response.shape == emission.shape == (47, 3)
+    assert efficiency.shape == (3, 47)
+    np.testing.assert_allclose(response[:, 2], rig.response[2].at(BANDS))
+    np.testing.assert_allclose(efficiency[0], rig.efficiency[-1].at(BANDS))
+    np.testing.assert_allclose(efficiency[2], rig.efficiency[1].at(BANDS))
+
+
+@pytest.mark.parametrize(
+    ("bands", "first", "last"), [(47, 430, 660), (24, 430, 660), (25, 420, 660), (29, 400, 680)]
+)
+def test_the_number_of_bands_tells_the_wavelengths(tmp_path: Path, bands: int, first: int, last: int) -> None:
+    # Names of earlier versions, for a change.
+    for name, shape in (("CRF_cam", (bands, 3)), ("CRF_proj", (bands, 3)), ("intensity_dg", (3, bands))):
+        np.save(tmp_path / f"{name}.npy", np.ones(shape))
+    curve = load_tables(tmp_path).efficiency[1]
+    assert (curve.wavelengths_nm[0], curve.wavelengths_nm[-1], len(curve.values)) == (first, last, bands)
+
+
+def _tables(folder: Path, **changes: NDArray[np.generic]) -> None:
+    tables = {"CRF": np.ones((47, 3)), "PEF": np.ones((47, 3)), "DG": np.ones((3, 47))}
+    for name, table in (tables | changes).items():
+        np.save(folder / f"{name}.npy", table)
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "says"),
+    [
+        ("CRF", np.ones((3, 47)), r"CRF\.npy has shape \(3, 47\); \(bands, 3\)"),
+        ("DG", np.ones((47, 3)), r"DG\.npy has shape \(47, 3\); \(3, bands\)"),
+        ("PEF", np.ones((47, 3, 1)), r"PEF\.npy has shape"),
+        ("PEF", np.ones((31, 3)), r"31 bands; published tables have 24, 25, 29, 47\. Give the wavelengths"),
+        ("CRF", np.full((47, 3), np.nan), "negative or non-finite"),
+        ("DG", np.full((3, 47), -1.0), "negative or non-finite"),
+        ("CRF", np.full((47, 3), "x"), "one array of numbers"),
+    ],
+)
+def test_wrong_tables_are_refused(tmp_path: Path, name: str, table: NDArray[np.generic], says: str) -> None:
+    _tables(tmp_path, **{name: table})
+    with pytest.raises(CalibrationError, match=says):
+        load_tables(tmp_path)
+
+
+def test_unreadable_and_missing_tables(tmp_path: Path) -> None:
+    _tables(tmp_path)
+    (tmp_path / "CRF.npy").write_bytes(b"no array")
+    with pytest.raises(CalibrationError, match=r"CRF\.npy is not an array"):
+        load_tables(tmp_path)
+    (tmp_path / "CRF.npy").unlink()
+    with pytest.raises(CalibrationError, match=r"CRF\.npy is not there"):
+        load_tables(tmp_path)
+
+
+def test_other_wavelengths_can_be_given(tmp_path: Path) -> None:
+    _tables(tmp_path, CRF=np.ones((5, 3)), PEF=np.ones((5, 3)), DG=np.ones((3, 5)))
+    assert load_tables(tmp_path, [500, 510, 530, 540, 600]).response[0].wavelengths_nm[2] == 530
+    with pytest.raises(CalibrationError, match="5 bands, but 2 wavelengths"):
+        load_tables(tmp_path, [500, 510])
+
+
+def test_a_rig_without_first_orders_cannot_be_exported(tmp_path: Path) -> None:
+    rig = small_rig()
+    rig = rig.model_copy(update={"efficiency": {0: rig.efficiency[0]}})
+    with pytest.raises(CalibrationError, match=r"no efficiency of order -1"):
+        export_calibration(rig, tmp_path)
+    export_calibration(small_rig(), tmp_path)
+    with pytest.raises(StoreError, match="exists already"):
+        export_calibration(small_rig(), tmp_path)
+
+
+@pytest.mark.parametrize("shape", [(2, 4, 3, 5), (2, 4, 15)])
+def test_first_order_lines_are_mapped(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    lines = np.arange(120, dtype=np.int16).reshape(shape)
+    np.save(tmp_path / "lines.npy", lines)
+    mapped = open_first_order_lines(tmp_path / "lines.npy", (5, 3), bands=2, depth_range_mm=(600, 603))
+    assert isinstance(mapped, np.memmap)
+    np.testing.assert_array_equal(mapped, lines.reshape(2, 4, 3, 5))
+    with pytest.raises(CalibrationError, match=r"\(2, 4, 5, 3\) is wanted|\(2, 301, 3, 5\) is wanted"):
+        open_first_order_lines(tmp_path / "lines.npy", (5, 3), bands=2)
+
+
+def test_the_table_says_what_to_do(tmp_path: Path) -> None:
+    export_calibration(small_rig(), tmp_path)
+    (tmp_path / "calibration" / "calibration_propcam.xml").rename(tmp_path / "calibration" / "result.xml")
+    tables = tmp_path / "dataset" / "image_formation"
+    (tables / "CRF.npy").rename(tables / "CRF_cam.npy")
+    (tables / "DG.npy").unlink()
+    table = {r.expected.split("/")[-1]: r for r in check_calibration(tmp_path)}
+    assert (table["calibration_propcam.xml"].status, table["calibration_propcam.xml"].found) == (
+        "misnamed",
+        "calibration/result.xml",
+    )
+    assert (
+        "rename calibration/result.xml to calibration_propcam.xml" in table["calibration_propcam.xml"].advice
+    )
+    assert table["CRF.npy"].status == "misnamed"
+    assert table["PEF.npy"].status == "ok"
+    assert table["DG.npy"].status == "missing"
+    assert "optional" in table["first_order_correspondence_model.npy"].advice
+    assert [r.status for r in check_calibration(tmp_path / "nowhere")] == ["missing"] * 5
