@@ -55,26 +55,34 @@ class ShotTaker:
         self._shown: tuple[object, ...] | None = None
         self._exposure_ms: float | None = None
         self._last: Frame | None = None
+        self._noiseless = False
 
     def take(self, shot: Shot) -> Frame:
         """The frame of a shot; raises `DeviceError` when all attempts failed."""
         before = self._last
-        suspected = False
+        twins: list[Frame] = []
         for attempt in range(self._policy.attempts):
             try:
-                frame = self._attempt(shot, attempt)
+                frame = replace(self._attempt(shot, attempt), attempts=attempt + 1)
             except DeviceError as error:
                 self._recover(shot, attempt, error)
                 continue
-            # New number, old picture: noise never repeats, so the picture is suspect, unless the camera
-            # has no noise, which shows when a second exposure agrees as well.
-            if suspected or not _same_picture(frame, before):
-                return replace(frame, attempts=attempt + 1)
-            suspected = True
-        raise DeviceError(
-            f"The camera delivered the picture of the shot before for {describe_shot(shot)}."
-            " Check that the projector follows and restart the camera, then resume the scan."
-        )
+            if not _same_picture(frame, before):
+                return frame
+            # A new number on the old picture: noise never repeats, so the picture is late, unless the
+            # camera has no noise, which is believed once every attempt gives that picture.
+            twins.append(frame)
+            if self._noiseless and len(twins) == 2:
+                return frame
+        if len(twins) < 2:
+            raise DeviceError(
+                f"The camera delivered the picture of the shot before for {describe_shot(shot)}."
+                " Check that the projector follows and restart the camera, then resume the scan."
+            )
+        if not self._noiseless:
+            _log.warning("the camera gives one picture for different patterns; taken as free of noise")
+        self._noiseless = True
+        return twins[-1]
 
     def show_black(self) -> None:
         """Turn the projector dark; raises `DeviceError`."""

@@ -123,14 +123,14 @@ class Runner:
 
     def _between_shots(self, shot: Shot, done: int) -> None:
         """Wait while paused; raise `Cancelled` when the end is wanted."""
-        with self._condition:
-            if self._must_wait():
-                self._pace.hold()
-                self._set(State.PAUSED, shot=shot, done=done)
+        if self._must_wait():
+            self._pace.hold()
+            self._set(State.PAUSED, shot=shot, done=done)
+            with self._condition:
                 # A token may be cancelled elsewhere without notifying, hence the time-out.
                 while self._must_wait():
                     self._condition.wait(0.1)
-                self._pace.go_on()
+            self._pace.go_on()
         if self._token.is_cancelled:
             self._set(State.CANCELLING, shot=shot, done=done)
             raise Cancelled(
@@ -170,8 +170,9 @@ class Runner:
         except Exception as error:
             _log.warning("the projector could not be turned dark: %s", error)
             message += f" The projector could not be turned dark ({error})"
-        self._pace.hold()
-        self._set(state, message=message)
+        finally:  # also when a second Ctrl-C comes just now
+            self._pace.hold()
+            self._set(state, message=message)
 
 
 class _Pace:
@@ -205,7 +206,7 @@ class _Pace:
         running_s = 0.0 if self._since_s is None else self._clock() - self._since_s
         elapsed_s = self._spent_s + running_s
         pace = elapsed_s / self._cost_done_s if self._cost_done_s > 0 else 1.0
-        return elapsed_s, pace * max(self._cost_left_s, 0.0)
+        return elapsed_s, round(pace * max(self._cost_left_s, 0.0), 3)
 
     def _cost_s(self, shot: Shot) -> float:
         return (shot.exposure_ms + self._latency_ms) / 1000.0

@@ -1,0 +1,73 @@
+"""A finished scan, played back, passes for a rig and gives the same frames again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.runner import Runner
+from dsl_core.capture.sink import MemorySink
+from dsl_core.devices.base import Camera, DeviceRig, Projector
+from dsl_core.devices.conformance import CameraConformance, ProjectorConformance, RigConformance
+from dsl_core.devices.registry import open_rig
+from dsl_core.devices.replay import replay_rig
+from dsl_core.errors import DeviceError, StoreError
+from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.patterns.images import pattern_image
+
+PLAN = CapturePlan(
+    camera_size_px=(12, 8),
+    projector_size_px=(32, 18),
+    code=GrayCode(rows=False),
+    spectral=LineComb(width_px=2, step_px=2, period_px=8),
+    settings=(Setting(exposure_ms=10.0, level=0.4),),
+    code_settings=(0,),
+)
+
+
+def _scan() -> MemorySink:
+    rng = np.random.default_rng(3)
+    sink = MemorySink(PLAN)
+    for shot in PLAN.shots():
+        sink.write(shot, Frame(rng.integers(0, 4096, (8, 12)).astype(np.uint16), shot.exposure_ms))
+    return sink
+
+
+class TestReplay(CameraConformance, ProjectorConformance, RigConformance):
+    sees_projector = False
+
+    def open_rig(self) -> DeviceRig:
+        return replay_rig(_scan())
+
+    def open_camera(self) -> Camera:
+        return self.open_rig().camera
+
+    def open_projector(self) -> Projector:
+        return self.open_rig().projector
+
+
+def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
+    original = _scan()
+    folder = tmp_path / "scan.dsl"
+    with SessionWriter.create(folder, PLAN) as writer:
+        Runner(replay_rig(original), PLAN, writer, pattern_image).run()
+    again = MemorySink(PLAN)
+    with open_rig("replay", {"session": str(folder)}) as rig:
+        Runner(rig, PLAN, again, pattern_image).run()
+    reader = SessionReader(folder)
+    for shot in PLAN.shots():
+        np.testing.assert_array_equal(again.read(shot), original.read(shot))
+        np.testing.assert_array_equal(reader.read(shot), original.read(shot))
+
+
+def test_replay_says_what_it_needs(tmp_path: Path) -> None:
+    with pytest.raises(DeviceError, match=r"takes one option, session=NAME.dsl; given: none"):
+        open_rig("replay")
+    with pytest.raises(StoreError, match="is not a session"):
+        open_rig("replay", {"session": str(tmp_path)})
+    with pytest.raises(DeviceError, match="shot 99 is not one of them"):
+        replay_rig(_scan()).camera.prepare(99)
