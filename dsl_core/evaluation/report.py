@@ -131,8 +131,8 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
         error = result["depth_mm"].values - truth.depth_mm
         found.append(value_picture(error, "Error of depth", "measured minus true", "mm", "RdBu_r", True))
     if "reflectance_std" in result:
-        spread = result["reflectance_std"].median(dim="wavelength_nm").values
-        caption = "standard deviation as stated, median over bands"
+        spread = result["reflectance_std"].values.mean(axis=0)
+        caption = "standard deviation as stated, mean over bands"
         found.append(value_picture(spread, "Uncertainty of reflectance", caption, "", "magma"))
     if "flags" in result:
         caption = "the gravest remark of each pixel; shares count every remark"
@@ -165,7 +165,7 @@ def _spectra(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[
 
 def _patch_note(patch: PatchScore) -> str:
     if patch.peak is not None:
-        return f"FWHM {patch.peak.fwhm_nm:.1f} nm · RMSE {patch.rmse:.3f}"
+        return f"FWHM {patch.peak.fwhm_nm:.1f} nm"
     return f"RMSE {patch.rmse:.3f} · ΔE₀₀ {patch.delta_e:.1f}"
 
 
@@ -187,7 +187,11 @@ def _honesty(content: ReportContent) -> list[Curve]:
     if evaluation is not None and evaluation.spectral_calibration is not None:
         drawn.append(calibration_curve("Uncertainty of reflectance", evaluation.spectral_calibration))
     if "data_share" in content.result:
-        share = content.result["data_share"].mean(dim=("y", "x")).values.astype(np.float64)
+        cube = content.result["data_share"].values
+        # Band by band, because a mean that skips NaN copies what it is given.
+        share = np.array(
+            [float(band[np.isfinite(band)].mean()) if np.isfinite(band).any() else np.nan for band in cube]
+        )
         drawn.append(share_curve(_bands(content), share))
     return drawn
 
