@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.runner import Runner
+from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.devices.replay import replay_rig
@@ -50,6 +51,8 @@ def make(kind: str) -> tuple[CapturePlan, DeviceRig]:
 
 def main() -> None:
     plan, rig = make(sys.argv[1])
+    # Once through, so that no child spends its life on what can be prepared.
+    Runner(rig, plan, MemorySink(plan), pattern_image).run()
     print("ready", flush=True)
     for line in sys.stdin:
         folder, kill_after_s = json.loads(line)
