@@ -1,0 +1,91 @@
+"""XOR codes: Gray codes without coarse stripes, so that interreflections do not flip their bits.
+
+Every pattern of the Gray code is combined by exclusive or with a fine one of its own, the base, which is
+projected as it is: the last pattern (stripes of 2 px, "XOR-02") or the last but one (4 px, "XOR-04").
+Order and number of frames stay those of the Gray code. Gupta, Agrawal, Veeraraghavan, Narasimhan:
+"Structured light 3D scanning in the presence of global illumination", CVPR 2011.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import GrayCode
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, code_image, frame_count
+
+BaseWidth = Literal[2, 4]
+
+
+def xor_image(
+    spec: GrayCode, size_px: tuple[int, int], index: int, base_px: BaseWidth = 4
+) -> NDArray[np.uint8]:
+    """Frame ``index`` of the code, shape (height, width), 0 or 255; raises `PlanError` outside the code."""
+    columns, rows = bit_counts(spec, size_px)
+    base_bit = _base_bit(spec, size_px, base_px)
+    image = code_image(spec, size_px, index)
+    pair = index // 2
+    base_pair = (columns if pair < columns else columns + rows) - 1 - base_bit
+    if pair in (base_pair, columns + rows):
+        return image
+    return np.asarray(image ^ code_image(spec, size_px, 2 * base_pair))
+
+
+def xor_images(spec: GrayCode, size_px: tuple[int, int], base_px: BaseWidth = 4) -> NDArray[np.uint8]:
+    """All frames of the code, shape (frames, height, width), 0 or 255; white and black are last."""
+    return np.stack([xor_image(spec, size_px, i, base_px) for i in range(frame_count(spec, size_px))])
+
+
+class XorDecoder:
+    """Decodes pair by pair; the counterpart of `GrayDecoder`."""
+
+    def __init__(self, spec: GrayCode, size_px: tuple[int, int], base_px: BaseWidth = 4) -> None:
+        """Expect the pairs of the XOR code of ``spec`` on a projector of ``size_px`` = (width, height)."""
+        self._size_px = size_px
+        self._bits = bit_counts(spec, size_px)
+        self._base_bit = _base_bit(spec, size_px, base_px)
+        # As Gray codes the frames may name any number of these bits; the range is checked after conversion.
+        self._decoder = GrayDecoder(spec, (2 ** self._bits[0], 2 ** max(self._bits[1], 1)))
+
+    def add(self, positive: ArrayLike, inverse: ArrayLike, std: ArrayLike | None = None) -> None:
+        """Add the next pair; see `GrayDecoder.add`."""
+        self._decoder.add(positive, inverse, std)
+
+    def finish(self, min_margin: float = 0.0, min_sigmas: float = 0.0) -> DecodedCode:
+        """Columns and rows of all pixels; see `GrayDecoder.finish`."""
+        found = self._decoder.finish(min_margin, min_sigmas)
+        column = _converted(found.column, self._bits[0], self._base_bit)
+        undecided = found.undecided | (column >= self._size_px[0])
+        row = None
+        if found.row is not None:
+            row = _converted(found.row, self._bits[1], self._base_bit)
+            undecided |= row >= self._size_px[1]
+            row[undecided] = -1
+        column[undecided] = -1
+        return replace(found, column=column, row=row, undecided=undecided)
+
+
+def _base_bit(spec: GrayCode, size_px: tuple[int, int], base_px: BaseWidth) -> int:
+    base_bit = base_px.bit_length() - 2
+    if min(bits for bits in bit_counts(spec, size_px) if bits) <= base_bit:
+        raise PlanError(
+            f"An XOR-{base_px:02d} code needs more than {base_px} columns and rows, given"
+            f" {size_px[0]} x {size_px[1]}. Use the Gray code."
+        )
+    return base_bit
+
+
+def _converted(code: NDArray[np.int32], bits: int, base_bit: int) -> NDArray[np.int32]:
+    """Numbers decoded as if the XOR digits were Gray digits -> numbers that the XOR digits mean."""
+    digits = code ^ (code >> 1)
+    others = (1 << bits) - 1 - (1 << base_bit)
+    number = digits ^ ((digits >> base_bit & 1) * np.int32(others))
+    shift = 1
+    while shift < bits:
+        number ^= number >> shift
+        shift *= 2
+    return number
