@@ -49,7 +49,7 @@ def test_stripes_are_fine(base_px: BaseWidth) -> None:
 
 
 def test_interreflection_breaks_gray_but_not_xor() -> None:
-    """Half of the left part's light comes from 200 columns further on, smeared over 40 columns."""
+    """60 % of the light of a pixel comes from 200 columns further on, smeared over 41 columns."""
     smear = np.ones(41) / 41
 
     def seen(images: NDArray[np.uint8]) -> NDArray[np.float64]:
