@@ -28,7 +28,8 @@ def test_patches_have_the_errors_that_were_put_in(known: Any) -> None:
     assert (ramp.name, narrow.name) == ("ramp", "filter")
     # The first four rows hold nothing, three pixels at each border are mixed.
     assert ramp.pixels == (40 - 4 - 3) * (40 - 3)
-    assert ramp.coverage == 1.0
+    # Shadowed pixels are not wanted, so that their absence costs no coverage.
+    assert ramp.coverage == narrow.coverage == 1.0
     assert ramp.scale == pytest.approx(1 / 0.9, rel=1e-3)
     assert ramp.rmse == pytest.approx(0.1 * np.sqrt(np.mean(ramp.truth**2)), rel=0.01)
     assert ramp.rmse_scaled < 0.001
