@@ -6,6 +6,7 @@ for one shot the later one counts.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -81,7 +82,8 @@ class CaptureLog:
             write_all(self._descriptor, line)
             os.fsync(self._descriptor)
         except OSError as error:
-            os.ftruncate(self._descriptor, self._size)
+            with contextlib.suppress(OSError):  # a torn line is dropped by the next reader anyway
+                os.ftruncate(self._descriptor, self._size)
             raise store_error(self.path, error) from error
         self._size += len(line)
         self.entries.append(entry)

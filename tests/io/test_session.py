@@ -79,6 +79,7 @@ def test_a_torn_last_line_is_dropped_and_cut_off(
         log.write_bytes(whole[:-cut])
         with SessionWriter.resume(folder, plan) as writer:
             assert list(writer.missing()) == shots[2:]
+            assert log.read_bytes() == b"".join(whole.splitlines(keepends=True)[:2])
             writer.write(shots[2], frame_of(shots[2]))
         assert SessionReader(folder).missing() == shots[3:]
 
@@ -204,6 +205,8 @@ def test_a_full_disk_loses_nothing_and_is_resumable(
             with pytest.raises(StoreError, match=r"The disk is full.*free some space and resume"):
                 writer.write(shots[4], frame_of(shots[4]))
     assert not list((folder / "frames").glob("*.partial"))
+    assert (folder / "frames.jsonl").read_bytes().count(b"\n") == 4
+    assert (folder / "frames.jsonl").read_bytes().endswith(b"\n")
     with SessionWriter.resume(folder, plan) as writer:
         assert list(writer.missing()) == shots[4:]
         for shot in writer.missing():
