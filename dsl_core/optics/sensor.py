@@ -32,7 +32,6 @@ def digitise(
     sensor: Sensor,
     signal_dn: NDArray[np.float32],
     rng: np.random.Generator | None,
-    extra_sigma_dn: float = 0.0,
 ) -> NDArray[np.uint16]:
     """Raw mosaic of an expected signal above black (DN), same shape; no noise when ``rng`` is None.
 
@@ -41,6 +40,6 @@ def digitise(
     value = signal_dn + np.float32(sensor.black_level_dn)
     if rng is not None:
         variance = np.maximum(signal_dn, 0) * np.float32(1 / sensor.electrons_per_dn)
-        variance += np.float32(sensor.read_noise_dn**2 + extra_sigma_dn**2)
+        variance += np.float32(sensor.read_noise_dn**2)
         value = value + rng.standard_normal(signal_dn.shape, np.float32) * np.sqrt(variance)
     return np.clip(np.rint(value), 0, sensor.full_scale_dn).astype(np.uint16)

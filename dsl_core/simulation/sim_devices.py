@@ -143,9 +143,15 @@ class SimSpectroradiometer(Spectroradiometer):
         spot = (truth.depth_mm.shape[0] // 2, truth.depth_mm.shape[1] // 2)
         material = int(truth.material[spot])
         reflectance = truth.materials.reflectance[material] if material >= 0 else np.zeros(len(nm))
-        drive = np.zeros(3) if world.image is None else world.image.reshape(-1, world.image.shape[-1])[:, -3:].mean(0) / 255
+        drive = (
+            np.zeros(3)
+            if world.image is None
+            else world.image.reshape(-1, world.image.shape[-1])[:, -3:].mean(0) / 255
+        )
         light = world.rig.projector_response.radiance(drive)
-        value = reflectance * sum(w * curve.at(nm) for w, curve in zip(light, world.rig.emission, strict=True))
+        value = reflectance * sum(
+            w * curve.at(nm) for w, curve in zip(light, world.rig.emission, strict=True)
+        )
         if world.noise:
             self._count += 1
             rng = np.random.Generator(np.random.SFC64([world.seed, 1 << 20, self._count]))
@@ -157,7 +163,7 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     """The twin of the published rig; scenes, noise and image size as options.
 
     ``scene`` (default ``color-checker``) and its own options, ``size`` (``890x580``), ``seed``, ``noise``
-    (``on``, ``off``), ``sigma`` (extra noise as a share of full scale), ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``),
+    (``on``, ``off``), ``sigma`` (extra Gaussian noise as a share of full scale, known to the calibration), ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``),
     ``realtime`` (``on`` waits as long as real devices would). Raises `DeviceError` for a value that makes no sense.
     """
     rest = dict(options)
@@ -165,13 +171,18 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     size = rest.pop("size", "")
     if size:
         rig = rig.model_copy(update={"camera": rig.camera.resized(*_size(size))})
+    sigma = _number("sigma", rest.pop("sigma", "0"))
+    if sigma:
+        noise_dn = np.hypot(rig.sensor.read_noise_dn, sigma * rig.sensor.full_scale_dn)
+        rig = rig.model_copy(
+            update={"sensor": rig.sensor.model_copy(update={"read_noise_dn": float(noise_dn)})}
+        )
     name = rest.pop("scene", "color-checker")
     world = World(
         rig,
         scene_at=lambda position_mm: make_scene(name, **rest),
         seed=int(_number("seed", rest.pop("seed", "0"))),
         noise=_switch("noise", rest.pop("noise", "on")),
-        extra_sigma_fs=_number("sigma", rest.pop("sigma", "0")),
         film=_switch("film", rest.pop("film", "on")),
         device=rest.pop("device", "cpu"),
         clock=Clock(sleep=time.sleep) if _switch("realtime", rest.pop("realtime", "off")) else Clock(),

@@ -40,7 +40,6 @@ class World:
     position_mm: float = 700.0
     seed: int = 0
     noise: bool = True
-    extra_sigma_fs: float = 0.0
     ambient_dn_per_ms: float = 0.002
     film: bool = True
     device: str = "cpu"
@@ -63,7 +62,9 @@ class World:
     def truth(self) -> SceneTruth:
         """Depth, normals, materials and shadow of the scene as it stands."""
         if self._truth is None:
-            self._truth = self.scene_at(self.position_mm).render(self.rig.camera, self.rig.pose.projector_centre_mm)
+            self._truth = self.scene_at(self.position_mm).render(
+                self.rig.camera, self.rig.pose.projector_centre_mm
+            )
         return self._truth
 
     @property
@@ -83,11 +84,6 @@ class World:
 
     def expose(self, exposure_ms: float, shot: int, attempt: int = 0) -> NDArray[np.uint16]:
         """Raw mosaic of one exposure."""
-        sensor = self.rig.sensor
-        rng = None
-        if self.noise or self.extra_sigma_fs:
-            rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt]))
-        if not self.noise:
-            sensor = sensor.model_copy(update={"read_noise_dn": 0.0, "electrons_per_dn": 1e9})
-        extra = self.extra_sigma_fs * sensor.full_scale_dn
-        return digitise(sensor, self.rate() * np.float32(exposure_ms), rng, extra)
+        signal = self.rate() * np.float32(exposure_ms)
+        rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt])) if self.noise else None
+        return digitise(self.rig.sensor, signal, rng)

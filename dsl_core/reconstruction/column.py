@@ -1,0 +1,139 @@
+"""The projector column of a pixel below one pixel, from the zero-order peak across the line frames.
+
+Around its column a pixel sees ``y_k = a g(q - x_k)``: the line's profile blurred by the projector, plus
+the halo. Amplitude and column are fitted by weighted least squares (variable projection, Gauss-Newton)
+from the frames within a few columns; the dim slopes that the brighter setting resolves count by their
+inverse variance like everything else.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.reconstruction.line_set import LineSet
+
+ITERATIONS = 6
+#: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
+MODEL_ERROR = 0.004
+#: A refined column this far from the decoded one is not the same peak.
+MAX_SHIFT_PX = 2.0
+#: Columns on either side of the zero order that no order lights, at any wavelength of the projector.
+UNLIT_PX = (80.0, 160.0)
+#: Above this reduced chi-square the profile does not fit (two surfaces in one pixel, motion).
+MAX_CHI_SQUARE = 25.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """Refined columns of some pixels: value and deviation (px), zero-order amplitude and its deviation, validity."""
+
+    column_px: Tensor
+    std_px: Tensor
+    amplitude: Tensor
+    amplitude_std: Tensor
+    refined: Tensor
+
+
+def refine(
+    coarse_px: Tensor, radiance: Tensor, std: Tensor, lines: LineSet, response: ProjectorResponse
+) -> Column:
+    """Refine decoded columns.
+
+    ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where saturated.
+    Where the fit fails, the decoded column stays with the deviation of a whole pixel, ``1/sqrt(12)``.
+    """
+    y, variance, centres = _window(coarse_px, radiance, std, lines, response)
+    q = coarse_px.clone()
+    amplitude = y.amax(0)
+    for _ in range(ITERATIONS):
+        g, slope = _profile(q - centres, lines.width_px, response)
+        weight = 1 / (variance + (MODEL_ERROR * amplitude) ** 2)
+        wg = weight * g
+        gg = (wg * g).sum(0).clip(min=1e-30)
+        amplitude = (wg * y).sum(0) / gg
+        residual = y - amplitude * g
+        along = slope - g * ((wg * slope).sum(0) / gg)
+        information = (amplitude**2 * (weight * along * along).sum(0)).clip(min=1e-12)
+        q = q + (amplitude * (weight * along * residual).sum(0) / information).clip(-0.7, 0.7)
+    used = (weight > 0).sum(0)
+    chi_square = (weight * residual**2).sum(0) / (used - 2).clip(min=1)
+    std_px = torch.sqrt(chi_square.clip(min=1) / information)
+    good = (used > 3) & (amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))
+    good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
+    return Column(
+        torch.where(good, q, coarse_px),
+        torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
+        amplitude,
+        1 / torch.sqrt(gg),
+        good,
+    )
+
+
+def dark_offset(
+    column_px: Tensor,
+    amplitude: Tensor,
+    radiance: Tensor,
+    std: Tensor,
+    lines: LineSet,
+    response: ProjectorResponse,
+) -> Tensor:
+    """Mean signal (DN per ms) where no order lights a pixel: what its single black frame got wrong.
+
+    Between the zero order and the first orders lie `UNLIT_PX` columns that reach a pixel only through the
+    halo, which is subtracted. A black frame's noise would be common to all lines of a pixel; the mean of
+    dozens of unlit frames takes it out. Zero for pattern sets that leave no frame unlit.
+    """
+    if lines.frames != lines.lines:
+        return torch.zeros_like(column_px)
+    first, last = (round(edge / lines.step_px) for edge in UNLIT_PX)
+    total = torch.zeros_like(column_px)
+    weight = torch.full_like(column_px, 1e-30)
+    for side in (-1, 1):
+        line = lines.nearest(column_px) + side * torch.arange(first, last, device=column_px.device)[:, None]
+        frame = lines.frame(line)
+        distance = column_px - lines.centre_px(line).to(column_px.dtype)
+        dark = torch.gather(radiance, 0, frame) - amplitude * halo_of_line(distance, lines, response)
+        w = lines.exists(line) / torch.gather(std, 0, frame).to(dark.dtype).clip(min=1e-9) ** 2
+        total += torch.where(w > 0, dark * w, 0.0).sum(0)
+        weight += w.sum(0)
+    return total / weight
+
+
+def halo_of_line(distance_px: Tensor, lines: LineSet, response: ProjectorResponse) -> Tensor:
+    """Halo of a line far from its own columns, relative to the zero-order amplitude; any shape."""
+    decay = response.halo_decay_px
+    return (response.halo_peak_per_px * lines.width_px) * torch.exp(distance_px.abs() * (-1 / decay))
+
+
+def _window(
+    coarse: Tensor, radiance: Tensor, std: Tensor, lines: LineSet, response: ProjectorResponse
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Values, variances and line centres of the frames around the peak, each (window, pixels)."""
+    half = math.ceil((lines.width_px / 2 + 3 * response.blur_px + 1) / lines.step_px)
+    offsets = torch.arange(-half, half + 1, device=coarse.device)[:, None]
+    line = lines.nearest(coarse) + offsets
+    frame = lines.frame(line)
+    y = torch.gather(radiance, 0, frame)
+    variance = torch.gather(std, 0, frame).to(y.dtype) ** 2
+    usable = lines.exists(line) & torch.isfinite(variance) & torch.isfinite(y)
+    variance = torch.where(usable, variance, torch.inf)
+    return torch.where(usable, y, 0.0), variance, lines.centre_px(line).to(coarse.dtype)
+
+
+def _profile(distance: Tensor, width_px: int, response: ProjectorResponse) -> tuple[Tensor, Tensor]:
+    """Profile of a line and its derivative over distance (1/px)."""
+    half = width_px / 2
+    g = zero_order_profile(distance, -half, half, response)
+    scale = 1 / (response.blur_px * math.sqrt(2 * math.pi))
+    inverse = -0.5 / response.blur_px**2
+    near, far = distance + half, distance - half
+    slope = scale * (torch.exp(inverse * near * near) - torch.exp(inverse * far * far))
+    decay = response.halo_decay_px
+    halo = response.halo_peak_per_px * (torch.exp(-near.abs() / decay) - torch.exp(-far.abs() / decay))
+    return g, slope + halo

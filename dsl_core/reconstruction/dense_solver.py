@@ -1,0 +1,63 @@
+"""The smooth, bounded solver for patterns that couple distant bands: full matrices, same prior."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from dsl_core.reconstruction.spectral_solver import LOCAL_STD, PENALTY, TOLERANCE, Prior, Spectra, roughness
+from dsl_core.solve import banded
+
+
+def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
+    """Posterior of every pixel's spectrum from full normal equations (pixels, bands, bands) and (pixels, bands)."""
+    bands = right.shape[1]
+    shape = banded.to_dense(roughness(bands, data)[..., None])[0]
+    ridge = torch.eye(bands).to(data) * prior.level_std**-2
+    right = right + prior.level * prior.level_std**-2
+    best = torch.full_like(right[:, 0], -torch.inf)
+    tau, mean = torch.full_like(best, prior.taus[0]), torch.zeros_like(right)
+    for candidate in prior.taus:
+        weights = shape * candidate**-2 + ridge
+        factor = torch.linalg.cholesky(data + weights)
+        x = torch.cholesky_solve(right[..., None], factor)[..., 0]
+        evidence = torch.logdet(weights.double()).to(best) - 2 * _log_diagonal(factor) + (right * x).sum(1)
+        better = evidence > best
+        best = torch.where(better, evidence, best)
+        tau = torch.where(better, candidate, tau)
+        mean = torch.where(better[:, None], x, mean)
+    matrix = data + shape * tau[:, None, None] ** -2 + ridge
+    factor = torch.linalg.cholesky(matrix)
+    variance = torch.diagonal(torch.cholesky_inverse(factor), dim1=1, dim2=2)
+    mean, active = _bounded(matrix, right, mean, prior.bounds)
+    return Spectra(mean.T, variance.clip(min=1e-12).sqrt().T, _share(data).T, tau, active.T)
+
+
+def _log_diagonal(factor: Tensor) -> Tensor:
+    return torch.log(torch.diagonal(factor, dim1=1, dim2=2)).sum(1)
+
+
+def _share(data: Tensor) -> Tensor:
+    """As `spectral_solver.data_share`, from full matrices, (pixels, bands)."""
+    near = torch.ones_like(data[0]).triu(-2).tril(2)
+    local = (data * near).sum(2)
+    return local.clip(min=0) / (local.clip(min=0) + LOCAL_STD**-2)
+
+
+def _bounded(matrix: Tensor, right: Tensor, mean: Tensor, bounds: tuple[float, float]) -> tuple[Tensor, Tensor]:
+    """Pin bands outside the bounds and solve again, until none is left outside or the rounds are up."""
+    low, high = bounds
+    pinned = torch.zeros_like(mean, dtype=torch.bool)
+    scale = torch.diagonal(matrix, dim1=1, dim2=2)
+    x = mean
+    for _ in range(5):
+        at = torch.where(x < 0.5 * (low + high), low, high)
+        slope = (matrix @ x[..., None])[..., 0] - right
+        release = pinned & torch.where(at == low, slope < 0, slope > 0)
+        outside = (x < low - TOLERANCE) | (x > high + TOLERANCE)
+        if not bool((outside | release).any()):
+            break
+        pinned = (pinned & ~release) | outside
+        stiff = torch.where(pinned, PENALTY * scale, 0.0)
+        x = torch.linalg.solve(matrix + torch.diag_embed(stiff), (right + stiff * torch.where(pinned, at, 0.0)))
+    return x.clip(low, high), pinned

@@ -1,0 +1,48 @@
+"""Scan lines and combs as one thing: equally spaced virtual lines, and the frame that shows each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
+
+
+@dataclass(frozen=True)
+class LineSet:
+    """Virtual line ``i`` is centred on column ``first_px + step_px * i`` and shown by frame ``i mod frames``."""
+
+    width_px: int
+    step_px: int
+    first_px: float
+    lines: int
+    frames: int
+
+    @classmethod
+    def of(cls, plan: CapturePlan) -> LineSet | None:
+        """The lines of a plan; None when its pattern set does not consist of equally spaced lines."""
+        width = plan.projector_size_px[0]
+        match plan.spectral:
+            case ScanLines(width_px=w, step_px=s):
+                return cls(w, s, (w - 1) / 2, plan.spectral_count, plan.spectral_count)
+            case LineComb(width_px=w, step_px=s, period_px=p) if p % s == 0:
+                return cls(w, s, (w - 1) / 2, -(-(width - w // 2) // s), p // s)
+        return None
+
+    def nearest(self, column_px: Tensor) -> Tensor:
+        """Virtual line nearest to columns (px), int64, not limited to the frame."""
+        return ((column_px - self.first_px) / self.step_px).round().long()
+
+    def centre_px(self, line: Tensor) -> Tensor:
+        """Column of the centre of virtual lines (px)."""
+        return line * self.step_px + self.first_px
+
+    def frame(self, line: Tensor) -> Tensor:
+        """Frame that shows virtual lines; lines outside the projector are clamped (give them no weight)."""
+        clamped = line.clip(0, self.lines - 1)
+        return clamped if self.frames == self.lines else clamped % self.frames
+
+    def exists(self, line: Tensor) -> Tensor:
+        """Whether virtual lines are on the projector, bool."""
+        return (line >= 0) & (line < self.lines)

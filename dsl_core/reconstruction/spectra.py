@@ -1,0 +1,276 @@
+"""Reflectance of every pixel from the line frames, tile by tile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result import Reach
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import Correspondence, Footprint, like
+from dsl_core.optics.demosaic import demosaic, demosaic_variance
+from dsl_core.progress import NoProgress, Progress
+from dsl_core.reconstruction.column import halo_of_line
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.spectral_solver import Prior, Spectra, data_share, solve_spectra
+from dsl_core.reconstruction.spectral_system import ORDERS, BandedAccumulator, Bands, dense_equations
+
+#: Pixels of a tile; even numbers keep the Bayer phase.
+TILE = (64, 96)
+#: Relative error of the linear model (correspondence, profile, interpolation), added to each variance.
+MODEL_ERROR = 0.01
+#: Relative error granted to the zero-order colour as a constraint on the spectrum.
+COLOUR_ERROR = 0.02
+#: Mean squared offset (camera px) of the samples that bilinear demosaicing averages.
+DEMOSAIC_SPREAD = 0.4
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """What is known of every pixel before its spectrum: arrays of shape (rows, columns).
+
+    ``amplitude`` and ``amplitude_std`` (DN per ms) are those of the zero order in the pixel's own colour,
+    ``offset`` the residual dark signal; ``valid`` pixels get a spectrum.
+    """
+
+    column_px: NDArray[np.float32]
+    depth_mm: NDArray[np.float32]
+    shading: NDArray[np.float32]
+    shading_rel_std: NDArray[np.float32]
+    amplitude: NDArray[np.float32]
+    amplitude_std: NDArray[np.float32]
+    offset: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SpectralMaps:
+    """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid."""
+
+    reflectance: NDArray[np.float32]
+    std: NDArray[np.float32]
+    data_share: NDArray[np.float32]
+    reach: NDArray[np.uint8]
+    at_bound: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
+        """Maps full of NaN, to be filled by tiles."""
+        nan = [np.full((bands, *shape), np.nan, np.float32) for _ in range(3)]
+        return cls(*nan, np.zeros((bands, *shape), np.uint8), np.zeros(shape, bool))
+
+
+class SpectralReconstruction:
+    """One scan's spectra: radiance and deviation stacks (frames, rows, columns) and what is known of its pixels."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        plan: CapturePlan,
+        grid: WavelengthGrid,
+        model: Correspondence,
+        radiance: NDArray[np.float32],
+        std: NDArray[np.float16],
+        pixels: Pixels,
+        *,
+        prior: Prior | None = None,
+        device: str = "cpu",
+        dtype: torch.dtype = torch.float32,
+    ) -> None:
+        self.rig, self.plan, self.model, self.pixels = rig, plan, model, pixels
+        self.bands = Bands.of(rig, grid)
+        self.radiance, self.std = radiance, std
+        self.lines = LineSet.of(plan)
+        self.prior = prior or Prior()
+        self.device, self.dtype = torch.device(device), dtype
+        self.colour_weight = self._colour_weight()
+
+    def run(self, progress: Progress | None = None, threads: int = 2) -> SpectralMaps:
+        """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy."""
+        progress = progress or NoProgress()
+        out = SpectralMaps.empty(self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape)
+        tiles = list(self._tiles())
+        before = torch.get_num_threads()
+        torch.set_num_threads(1)
+        try:
+            with ThreadPoolExecutor(threads) as pool:
+                for done, _ in enumerate(pool.map(lambda tile: self._tile(*tile, out), tiles), 1):
+                    progress.report("spectra", done, len(tiles))
+        finally:
+            torch.set_num_threads(before)
+        return out
+
+    def _tiles(self) -> Iterator[tuple[slice, slice]]:
+        height, width = self.pixels.valid.shape
+        for y in range(0, height, TILE[0]):
+            for x in range(0, width, TILE[1]):
+                yield slice(y, min(y + TILE[0], height)), slice(x, min(x + TILE[1], width))
+
+    def _colour_weight(self) -> NDArray[np.float32]:
+        """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed section 7.1)."""
+        import cv2
+
+        valid = np.flatnonzero(self.pixels.valid)
+        complete = np.ones(self.pixels.valid.shape, np.float32)
+        if valid.size:
+            nm = self.bands.centres_nm[self.bands.reported][[0, -1]]
+            reached = torch.zeros((2, valid.size), dtype=torch.bool)
+            for _, _, inside in self._footprints(valid, nm):
+                reached |= inside
+            complete.ravel()[valid] = reached.all(0).numpy()
+        sigma = max(self.rig.camera.width_px / 90, 1.0)
+        return np.asarray(1 - cv2.GaussianBlur(complete, (0, 0), sigma), np.float32).clip(0, 1)
+
+    def _footprints(self, flat: NDArray[np.intp], nm: NDArray[np.float64]) -> Iterator[tuple[int, Footprint, Tensor]]:
+        """For each first order, the footprint of pixels and whether it lies inside the projector's frame."""
+        index = torch.as_tensor(flat, device=self.device)
+        depth = torch.as_tensor(self.pixels.depth_mm.ravel()[flat], device=self.device, dtype=self.dtype)
+        width, height = self.plan.projector_size_px
+        for order in ORDERS:
+            footprint = self.model.trace(index, depth, order, nm)
+            yield order, footprint, footprint.inside(width, height)
+
+    def _tile(self, rows: slice, columns: slice, out: SpectralMaps) -> None:
+        valid = self.pixels.valid[rows, columns]
+        if not valid.any():
+            return
+        inside_tile = np.flatnonzero(valid)
+        y, x = np.divmod(inside_tile, valid.shape[1])
+        flat = (y + rows.start) * self.pixels.valid.shape[1] + x + columns.start
+        traced = {}
+        for order in ORDERS:
+            nm = self.bands.centroids_nm[order]
+            traced.update({m: (f, i) for m, f, i in self._footprints(flat, nm) if m == order})
+        window = _Window(self, rows, columns, inside_tile)
+        spectra = self._banded(flat, traced, window) if self._is_banded else self._dense(flat, traced, window)
+        self._store(spectra, flat, traced, out)
+
+    @property
+    def _is_banded(self) -> bool:
+        return self.lines is not None and self.lines.frames == self.lines.lines
+
+    def _banded(self, flat: NDArray[np.intp], traced: dict[int, tuple[Footprint, Tensor]], window: _Window) -> Spectra:
+        assert self.lines is not None
+        shading = self._map(self.pixels.shading, flat)
+        system = BandedAccumulator(self.rig, self.bands, self.lines, len(flat), shading)
+        blur = window.blur_px()
+        for order, (footprint, inside) in traced.items():
+            frames = system.frames(footprint, inside)
+            if frames:
+                radiance, weight = window.colours(frames, self.lines)
+                system.add(order, footprint.columns, inside, radiance, weight, frames.start, blur)
+        right = system.right * shading
+        rows = self._colour_rows(flat, shading, window, right)
+        return solve_spectra(system.matrix * shading**2, right, rows, self.prior)
+
+    def _colour_rows(self, flat: NDArray[np.intp], shading: Tensor, window: _Window, right: Tensor) -> Tensor | None:
+        """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None where no pixel needs them."""
+        kappa = self._map(self.colour_weight, flat)
+        if float(kappa.max()) < 1e-3:
+            return None
+        colour, variance = window.zero_order_colour()
+        root = (kappa / (variance + (COLOUR_ERROR * colour) ** 2)).sqrt()
+        moments = like(self.bands.moments[0].sum(1).T, right)
+        rows = moments[:, :, None] * (root * shading)
+        right += torch.einsum("jcp,cp->jp", rows, colour * root)
+        return rows
+
+    def _dense(self, flat: NDArray[np.intp], traced: dict[int, tuple[Footprint, Tensor]], window: _Window) -> Spectra:
+        from dsl_core.patterns.images import drive_levels, spectral_profiles
+        from dsl_core.reconstruction.dense_solver import solve_dense
+
+        drive = drive_levels(spectral_profiles(self.plan), 1.0) / 255.0
+        response = self.rig.projector_response
+        profiles = (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
+        shading = self._map(self.pixels.shading, flat)
+        radiance, weight = window.colours(range(len(self.radiance)), None)
+        matrix, right = dense_equations(
+            self.rig, self.bands, profiles, self._map(self.pixels.column_px, flat),
+            {m: f for m, (f, _) in traced.items()}, {m: i for m, (_, i) in traced.items()}, radiance, weight,
+        )  # fmt: skip
+        return solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
+
+    def _map(self, values: NDArray[np.float32], flat: NDArray[np.intp]) -> Tensor:
+        return torch.as_tensor(values.ravel()[flat], device=self.device, dtype=self.dtype)
+
+    def _store(
+        self, spectra: Spectra, flat: NDArray[np.intp], traced: dict[int, tuple[Footprint, Tensor]], out: SpectralMaps
+    ) -> None:
+        reported = self.bands.reported
+        mean = spectra.mean[reported]
+        relative = self._map(self.pixels.shading_rel_std, flat).nan_to_num(nan=0.0)
+        std = torch.hypot(spectra.std[reported], mean * relative)
+        for cube, values in ((out.reflectance, mean), (out.std, std), (out.data_share, spectra.data_share[reported])):
+            cube.reshape(len(cube), -1)[:, flat] = values.float().cpu().numpy()
+        bits = {1: Reach.PLUS_ONE, -1: Reach.MINUS_ONE}
+        reach = torch.zeros_like(mean, dtype=torch.uint8)
+        for order, (_, inside) in traced.items():
+            reach |= inside[reported].to(torch.uint8) * int(bits[order])
+        reach[reach == 0] = int(Reach.ZERO_ONLY)
+        out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
+        out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
+
+
+class _Window:
+    """The frames of one tile with the neighbours that demosaicing needs."""
+
+    def __init__(self, owner: SpectralReconstruction, rows: slice, columns: slice, inside: NDArray[np.intp]) -> None:
+        self.owner = owner
+        height, width = owner.pixels.valid.shape
+        self.rows = slice(max(rows.start - 2, 0), min(rows.stop + 2, height))
+        self.columns = slice(max(columns.start - 2, 0), min(columns.stop + 2, width))
+        y, x = np.divmod(inside, columns.stop - columns.start)
+        w = self.columns.stop - self.columns.start
+        at = (y + rows.start - self.rows.start) * w + x + columns.start - self.columns.start
+        self.at = torch.as_tensor(at, device=owner.device)
+
+    def _part(self, values: NDArray[np.floating]) -> Tensor:
+        block = np.ascontiguousarray(values[..., self.rows, self.columns])
+        return torch.as_tensor(block, device=self.owner.device).to(self.owner.dtype)
+
+    def _colours(self, mosaic: Tensor) -> Tensor:
+        return demosaic(mosaic, self.owner.rig.sensor.bayer)
+
+    def blur_px(self) -> float:
+        """Spread of the projector columns that demosaicing averages, px."""
+        column = self.owner.pixels.column_px[self.rows, self.columns]
+        change = np.abs(np.diff(column, axis=1))
+        finite = change[np.isfinite(change)]
+        return float(np.sqrt(DEMOSAIC_SPREAD) * np.median(finite)) if finite.size else 0.0
+
+    def colours(self, frames: range, lines: LineSet | None) -> tuple[Tensor, Tensor]:
+        """Radiance without halo and offset, and weight, of a range of frames, each (3, frames, pixels)."""
+        part = slice(frames.start, frames.stop)
+        y = self._part(self.owner.radiance[part])
+        variance = self._part(self.owner.std[part]) ** 2
+        pixels = self.owner.pixels
+        y = y - self._part(pixels.offset)
+        if lines is not None:
+            index = torch.arange(frames.start, frames.stop, device=y.device)[:, None, None]
+            distance = self._part(pixels.column_px) - lines.centre_px(index).to(y.dtype)
+            y = y - self._part(pixels.amplitude) * halo_of_line(distance, lines, self.owner.rig.projector_response)
+        count = len(frames)
+        bayer = self.owner.rig.sensor.bayer
+        rgb = demosaic(y, bayer).reshape(count, 3, -1)[..., self.at].permute(1, 0, 2).contiguous()
+        spread = demosaic_variance(variance, bayer).reshape(count, 3, -1)[..., self.at].permute(1, 0, 2)
+        weight = 1 / (spread + (MODEL_ERROR * rgb) ** 2)
+        usable = torch.isfinite(rgb) & torch.isfinite(weight)
+        return torch.where(usable, rgb, 0.0), torch.where(usable, weight, 0.0)
+
+    def zero_order_colour(self) -> tuple[Tensor, Tensor]:
+        """Zero-order amplitude in three colours and its variance, each (3, pixels)."""
+        pixels, bayer = self.owner.pixels, self.owner.rig.sensor.bayer
+        colour = demosaic(self._part(pixels.amplitude), bayer).reshape(3, -1)[:, self.at]
+        variance = demosaic_variance(self._part(pixels.amplitude_std) ** 2, bayer).reshape(3, -1)[:, self.at]
+        return colour, variance
+
+
+__all__ = ["Pixels", "SpectralMaps", "SpectralReconstruction", "data_share"]

@@ -1,0 +1,190 @@
+"""Smooth, bounded, weighted least squares for many spectra, with the smoothness found in each pixel's data.
+
+The prior is Gaussian: second differences of reflectance have the standard deviation ``tau``, levels a wide one.
+For each of a few values of tau the evidence of the data is computed from the same factorisation that
+solves the system; a pixel takes the tau under which its data are most probable. Narrow peaks then get a
+loose prior and smooth spectra a tight one, from one setting. Bounds follow by an active-set iteration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from dsl_core.solve import banded
+
+
+#: Deviation against which local data are weighed in the data share.
+LOCAL_STD = 0.1
+#: How far outside a bound counts, how stiffly a bound holds, and how often bands change sides.
+TOLERANCE, PENALTY, ACTIVE_SET_ROUNDS = 1e-4, 1e4, 5
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Candidates of the second-difference deviation, the level's mean and deviation, and the bounds."""
+
+    taus: tuple[float, ...] = (0.002, 0.005, 0.0125, 0.03, 0.08, 0.2, 0.6)
+    level: float = 0.4
+    level_std: float = 0.6
+    bounds: tuple[float, float] = (0.0, 1.5)
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Mean, standard deviation and data share of each band, (bands, pixels), chosen tau and bound mask."""
+
+    mean: Tensor
+    std: Tensor
+    data_share: Tensor
+    tau: Tensor
+    at_bound: Tensor
+
+
+def roughness(bands: int, like: Tensor) -> Tensor:
+    """``D'D`` of second differences, banded storage (3, bands)."""
+    d = torch.zeros((bands - 2, bands), dtype=torch.float64)
+    for i in range(bands - 2):
+        d[i, i : i + 3] = torch.tensor([1.0, -2.0, 1.0], dtype=torch.float64)
+    full = d.T @ d
+    rows = [torch.nn.functional.pad(torch.diagonal(full, o), (0, o)) for o in range(3)]
+    return torch.stack(rows).to(like)
+
+
+class Posterior:
+    """One factorisation of data and prior: banded plus a few broad-band rows, or full."""
+
+    def __init__(self, data: Tensor, prior: Tensor, rows: Tensor | None) -> None:
+        """``data`` banded (bandwidth + 1, bands, pixels); ``prior`` (3, bands, 1 or pixels); ``rows`` (bands, n, pixels)."""
+        matrix = data.clone()
+        matrix[:3] += prior
+        self.matrix, self.rows = matrix, rows
+        self.factor = banded.factorise(matrix)
+        if rows is not None:
+            self._spread = banded.solve(self.factor, rows)
+            gram = torch.einsum("jap,jbp->pab", rows, self._spread)
+            self._small = torch.linalg.cholesky(gram + torch.eye(rows.shape[1]).to(gram))
+
+    @property
+    def log_determinant(self) -> Tensor:
+        """Logarithm of the determinant, (pixels,)."""
+        value = self.factor.log_determinant
+        if self.rows is not None:
+            value = value + 2 * torch.log(torch.diagonal(self._small, dim1=-2, dim2=-1)).sum(-1)
+        return value
+
+    def solve(self, right: Tensor) -> Tensor:
+        """Solution for a right side (bands, pixels), by the Woodbury identity where there are broad-band rows."""
+        x = banded.solve(self.factor, right)
+        if self.rows is not None:
+            seen = torch.einsum("jap,jp->pa", self.rows, x)
+            inner = torch.cholesky_solve(seen[..., None], self._small)[..., 0]
+            x = x - torch.einsum("jap,pa->jp", self._spread, inner)
+        return x
+
+    def variance(self) -> Tensor:
+        """Diagonal of the inverse, (bands, pixels)."""
+        diagonal = banded.inverse_band(self.factor)[0]
+        if self.rows is not None:
+            half = torch.linalg.solve_triangular(self._small, self._spread.permute(2, 1, 0), upper=False)
+            diagonal = diagonal - (half**2).sum(1).T
+        return diagonal
+
+
+def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> Tensor:
+    """Gradient of the quadratic with a banded matrix and broad-band rows at x, (bands, pixels)."""
+    g = banded.multiply(matrix, x) - right
+    if rows is not None:
+        g = g + torch.einsum("jap,ap->jp", rows, torch.einsum("jap,jp->ap", rows, x))
+    return g
+
+
+def solve_spectra(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior) -> Spectra:
+    """Posterior of every pixel's spectrum.
+
+    ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal equations in
+    reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are already in ``right``.
+    """
+    if data.shape[0] < 3:
+        data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))
+    shape = roughness(data.shape[1], data)
+    ridge = torch.zeros_like(shape)
+    ridge[0] = prior.level_std**-2
+    right = right + prior.level * prior.level_std**-2
+    tau = _most_probable_tau(data, right, rows, shape, ridge, prior)
+    weights = shape[..., None] * tau**-2 + ridge[..., None]
+    posterior = Posterior(data, weights, rows)
+    mean = posterior.solve(right)
+    mean, at_bound = _bounded(posterior, data, weights, rows, right, mean, prior.bounds)
+    std = posterior.variance().clip(min=1e-12).sqrt()
+    return Spectra(mean, std, data_share(data), tau, at_bound)
+
+
+def data_share(data: Tensor) -> Tensor:
+    """Share of a band's answer that local data decide against a prior of 0.1, (bands, pixels).
+
+    The data's information on a common change of the bands within two of it, ``i / (i + 1 / 0.1^2)``.
+    """
+    bands = data.shape[1]
+    local = data[0].clone()
+    for o in range(1, min(3, data.shape[0])):
+        local[: bands - o] += data[o, : bands - o]
+        local[o:] += data[o, : bands - o]
+    return local / (local + LOCAL_STD**-2)
+
+
+def _most_probable_tau(
+    data: Tensor, right: Tensor, rows: Tensor | None, shape: Tensor, ridge: Tensor, prior: Prior
+) -> Tensor:
+    """The candidate with the largest evidence in each pixel, (pixels,)."""
+    best = torch.full_like(right[0], -torch.inf)
+    chosen = torch.full_like(best, prior.taus[0])
+    for tau in prior.taus:
+        weights = shape * tau**-2 + ridge
+        posterior = Posterior(data, weights[..., None], rows)
+        x = posterior.solve(right)
+        volume = banded.factorise(weights[..., None].double()).log_determinant.to(best)
+        evidence = volume - posterior.log_determinant + (right * x).sum(0)
+        better = evidence > best
+        best = torch.where(better, evidence, best)
+        chosen = torch.where(better, tau, chosen)
+    return chosen
+
+
+def _bounded(
+    free: Posterior,
+    data: Tensor,
+    prior: Tensor,
+    rows: Tensor | None,
+    right: Tensor,
+    mean: Tensor,
+    bounds: tuple[float, float],
+) -> tuple[Tensor, Tensor]:
+    """Minimum inside the bounds by an active-set iteration on the pixels that need it, and the active bands."""
+    low, high = bounds
+    active = torch.zeros_like(mean, dtype=torch.bool)
+    todo = torch.nonzero(((mean < low - TOLERANCE) | (mean > high + TOLERANCE)).any(0)).ravel()
+    if len(todo) == 0:
+        return mean.clip(low, high), active
+    x, b = mean[:, todo], right[:, todo]
+    sub_data, sub_rows = data[..., todo], None if rows is None else rows[..., todo]
+    sub_prior = prior[..., todo]
+    pinned = torch.zeros_like(x, dtype=torch.bool)
+    slope = torch.zeros_like(x)
+    matrix = free.matrix[..., todo]
+    scale = sub_data[0] + sub_prior[0]
+    for _ in range(ACTIVE_SET_ROUNDS):
+        at = torch.where(x < 0.5 * (low + high), low, high)
+        release = pinned & torch.where(at == low, slope < 0, slope > 0)
+        pinned = (pinned & ~release) | (x < low - TOLERANCE) | (x > high + TOLERANCE)
+        held = torch.where(pinned, at, 0.0)
+        stiff = sub_prior.clone()
+        stiff[0] += torch.where(pinned, PENALTY * scale, 0.0)
+        x = Posterior(sub_data, stiff, sub_rows).solve(b + PENALTY * scale * held)
+        slope = gradient(matrix, sub_rows, x, b)
+    out = mean.clone()
+    out[:, todo] = x
+    active[:, todo] = pinned
+    return out.clip(low, high), active

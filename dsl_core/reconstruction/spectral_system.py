@@ -1,0 +1,218 @@
+"""The linear model of a pixel's spectrum, as weighted normal equations.
+
+For reflectance H at internal bands, frame k and colour c of a pixel::
+
+    y_ck = shading * sum_m sum_j response_mcj G(q_m(j) - x_k) H_j
+
+with G the line's profile over a band. A line lights only a few neighbouring bands through one order,
+so the normal matrix is banded; combs and free patterns couple distant bands and fill it.
+Both orders add where both reach. Internal bands extend beyond the reported ones, because lines at the
+ends also collect light from outside.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import Footprint, like
+from dsl_core.optics.line_profile import ProfileTable
+from dsl_core.optics.spectra import hat_moments
+from dsl_core.reconstruction.line_set import LineSet
+
+ORDERS = (1, -1)
+#: Internal bands beyond each end of the grid.
+PAD_NM = 15.0
+#: Tables of line profiles are shared by pixels whose dispersion agrees to this, px per nm.
+SLOPE_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Internal bands of a reconstruction and the response of each order there."""
+
+    centres_nm: NDArray[np.float64]
+    step_nm: float
+    reported: slice
+    moments: dict[int, NDArray[np.float64]]  # order -> (3 channels, 3 LEDs, bands), DN per ms
+    centroids_nm: dict[int, NDArray[np.float64]]
+
+    @classmethod
+    def of(cls, rig: Rig, grid: WavelengthGrid) -> Bands:
+        """Extend a grid and integrate the rig's response over its bands."""
+        pad = math.ceil(PAD_NM / grid.step_nm)
+        step = grid.step_nm
+        centres = grid.start_nm + step * np.arange(-pad, grid.count + pad)
+        moments, centroids = {}, {}
+        for order in (0, *ORDERS):
+            moments[order], centroids[order] = hat_moments(rig, order, centres, step)
+        return cls(centres, step, slice(pad, pad + grid.count), moments, centroids)
+
+    @property
+    def count(self) -> int:
+        """Number of internal bands."""
+        return len(self.centres_nm)
+
+
+@lru_cache(maxsize=64)
+def _table(
+    width_px: float, blur_px: float, band_px: float, device: torch.device, dtype: torch.dtype
+) -> ProfileTable:
+    return ProfileTable(width_px, blur_px, band_px, device, dtype)
+
+
+def profile_table(
+    rig: Rig, width_px: float, band_px: float, other: Tensor, extra_blur_px: float = 0.0
+) -> ProfileTable:
+    """Shared table of the line profile over a band of a given half width (px)."""
+    blur = math.hypot(rig.projector_response.blur_px, extra_blur_px)
+    return _table(width_px, round(blur, 2), band_px, other.device, other.dtype)
+
+
+def band_halfwidth_px(columns: Tensor, step_nm: float, internal_nm: NDArray[np.float64]) -> float:
+    """Half width (px) of a band's triangle: mean dispersion of some pixels, in shared steps."""
+    slope = float((columns[-1] - columns[0]).abs().mean()) / float(internal_nm[-1] - internal_nm[0])
+    return max(round(slope / SLOPE_STEP), 1) * SLOPE_STEP * step_nm
+
+
+class BandedAccumulator:
+    """Adds the first orders of scan lines, one order and band at a time, over all pixels of a tile."""
+
+    def __init__(self, rig: Rig, bands: Bands, lines: LineSet, pixels: int, other: Tensor) -> None:
+        self.rig, self.bands, self.lines = rig, bands, lines
+        self.matrix = torch.zeros((1, bands.count, pixels), device=other.device, dtype=other.dtype)
+        self.right = torch.zeros_like(self.matrix[0])
+
+    def frames(self, footprint: Footprint, inside: Tensor) -> range:
+        """Frames that light any band of any pixel of the tile through an order; empty when none does."""
+        columns = footprint.columns[inside]
+        if len(columns) == 0:
+            return range(0)
+        margin = self.lines.width_px / 2 + 8
+        low, high = float(columns.min()) - margin, float(columns.max()) + margin
+        first, last = ((x - self.lines.first_px) / self.lines.step_px for x in (low, high))
+        return range(max(math.floor(first), 0), min(math.ceil(last) + 1, self.lines.lines))
+
+    def add(
+        self,
+        order: int,
+        columns: Tensor,
+        inside: Tensor,
+        radiance: Tensor,
+        weight: Tensor,
+        first_line: int,
+        blur_px: float,
+    ) -> None:
+        """Add one order: ``radiance`` and ``weight`` are (3, frames, pixels), frame 0 being ``first_line``."""
+        half = band_halfwidth_px(columns, self.bands.step_nm, self.bands.centres_nm)
+        table = profile_table(self.rig, self.lines.width_px, half, columns, blur_px)
+        # The outermost diagonals hold products of two tails, below 1e-4 of the main one.
+        bandwidth = max(min(math.ceil(2 * table.support_px / half), self.bands.count - 1) - 2, 1)
+        if self.matrix.shape[0] < bandwidth + 1:
+            self.matrix = torch.nn.functional.pad(
+                self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])
+            )
+        count, pixels = radiance.shape[1:]
+        window = math.floor(2 * table.support_px / self.lines.step_px) + 1
+        offsets = torch.arange(window, device=columns.device)[:, None]
+        white = like(self.bands.moments[order].sum(1), columns)
+        reached = inside.any(1).tolist()
+        pixel = torch.arange(pixels, device=columns.device)
+        flat_weight, flat_weighted = weight.reshape(3, -1), (radiance * weight).reshape(3, -1)
+        for j in range(self.bands.count):
+            if not reached[j]:
+                continue
+            start = ((columns[j] - table.support_px - self.lines.first_px) / self.lines.step_px).ceil().long()
+            frame = start + (offsets - first_line)
+            valid = (frame >= 0) & (frame < count)
+            flat = (frame.clip(0, count - 1) * pixels + pixel).reshape(-1)
+            centre = (start + offsets) * float(self.lines.step_px) + self.lines.first_px
+            profile = table.at(columns[j] - centre) * (valid & inside[j])
+            gathered = flat_weighted.index_select(1, flat)
+            self.right[j] += ((white[:, j] @ gathered).reshape(window, pixels) * profile).sum(0)
+            gathered = flat_weight.index_select(1, flat)
+            for o in range(min(bandwidth + 1, self.bands.count - j)):
+                if reached[j + o]:
+                    both = ((white[:, j] * white[:, j + o]) @ gathered).reshape(window, pixels)
+                    other = profile if o == 0 else table.at(columns[j + o] - centre) * inside[j + o]
+                    self.matrix[o, j] += (both * profile * other).sum(0)
+
+
+def dense_equations(
+    rig: Rig,
+    bands: Bands,
+    profiles: NDArray[np.float64],
+    column_px: Tensor,
+    footprints: dict[int, Footprint],
+    inside: dict[int, Tensor],
+    radiance: Tensor,
+    weight: Tensor,
+) -> tuple[Tensor, Tensor]:
+    """Full matrix (pixels, bands, bands) and right side (pixels, bands) of unit shading, for any pattern set.
+
+    ``profiles`` (frames, width, LEDs) are radiances relative to full drive; ``radiance`` and ``weight`` are
+    (3, frames, pixels). The zero order is part of the model: patterns may light a pixel by several orders at once.
+    """
+    frames, pixels = radiance.shape[1:]
+    model = torch.zeros((pixels, 3, frames, bands.count), device=radiance.device, dtype=radiance.dtype)
+    for order, footprint in {0: None, **footprints}.items():
+        half = (
+            0.0
+            if footprint is None
+            else band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
+        )
+        sampled = sampled_profiles(rig, profiles, half, radiance)
+        moments = like(bands.moments[order], radiance)
+        if footprint is None:
+            lit = sampled.at(column_px)
+            model += torch.einsum("plf,clj->pcfj", lit, moments)
+            continue
+        for j in range(bands.count):
+            lit = sampled.at(footprint.columns[j]) * inside[order][j][:, None, None]
+            model[..., j] += torch.einsum("plf,cl->pcf", lit, moments[:, :, j])
+    flat = model.reshape(pixels, -1, bands.count)
+    w = weight.permute(2, 0, 1).reshape(pixels, -1, 1)
+    y = radiance.permute(2, 0, 1).reshape(pixels, -1, 1)
+    weighted = flat * w
+    return weighted.mT @ flat, (weighted.mT @ y)[..., 0]
+
+
+class SampledProfiles:
+    """Profiles of a whole pattern set, blurred, looked up at columns."""
+
+    def __init__(self, table: Tensor, oversample: int) -> None:
+        """``table`` is (samples, LEDs, frames)."""
+        self.table, self.oversample = table, oversample
+
+    def at(self, columns: Tensor) -> Tensor:
+        """Light at columns (px) of shape (pixels,): (pixels, LEDs, frames); zero outside the projector."""
+        position = ((columns + 0.5) * self.oversample - 0.5).clip(0, len(self.table) - 1.001)
+        whole = position.long()
+        part = (position - whole)[:, None, None]
+        low = self.table[whole]
+        return low + part * (self.table[whole + 1] - low)
+
+
+def sampled_profiles(
+    rig: Rig, profiles: NDArray[np.float64], band_px: float, like_this: Tensor
+) -> SampledProfiles:
+    """Blur a pattern set for the zero order (``band_px`` 0: blur and halo) or a band of the first orders."""
+    from dsl_core.optics.light_path import zero_order_profile
+    from dsl_core.optics.line_profile import band_profile
+
+    oversample, width = 4, profiles.shape[1]
+    at = (np.arange(width * oversample)[:, None] + 0.5) / oversample - 0.5 - np.arange(width)
+    if band_px == 0:
+        spread = zero_order_profile(torch.as_tensor(at), -0.5, 0.5, rig.projector_response)
+    else:
+        spread = torch.as_tensor(band_profile(at, 1.0, rig.projector_response.blur_px, band_px))
+    table = torch.einsum("sx,fxl->slf", spread, torch.as_tensor(profiles, dtype=torch.float64))
+    return SampledProfiles(table.to(like_this), oversample)

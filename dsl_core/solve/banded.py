@@ -1,0 +1,101 @@
+"""Symmetric positive definite banded systems, many small ones at once.
+
+Storage: ``matrix[o, j, p]`` is element (j, j + o) of system p, so a batch has shape
+(bandwidth + 1, unknowns, systems) and every step works on contiguous systems.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class Factor:
+    """``L D L'`` of a batch: ``lower[o - 1, j]`` is L's element (j + o, j), ``diagonal[j]`` is D's."""
+
+    lower: Tensor
+    diagonal: Tensor
+
+    @property
+    def log_determinant(self) -> Tensor:
+        """Logarithm of each system's determinant, shape (systems,)."""
+        return torch.log(self.diagonal).sum(0)
+
+
+def factorise(matrix: Tensor) -> Factor:
+    """Factorise a batch; raises ``ValueError`` unless every system is positive definite."""
+    bandwidth, unknowns = matrix.shape[0] - 1, matrix.shape[1]
+    work = matrix.clone()
+    lower = torch.zeros_like(matrix[1:]) if bandwidth else matrix[:0]
+    for j in range(unknowns):
+        reach = min(bandwidth, unknowns - 1 - j)
+        if reach == 0:
+            continue
+        column = work[1 : reach + 1, j]
+        torch.div(column, work[0, j], out=lower[:reach, j])
+        for a in range(1, reach + 1):
+            work[: reach - a + 1, j + a].addcmul_(lower[a - 1, j], work[a : reach + 1, j], value=-1)
+    if not bool((work[0] > 0).all()):
+        raise ValueError("a banded system is not positive definite; its weights or prior are not positive")
+    return Factor(lower, work[0])
+
+
+def solve(factor: Factor, right: Tensor) -> Tensor:
+    """Solutions of a batch; ``right`` is (unknowns, systems) or (unknowns, columns, systems)."""
+    x = right.clone()
+    bandwidth, unknowns = factor.lower.shape[0], factor.diagonal.shape[0]
+    extra = (1,) * (right.ndim - 2)
+    lower = factor.lower.reshape(bandwidth, unknowns, *extra, -1)
+    for j in range(unknowns):
+        reach = min(bandwidth, unknowns - 1 - j)
+        if reach:
+            x[j + 1 : j + 1 + reach].addcmul_(lower[:reach, j], x[j], value=-1)
+    x /= factor.diagonal.reshape(unknowns, *extra, -1)
+    for j in range(unknowns - 2, -1, -1):
+        reach = min(bandwidth, unknowns - 1 - j)
+        if reach:
+            x[j] -= (lower[:reach, j] * x[j + 1 : j + 1 + reach]).sum(0)
+    return x
+
+
+def inverse_band(factor: Factor) -> Tensor:
+    """Elements of the inverse inside the band, stored like the matrix (Takahashi's recursion)."""
+    bandwidth, unknowns = factor.lower.shape[0], factor.diagonal.shape[0]
+    z = torch.zeros(
+        (bandwidth + 1, *factor.diagonal.shape), dtype=factor.diagonal.dtype, device=factor.diagonal.device
+    )
+    for j in range(unknowns - 1, -1, -1):
+        reach = min(bandwidth, unknowns - 1 - j)
+        low = factor.lower[:reach, j]
+        for a in range(1, reach + 1):
+            # Z[j, j + a] = -sum_b L[j + b, j] Z[j + b, j + a], with the symmetric element inside the band.
+            block = torch.stack([z[abs(a - b), j + min(a, b)] for b in range(1, reach + 1)])
+            z[a, j] = -(low * block).sum(0)
+        z[0, j] = 1 / factor.diagonal[j]
+        if reach:
+            z[0, j] -= (low * z[1 : reach + 1, j]).sum(0)
+    return z
+
+
+def multiply(matrix: Tensor, x: Tensor) -> Tensor:
+    """Product of each system's matrix with its vector, (unknowns, systems)."""
+    unknowns = matrix.shape[1]
+    out = matrix[0] * x
+    for o in range(1, matrix.shape[0]):
+        out[: unknowns - o].addcmul_(matrix[o, : unknowns - o], x[o:])
+        out[o:].addcmul_(matrix[o, : unknowns - o], x[: unknowns - o])
+    return out
+
+
+def to_dense(matrix: Tensor) -> Tensor:
+    """Full matrices, shape (systems, unknowns, unknowns)."""
+    unknowns, systems = matrix.shape[1:]
+    dense = torch.zeros((systems, unknowns, unknowns), dtype=matrix.dtype, device=matrix.device)
+    for o in range(matrix.shape[0]):
+        j = torch.arange(unknowns - o)
+        dense[:, j, j + o] = matrix[o, : unknowns - o].T
+        dense[:, j + o, j] = matrix[o, : unknowns - o].T
+    return dense
