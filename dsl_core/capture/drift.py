@@ -1,0 +1,103 @@
+"""Whether anything moved or faded between two runs of one scan: old shots, taken again and compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.frames import FrameSource
+from dsl_core.model.plan import Shot
+
+#: Pixels are averaged over blocks of this many rows and columns, so that noise does not pass for drift.
+BLOCK_PX = 8
+
+
+@dataclass(frozen=True)
+class DriftReport:
+    """How far two takes of the same shots differ.
+
+    ``brightness_ratio`` is new over old light; ``change`` the root mean square difference of block means
+    that remains after scaling, as a share of their own root mean square, the largest of all shots compared.
+    """
+
+    shots: tuple[int, ...]
+    brightness_ratio: float
+    change: float
+    limit: float
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the scan may go on as one scan."""
+        return max(self.change, abs(self.brightness_ratio - 1.0)) <= self.limit
+
+    @property
+    def message(self) -> str:
+        """The finding in a sentence."""
+        brightness, structure = 100 * (self.brightness_ratio - 1), 100 * self.change
+        seen = f"brightness changed by {brightness:+.1f} %, structure by {structure:.1f} %"
+        if self.is_stable:
+            return f"Nothing moved since the scan stopped ({seen})."
+        return (
+            f"The scene, the rig or the light changed since the scan stopped ({seen}, allowed"
+            f" {100 * self.limit:.1f} %). Start a new scan, or put everything back in place."
+        )
+
+
+def pick_reference_shots(done: Iterable[Shot]) -> list[Shot]:
+    """Two old shots that show most: a white one, if there is one, and the last of the code before it."""
+    shots = list(done)
+    white = [shot for shot in shots if shot.role == "white"][-1:]
+    code = [shot for shot in shots if shot.role == "code"][-1:]
+    return [*code, *white] or shots[-2:]
+
+
+def check_drift(
+    rig: DeviceRig,
+    source: FrameSource,
+    shots: Iterable[Shot],
+    pattern_image: PatternImage,
+    limit: float = 0.03,
+    policy: RetryPolicy | None = None,
+) -> DriftReport:
+    """Take ``shots`` again and compare them with the stored ones; nothing is stored.
+
+    Raises `DeviceError` when the rig fails, `StoreError` when a stored frame is damaged, ``ValueError``
+    without shots.
+    """
+    chosen = list(shots)
+    if not chosen:
+        raise ValueError("a drift check needs at least one shot that was taken before")
+    taker = ShotTaker(rig, source.plan, pattern_image, policy or RetryPolicy())
+    black_dn = rig.calibration.sensor.black_level_dn if rig.calibration else 0.0
+    try:
+        pairs = [
+            (_blocks(source.read(shot)) - black_dn, _blocks(taker.take(shot).pixels) - black_dn)
+            for shot in chosen
+        ]
+    finally:
+        taker.show_black()
+    old_light = sum(float(old.sum()) for old, _ in pairs)
+    new_light = sum(float(new.sum()) for _, new in pairs)
+    ratio = new_light / old_light if old_light > 0 else float("inf")
+    change = max(_change(old * ratio, new) for old, new in pairs) if np.isfinite(ratio) else float("inf")
+    return DriftReport(tuple(shot.index for shot in chosen), ratio, change, limit)
+
+
+def _blocks(pixels: NDArray[np.uint16]) -> NDArray[np.float64]:
+    """Means of blocks of pixels; the rest at the right and lower edge is left out."""
+    block = min(BLOCK_PX, *pixels.shape)
+    rows, columns = (n // block for n in pixels.shape)
+    cut = pixels[: rows * block, : columns * block].astype(np.float64)
+    means: NDArray[np.float64] = cut.reshape(rows, block, columns, block).mean(axis=(1, 3))
+    return means
+
+
+def _change(old: NDArray[np.float64], new: NDArray[np.float64]) -> float:
+    """Root mean square difference over the root mean square of the old signal."""
+    size = float(np.sqrt((old**2).mean()))
+    return float(np.sqrt(((new - old) ** 2).mean())) / size if size > 0 else float("inf")
