@@ -1,0 +1,135 @@
+"""Frames of a scan, read and merged once: decoded columns, white, and the stack of line frames."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import DecodeError
+from dsl_core.model.frames import FrameSource
+from dsl_core.model.plan import CapturePlan, Role, Shot
+from dsl_core.model.rig import Rig
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder
+from dsl_core.progress import NoProgress, Progress
+from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
+
+T = TypeVar("T")
+THREADS = 2
+
+
+class MergedScan:
+    """Reads the settings of a shot and merges them; one merger and its buffers per thread."""
+
+    def __init__(self, source: FrameSource, rig: Rig) -> None:
+        self.source, self.rig, self.plan = source, rig, source.plan
+        self._shots: dict[tuple[Role, int], list[Shot]] = {}
+        for shot in self.plan.shots():
+            self._shots.setdefault((shot.role, shot.pattern), []).append(shot)
+        blacks = [black_frame([source.read(shot)], rig.sensor) for shot in self._shots["black", 0]]
+        # The noise of a black frame is the same for all frames of a pixel: it is no noise from frame to frame.
+        # What it shifts is measured later on unlit frames.
+        self.blacks = [BlackFrame(black.mean, np.zeros_like(black.variance)) for black in blacks]
+        self.gains_ms = setting_gains_ms(self.plan.settings, rig.projector_response)
+        self._local = threading.local()
+
+    def merge(self, role: Role, pattern: int, out: MergedFrame | None = None) -> MergedFrame:
+        """Linear radiance of one pattern, from every setting it was captured with."""
+        shots = self._shots[role, pattern]
+        merger = self._merger(tuple(shot.setting for shot in shots))
+        return merger.merge([self.source.read(shot) for shot in shots], out)
+
+    def _merger(self, settings: tuple[int, ...]) -> HdrMerger:
+        mergers: dict[tuple[int, ...], HdrMerger] = self._local.__dict__.setdefault("mergers", {})
+        if settings not in mergers:
+            gains = [float(self.gains_ms[i]) for i in settings]
+            mergers[settings] = HdrMerger(gains, [self.blacks[i] for i in settings], self.rig.sensor)
+        return mergers[settings]
+
+
+@dataclass(frozen=True)
+class LineStack:
+    """Merged line frames: radiance (DN per ms) and deviation, each (frames, rows, columns); infinite = saturated."""
+
+    radiance: NDArray[np.float32]
+    std: NDArray[np.float16]
+
+
+def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
+    """Decode the binary code (seed Eqs. 4 to 8) and merge the white frame."""
+    plan = scan.plan
+    decoder = GrayDecoder(plan.code, plan.projector_size_px)
+
+    def add(pair: tuple[MergedFrame, MergedFrame]) -> None:
+        positive, inverse = pair
+        decoder.add(positive.radiance, inverse.radiance, np.sqrt(positive.variance + inverse.variance))
+
+    _each(
+        lambda i: (scan.merge("code", 2 * i), scan.merge("code", 2 * i + 1)),
+        plan.code_count // 2,
+        "binary code",
+        progress,
+        add,
+    )
+    return decoder.finish(), scan.merge("white", 0)
+
+
+def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack:
+    """Read and merge every spectral frame."""
+    plan = scan.plan
+    shape = (plan.spectral_count, plan.camera_size_px[1], plan.camera_size_px[0])
+    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, np.float16))
+
+    def load(k: int) -> None:
+        buffer = MergedFrame(stack.radiance[k], np.empty(shape[1:], np.float32), np.empty(shape[1:], bool))
+        merged = scan.merge("spectral", k, buffer)
+        np.sqrt(merged.variance, out=merged.variance)
+        stack.std[k] = merged.variance
+
+    _each(load, shape[0], "line frames", progress)
+    return stack
+
+
+def check_source(source: FrameSource, rig: Rig) -> CapturePlan:
+    """The plan, after a check that it belongs to the rig; raises `DecodeError`."""
+    plan = source.plan
+    sizes = {
+        "camera": (plan.camera_size_px, (rig.camera.width_px, rig.camera.height_px)),
+        "projector": (plan.projector_size_px, (rig.projector.width_px, rig.projector.height_px)),
+    }
+    for device, (given, wanted) in sizes.items():
+        if tuple(given) != wanted:
+            raise DecodeError(
+                f"The scan was taken with a {device} of {given[0]} x {given[1]} pixels, the calibration"
+                f" {rig.name!r} is for {wanted[0]} x {wanted[1]}. Use the calibration of this rig and crop."
+            )
+    return plan
+
+
+def _each(
+    task: Callable[[int], T],
+    count: int,
+    stage: str,
+    progress: Progress | None,
+    use: Callable[[T], object] = lambda result: None,
+) -> None:
+    """Run a task for 0 to count - 1 in threads, a few ahead, and use the results in order."""
+    progress = progress or NoProgress()
+    with ThreadPoolExecutor(THREADS) as pool:
+        ahead: deque[Future[T]] = deque()
+        try:
+            for i in range(count + 2 * THREADS):
+                if i < count:
+                    ahead.append(pool.submit(task, i))
+                if i >= 2 * THREADS and ahead:
+                    use(ahead.popleft().result())
+                    progress.report(stage, i - 2 * THREADS + 1, count)
+        finally:
+            for future in ahead:
+                future.cancel()

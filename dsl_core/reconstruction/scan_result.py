@@ -1,0 +1,74 @@
+"""From maps and cubes to the result that a user opens."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core import __version__
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.reconstruction.geometry import Geometry
+from dsl_core.reconstruction.spectra import Pixels, SpectralMaps
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Bands with less than this share of data count as decided by the prior.
+DECIDED_FROM = 0.5
+
+
+def known_pixels(geometry: Geometry) -> Pixels:
+    """What the spectral solver needs to know of each pixel."""
+    surface = geometry.surface
+    valid = ((geometry.flags & int(SPECTRUM_INVALID)) == 0) & np.isfinite(surface.shading)
+    return Pixels(
+        geometry.column_px,
+        geometry.depth_mm.astype(np.float32),
+        surface.shading.astype(np.float32),
+        surface.shading_rel_std.astype(np.float32),
+        geometry.amplitude,
+        geometry.amplitude_std,
+        geometry.offset,
+        valid,
+    )
+
+
+def assemble(
+    rig: Rig, plan: CapturePlan, grid: WavelengthGrid, geometry: Geometry, spectra: SpectralMaps | None
+) -> xr.Dataset:
+    """The dataset of a scan; without spectra when only depth was asked for."""
+    from dsl_core.optics.colour import reflectance_to_srgb
+
+    flags = geometry.flags.copy()
+    arrays: dict[str, NDArray[np.generic]] = {
+        "depth_mm": geometry.depth_mm.astype(np.float32),
+        "depth_std_mm": geometry.depth_std_mm.astype(np.float32),
+        "column_px": geometry.column_px,
+        "column_std_px": geometry.column_std_px,
+        "points_mm": geometry.points_mm(rig),
+        "normals": geometry.surface.normals.astype(np.float32),
+        "shading": geometry.surface.shading.astype(np.float32),
+    }
+    if spectra is not None:
+        flags |= _spectral_flags(spectra)
+        arrays.update(
+            reflectance=spectra.reflectance,
+            reflectance_std=spectra.std,
+            data_share=spectra.data_share,
+            reach=spectra.reach,
+            rgb=reflectance_to_srgb(spectra.reflectance, grid.centres_nm).astype(np.float32),
+        )
+    arrays["flags"] = flags
+    attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
+    return build_result(arrays, grid.centres_nm, attributes)
+
+
+def _spectral_flags(spectra: SpectralMaps) -> NDArray[np.uint16]:
+    with np.errstate(invalid="ignore"):
+        unreached = (spectra.data_share < DECIDED_FROM).any(0)
+    flags = np.where(unreached, np.uint16(int(Flag.BANDS_UNREACHED)), np.uint16(0))
+    return flags | np.where(spectra.at_bound, np.uint16(int(Flag.AT_BOUND)), np.uint16(0))
