@@ -32,10 +32,11 @@ class Footprint(NamedTuple):
     columns: Tensor
     rows: Tensor
 
-    def inside(self, width_px: int, height_px: int) -> Tensor:
-        """Whether the light comes from inside the projector's frame, same shape, bool."""
+    def inside(self, width_px: int, height_px: int, margin_px: float = 0.0) -> Tensor:
+        """Whether the light comes from inside the projector's frame, or a margin left and right of it; bool."""
         c, r = self
-        return (c > -0.5) & (c < width_px - 0.5) & (r > -0.5) & (r < height_px - 0.5)
+        low, high = -0.5 - margin_px, width_px - 0.5 + margin_px
+        return (c > low) & (c < high) & (r > -0.5) & (r < height_px - 0.5)
 
 
 class Correspondence(Protocol):

@@ -29,6 +29,8 @@ TILE = (64, 96)
 MODEL_ERROR = 0.01
 #: Relative error granted to the zero-order colour as a constraint on the spectrum.
 COLOUR_ERROR = 0.02
+#: Bands whose centre lies this far outside the projector's frame still belong to the model, px.
+EDGE_PX = 8.0
 #: Mean squared offset (camera px) of the samples that bilinear demosaicing averages.
 DEMOSAIC_SPREAD = 0.4
 
@@ -123,20 +125,17 @@ class SpectralReconstruction:
         if valid.size:
             nm = self.bands.centres_nm[self.bands.reported][[0, -1]]
             reached = torch.zeros((2, valid.size), dtype=torch.bool)
-            for _, _, inside in self._footprints(valid, nm):
-                reached |= inside
+            for order in ORDERS:
+                reached |= self._footprint(order, valid, nm).inside(*self.plan.projector_size_px).cpu()
             complete.ravel()[valid] = reached.all(0).numpy()
         sigma = max(self.rig.camera.width_px / 90, 1.0)
         return np.asarray(1 - cv2.GaussianBlur(complete, (0, 0), sigma), np.float32).clip(0, 1)
 
-    def _footprints(self, flat: NDArray[np.intp], nm: NDArray[np.float64]) -> Iterator[tuple[int, Footprint, Tensor]]:
-        """For each first order, the footprint of pixels and whether it lies inside the projector's frame."""
+    def _footprint(self, order: int, flat: NDArray[np.intp], nm: NDArray[np.float64]) -> Footprint:
+        """Where the light of an order that reaches pixels comes from."""
         index = torch.as_tensor(flat, device=self.device)
         depth = torch.as_tensor(self.pixels.depth_mm.ravel()[flat], device=self.device, dtype=self.dtype)
-        width, height = self.plan.projector_size_px
-        for order in ORDERS:
-            footprint = self.model.trace(index, depth, order, nm)
-            yield order, footprint, footprint.inside(width, height)
+        return self.model.trace(index, depth, order, nm)
 
     def _tile(self, rows: slice, columns: slice, out: SpectralMaps) -> None:
         valid = self.pixels.valid[rows, columns]
@@ -145,10 +144,7 @@ class SpectralReconstruction:
         inside_tile = np.flatnonzero(valid)
         y, x = np.divmod(inside_tile, valid.shape[1])
         flat = (y + rows.start) * self.pixels.valid.shape[1] + x + columns.start
-        traced = {}
-        for order in ORDERS:
-            nm = self.bands.centroids_nm[order]
-            traced.update({m: (f, i) for m, f, i in self._footprints(flat, nm) if m == order})
+        traced = {order: self._footprint(order, flat, self.bands.centroids_nm[order]) for order in ORDERS}
         window = _Window(self, rows, columns, inside_tile)
         spectra = self._banded(flat, traced, window) if self._is_banded else self._dense(flat, traced, window)
         self._store(spectra, flat, traced, out)
@@ -157,12 +153,14 @@ class SpectralReconstruction:
     def _is_banded(self) -> bool:
         return self.lines is not None and self.lines.frames == self.lines.lines
 
-    def _banded(self, flat: NDArray[np.intp], traced: dict[int, tuple[Footprint, Tensor]], window: _Window) -> Spectra:
+    def _banded(self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window) -> Spectra:
         assert self.lines is not None
         shading = self._map(self.pixels.shading, flat)
         system = BandedAccumulator(self.rig, self.bands, self.lines, len(flat), shading)
         blur = window.blur_px()
-        for order, (footprint, inside) in traced.items():
+        for order, footprint in traced.items():
+            # A band just outside the frame still catches the outermost lines.
+            inside = footprint.inside(*self.plan.projector_size_px, margin_px=EDGE_PX)
             frames = system.frames(footprint, inside)
             if frames:
                 radiance, weight = window.colours(frames, self.lines)
@@ -183,7 +181,7 @@ class SpectralReconstruction:
         right += torch.einsum("jcp,cp->jp", rows, colour * root)
         return rows
 
-    def _dense(self, flat: NDArray[np.intp], traced: dict[int, tuple[Footprint, Tensor]], window: _Window) -> Spectra:
+    def _dense(self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window) -> Spectra:
         from dsl_core.patterns.images import drive_levels, spectral_profiles
         from dsl_core.reconstruction.dense_solver import solve_dense
 
@@ -194,7 +192,7 @@ class SpectralReconstruction:
         radiance, weight = window.colours(range(len(self.radiance)), None)
         matrix, right = dense_equations(
             self.rig, self.bands, profiles, self._map(self.pixels.column_px, flat),
-            {m: f for m, (f, _) in traced.items()}, {m: i for m, (_, i) in traced.items()}, radiance, weight,
+            traced, {m: f.inside(*self.plan.projector_size_px, margin_px=EDGE_PX) for m, f in traced.items()}, radiance, weight,
         )  # fmt: skip
         return solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
 
@@ -202,7 +200,7 @@ class SpectralReconstruction:
         return torch.as_tensor(values.ravel()[flat], device=self.device, dtype=self.dtype)
 
     def _store(
-        self, spectra: Spectra, flat: NDArray[np.intp], traced: dict[int, tuple[Footprint, Tensor]], out: SpectralMaps
+        self, spectra: Spectra, flat: NDArray[np.intp], traced: dict[int, Footprint], out: SpectralMaps
     ) -> None:
         reported = self.bands.reported
         mean = spectra.mean[reported]
@@ -212,7 +210,8 @@ class SpectralReconstruction:
             cube.reshape(len(cube), -1)[:, flat] = values.float().cpu().numpy()
         bits = {1: Reach.PLUS_ONE, -1: Reach.MINUS_ONE}
         reach = torch.zeros_like(mean, dtype=torch.uint8)
-        for order, (_, inside) in traced.items():
+        for order, footprint in traced.items():
+            inside = footprint.inside(*self.plan.projector_size_px)
             reach |= inside[reported].to(torch.uint8) * int(bits[order])
         reach[reach == 0] = int(Reach.ZERO_ONLY)
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
@@ -257,13 +256,18 @@ class _Window:
             index = torch.arange(frames.start, frames.stop, device=y.device)[:, None, None]
             distance = self._part(pixels.column_px) - lines.centre_px(index).to(y.dtype)
             y = y - self._part(pixels.amplitude) * halo_of_line(distance, lines, self.owner.rig.projector_response)
-        count = len(frames)
         bayer = self.owner.rig.sensor.bayer
-        rgb = demosaic(y, bayer).reshape(count, 3, -1)[..., self.at].permute(1, 0, 2).contiguous()
-        spread = demosaic_variance(variance, bayer).reshape(count, 3, -1)[..., self.at].permute(1, 0, 2)
-        weight = 1 / (spread + (MODEL_ERROR * rgb) ** 2)
-        usable = torch.isfinite(rgb) & torch.isfinite(weight)
-        return torch.where(usable, rgb, 0.0), torch.where(usable, weight, 0.0)
+        rgb = self._pick(demosaic(y, bayer))
+        spread = self._pick(demosaic_variance(variance, bayer))
+        weight = spread.addcmul_(rgb, rgb, value=MODEL_ERROR**2).reciprocal_()
+        # An infinite variance has weight zero by itself; a value that is no number must not survive the product.
+        return torch.nan_to_num_(rgb, 0.0, 0.0, 0.0), torch.nan_to_num_(weight, 0.0, 0.0, 0.0)
+
+    def _pick(self, images: Tensor) -> Tensor:
+        """The tile's pixels of colour images (frames, 3, rows, columns), as (3, frames, pixels)."""
+        count = len(images)
+        flat = images.reshape(count * 3, -1).index_select(1, self.at)
+        return flat.reshape(count, 3, -1).permute(1, 0, 2).contiguous()
 
     def zero_order_colour(self) -> tuple[Tensor, Tensor]:
         """Zero-order amplitude in three colours and its variance, each (3, pixels)."""

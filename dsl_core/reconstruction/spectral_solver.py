@@ -26,7 +26,7 @@ TOLERANCE, PENALTY, ACTIVE_SET_ROUNDS = 1e-4, 1e4, 5
 class Prior:
     """Candidates of the second-difference deviation, the level's mean and deviation, and the bounds."""
 
-    taus: tuple[float, ...] = (0.002, 0.005, 0.0125, 0.03, 0.08, 0.2, 0.6)
+    taus: tuple[float, ...] = (0.002, 0.0085, 0.036, 0.15, 0.6)
     level: float = 0.4
     level_std: float = 0.6
     bounds: tuple[float, float] = (0.0, 1.5)
@@ -138,19 +138,30 @@ def data_share(data: Tensor) -> Tensor:
 def _most_probable_tau(
     data: Tensor, right: Tensor, rows: Tensor | None, shape: Tensor, ridge: Tensor, prior: Prior
 ) -> Tensor:
-    """The candidate with the largest evidence in each pixel, (pixels,)."""
-    best = torch.full_like(right[0], -torch.inf)
-    chosen = torch.full_like(best, prior.taus[0])
+    """The second-difference deviation with the largest evidence in each pixel, (pixels,).
+
+    The evidence is a smooth function of log tau: a parabola through the best candidate and its neighbours
+    gives the place of the maximum between the candidates.
+    """
+    evidence = []
     for tau in prior.taus:
         weights = shape * tau**-2 + ridge
         posterior = Posterior(data, weights[..., None], rows)
         x = posterior.solve(right)
-        volume = banded.factorise(weights[..., None].double()).log_determinant.to(best)
-        evidence = volume - posterior.log_determinant + (right * x).sum(0)
-        better = evidence > best
-        best = torch.where(better, evidence, best)
-        chosen = torch.where(better, tau, chosen)
-    return chosen
+        volume = banded.factorise(weights[..., None].double()).log_determinant.to(right)
+        evidence.append(volume - posterior.log_determinant + (right * x).sum(0))
+    return parabola_peak(torch.stack(evidence), torch.as_tensor(prior.taus).to(right).log()).exp()
+
+
+def parabola_peak(values: Tensor, positions: Tensor) -> Tensor:
+    """Position of the maximum of samples (candidates, pixels) at evenly spaced positions (candidates,)."""
+    best = values.argmax(0).clip(1, len(values) - 2)
+    left, middle, right = (values.gather(0, (best + i)[None])[0] for i in (-1, 0, 1))
+    curvature = (2 * middle - left - right).clip(min=1e-6)
+    shift = (0.5 * (right - left) / curvature).clip(-1, 1)
+    # Where the middle is a minimum of the three, the better end is taken.
+    shift = torch.where(2 * middle - left - right > 0, shift, torch.sign(right - left))
+    return positions[best] + shift * (positions[1] - positions[0])
 
 
 def _bounded(

@@ -33,6 +33,8 @@ ORDERS = (1, -1)
 PAD_NM = 15.0
 #: Tables of line profiles are shared by pixels whose dispersion agrees to this, px per nm.
 SLOPE_STEP = 0.02
+#: Bands that share one window of lines while the normal equations are added up.
+GROUP = 3
 
 
 @dataclass(frozen=True)
@@ -102,48 +104,65 @@ class BandedAccumulator:
         return range(max(math.floor(first), 0), min(math.ceil(last) + 1, self.lines.lines))
 
     def add(
-        self,
-        order: int,
-        columns: Tensor,
-        inside: Tensor,
-        radiance: Tensor,
-        weight: Tensor,
-        first_line: int,
-        blur_px: float,
+        self, order: int, columns: Tensor, inside: Tensor, radiance: Tensor, weight: Tensor, first_line: int, blur_px: float
     ) -> None:
-        """Add one order: ``radiance`` and ``weight`` are (3, frames, pixels), frame 0 being ``first_line``."""
+        """Add one order: ``radiance`` and ``weight`` are (3, frames, pixels), frame 0 being ``first_line``.
+
+        Bands are taken in groups that share one window of lines, so that data are gathered once a group.
+        """
         half = band_halfwidth_px(columns, self.bands.step_nm, self.bands.centres_nm)
         table = profile_table(self.rig, self.lines.width_px, half, columns, blur_px)
         # The outermost diagonals hold products of two tails, below 1e-4 of the main one.
         bandwidth = max(min(math.ceil(2 * table.support_px / half), self.bands.count - 1) - 2, 1)
         if self.matrix.shape[0] < bandwidth + 1:
-            self.matrix = torch.nn.functional.pad(
-                self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])
-            )
-        count, pixels = radiance.shape[1:]
-        window = math.floor(2 * table.support_px / self.lines.step_px) + 1
-        offsets = torch.arange(window, device=columns.device)[:, None]
+            self.matrix = torch.nn.functional.pad(self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0]))
+        reached = [j for j, any_pixel in enumerate(inside.any(1).tolist()) if any_pixel]
+        if not reached:
+            return
         white = like(self.bands.moments[order].sum(1), columns)
-        reached = inside.any(1).tolist()
-        pixel = torch.arange(pixels, device=columns.device)
-        flat_weight, flat_weighted = weight.reshape(3, -1), (radiance * weight).reshape(3, -1)
-        for j in range(self.bands.count):
-            if not reached[j]:
-                continue
-            start = ((columns[j] - table.support_px - self.lines.first_px) / self.lines.step_px).ceil().long()
-            frame = start + (offsets - first_line)
-            valid = (frame >= 0) & (frame < count)
-            flat = (frame.clip(0, count - 1) * pixels + pixel).reshape(-1)
-            centre = (start + offsets) * float(self.lines.step_px) + self.lines.first_px
-            profile = table.at(columns[j] - centre) * (valid & inside[j])
-            gathered = flat_weighted.index_select(1, flat)
-            self.right[j] += ((white[:, j] @ gathered).reshape(window, pixels) * profile).sum(0)
-            gathered = flat_weight.index_select(1, flat)
-            for o in range(min(bandwidth + 1, self.bands.count - j)):
-                if reached[j + o]:
-                    both = ((white[:, j] * white[:, j + o]) @ gathered).reshape(window, pixels)
-                    other = profile if o == 0 else table.at(columns[j + o] - centre) * inside[j + o]
-                    self.matrix[o, j] += (both * profile * other).sum(0)
+        masked = None if bool(inside[reached[0] : reached[-1] + 1].all()) else inside
+        flat = weight.reshape(3, -1), (radiance * weight).reshape(3, -1)
+        for start in range(reached[0], reached[-1] + 1, GROUP):
+            group = range(start, min(start + GROUP, reached[-1] + 1))
+            stop = min(group[-1] + bandwidth, reached[-1]) + 1
+            self._add_group(group, stop, columns, masked, white, flat, first_line, table)
+
+    def _add_group(
+        self,
+        group: range,
+        stop: int,
+        columns: Tensor,
+        inside: Tensor | None,
+        white: Tensor,
+        flat: tuple[Tensor, Tensor],
+        first_line: int,
+        table: ProfileTable,
+    ) -> None:
+        pixels = columns.shape[1]
+        count = flat[0].shape[1] // pixels
+        ends = columns[[group[0], group[-1]]]
+        lowest, span = ends.amin(0), float((ends[1] - ends[0]).abs().max())
+        window = math.ceil((span + 2 * table.support_px) / self.lines.step_px) + 1
+        offsets = torch.arange(window, device=columns.device, dtype=torch.int32)[:, None]
+        start = ((lowest - table.support_px - self.lines.first_px) / self.lines.step_px).ceil().int()
+        frame = (start - first_line) + offsets
+        valid = (frame >= 0) & (frame < count)
+        index = (frame.clip_(0, count - 1) * pixels + torch.arange(pixels, device=columns.device, dtype=torch.int32)).reshape(-1)
+        weights, weighted = (values.index_select(1, index) for values in flat)
+        relative = columns[group[0] : stop] - (start * self.lines.step_px + self.lines.first_px)
+        profiles = table.at(relative[:, None] - (offsets * self.lines.step_px))
+        profiles[: len(group)] *= valid
+        if inside is not None:
+            profiles *= inside[group[0] : stop, None]
+        for i, j in enumerate(group):
+            own = profiles[i]
+            self.right[j] += ((white[:, j] @ weighted).reshape(window, pixels) * own).sum(0)
+            reach = profiles[i : i + self.matrix.shape[0]]
+            pairs = (white[:, j, None] * white[:, j : j + len(reach)]).T
+            mixed = (pairs @ weights).reshape(len(reach), window, pixels)
+            mixed *= own
+            mixed *= reach
+            self.matrix[: len(reach), j] += mixed.sum(1)
 
 
 def dense_equations(
