@@ -5,7 +5,16 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from dsl_core.reconstruction.spectral_solver import LOCAL_STD, PENALTY, TOLERANCE, Prior, Spectra, roughness
+from dsl_core.reconstruction.spectral_solver import (
+    LOCAL_STD,
+    PENALTY,
+    TOLERANCE,
+    Prior,
+    Spectra,
+    band_mean,
+    roughness,
+    within_band,
+)
 from dsl_core.solve import banded
 
 
@@ -28,9 +37,18 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
         mean = torch.where(better[:, None], x, mean)
     matrix = data + shape * tau[:, None, None] ** -2 + ridge
     factor = torch.linalg.cholesky(matrix)
-    variance = torch.diagonal(torch.cholesky_inverse(factor), dim1=1, dim2=2)
-    mean, active = _bounded(matrix, right, mean, prior.bounds)
-    return Spectra(mean.T, variance.clip(min=1e-12).sqrt().T, _share(data).T, tau, active.T)
+    variance = _band_mean_variance(torch.cholesky_inverse(factor))
+    nodes, active = _bounded(matrix, right, mean, prior.bounds)
+    nodes = nodes.T
+    std = torch.hypot(variance.clip(min=1e-12).sqrt().T, within_band(nodes))
+    return Spectra(nodes, band_mean(nodes), std, _share(data).T, tau, active.T)
+
+
+def _band_mean_variance(inverse: Tensor) -> Tensor:
+    """Variance of the band means, (pixels, bands), the ends repeated as in the banded solver."""
+    mean = band_mean(torch.eye(inverse.shape[1], dtype=inverse.dtype, device=inverse.device))
+    inner = torch.einsum("jk,pkl,jl->pj", mean, inverse, mean)[:, 1:-1]
+    return torch.cat([inner[:, :1], inner, inner[:, -1:]], 1)
 
 
 def _log_diagonal(factor: Tensor) -> Tensor:
@@ -44,7 +62,9 @@ def _share(data: Tensor) -> Tensor:
     return local.clip(min=0) / (local.clip(min=0) + LOCAL_STD**-2)
 
 
-def _bounded(matrix: Tensor, right: Tensor, mean: Tensor, bounds: tuple[float, float]) -> tuple[Tensor, Tensor]:
+def _bounded(
+    matrix: Tensor, right: Tensor, mean: Tensor, bounds: tuple[float, float]
+) -> tuple[Tensor, Tensor]:
     """Pin bands outside the bounds and solve again, until none is left outside or the rounds are up."""
     low, high = bounds
     pinned = torch.zeros_like(mean, dtype=torch.bool)
@@ -59,5 +79,7 @@ def _bounded(matrix: Tensor, right: Tensor, mean: Tensor, bounds: tuple[float, f
             break
         pinned = (pinned & ~release) | outside
         stiff = torch.where(pinned, PENALTY * scale, 0.0)
-        x = torch.linalg.solve(matrix + torch.diag_embed(stiff), (right + stiff * torch.where(pinned, at, 0.0)))
+        x = torch.linalg.solve(
+            matrix + torch.diag_embed(stiff), (right + stiff * torch.where(pinned, at, 0.0))
+        )
     return x.clip(low, high), pinned

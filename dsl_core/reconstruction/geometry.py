@@ -113,7 +113,9 @@ def _columns(
         amplitude = torch.as_tensor(white.radiance.ravel()[part], device=device)
         spread = torch.as_tensor(white.variance.ravel()[part], device=device).sqrt()
         none = torch.zeros_like(start, dtype=torch.bool)
-        return Column(start, torch.full_like(start, 12**-0.5), amplitude, spread, none), torch.zeros_like(start)
+        return Column(start, torch.full_like(start, 12**-0.5), amplitude, spread, none), torch.zeros_like(
+            start
+        )
     y = torch.as_tensor(stack.radiance.reshape(len(stack.radiance), -1)[:, part], device=device)
     std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, part], device=device)
     column = refine(start, y, std, lines, rig.projector_response)

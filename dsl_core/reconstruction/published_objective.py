@@ -12,6 +12,7 @@ smoothness is the one that does best on the twin's ColorChecker.
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,8 +36,8 @@ from dsl_core.reconstruction.spectra import Pixels, SpectralMaps
 ORDERS = (1, -1)
 #: Rows of frames that are demosaiced at once; even, to keep the Bayer phase.
 STRIP = 32
-#: Pixels that are fitted at once.
-CHUNK = 8192
+#: Pixels that are fitted at once: their arrays stay in the processor's cache.
+CHUNK = 1024
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class AdamOptions:
 
     steps: int = 1000
     learning_rate: float = 0.05
-    smoothness: float = 0.2
+    smoothness: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class PublishedReconstruction:
         self.radiance, self.saturated, self.pixels = radiance, ~np.isfinite(std), pixels
         self.options, self.device = options or AdamOptions(), torch.device(device)
 
-    def run(self, progress: Progress | None = None) -> SpectralMaps:
+    def run(self, progress: Progress | None = None, threads: int = 2) -> SpectralMaps:
         """Fit all valid pixels. The result states no uncertainty: ``std`` and ``data_share`` are NaN."""
         progress = progress or NoProgress()
         out = SpectralMaps.empty(self.grid.count, self.pixels.valid.shape)
@@ -103,14 +104,24 @@ class PublishedReconstruction:
         first = self._nearest_intensities(flat, columns)
         reached = reached & torch.isfinite(first).all(0)
         colour = demosaic(np.nan_to_num(self.pixels.amplitude), self.rig.sensor.bayer).reshape(3, -1)[:, flat]
-        for start in range(0, flat.size, CHUNK):
+
+        def work(start: int) -> None:
             part = slice(start, start + CHUNK)
             measured = self._measured(
                 flat[part], order[part], columns[:, part], reached[:, part], kappa[part], first[..., part],
                 torch.as_tensor(colour[:, part], dtype=torch.float32),
             )  # fmt: skip
             self._store(out, flat[part], order[part], reached[:, part], fit(measured, self.options))
-            progress.report("spectra", min(start + CHUNK, flat.size), flat.size)
+
+        starts = range(0, flat.size, CHUNK)
+        before = torch.get_num_threads()
+        torch.set_num_threads(1)
+        try:
+            with ThreadPoolExecutor(threads) as pool:
+                for done, _ in enumerate(pool.map(work, starts), 1):
+                    progress.report("spectra", done, len(starts))
+        finally:
+            torch.set_num_threads(before)
         return out
 
     def _valid_order(self, flat: NDArray[np.intp]) -> tuple[Tensor, Tensor, Tensor]:

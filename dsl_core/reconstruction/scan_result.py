@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,13 +14,14 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectra import Pixels, SpectralMaps
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
 
 #: Bands with less than this share of data count as decided by the prior.
 DECIDED_FROM = 0.5
+#: Reduced chi-square above which no spectrum explains a pixel's frames.
+POOR_FIT_FROM = 3.0
 
 
 def known_pixels(geometry: Geometry) -> Pixels:
@@ -71,4 +74,5 @@ def _spectral_flags(spectra: SpectralMaps) -> NDArray[np.uint16]:
     with np.errstate(invalid="ignore"):
         unreached = (spectra.data_share < DECIDED_FROM).any(0)
     flags = np.where(unreached, np.uint16(int(Flag.BANDS_UNREACHED)), np.uint16(0))
+    flags |= np.where(spectra.chi_square > POOR_FIT_FROM, np.uint16(int(Flag.POOR_FIT)), np.uint16(0))
     return flags | np.where(spectra.at_bound, np.uint16(int(Flag.AT_BOUND)), np.uint16(0))

@@ -20,8 +20,9 @@ from dsl_core.optics.demosaic import demosaic, demosaic_variance
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import halo_of_line
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.spectral_solver import Prior, Spectra, data_share, solve_spectra
+from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral_system import ORDERS, BandedAccumulator, Bands, dense_equations
+from dsl_core.solve.banded import multiply
 
 #: Pixels of a tile; even numbers keep the Bayer phase.
 TILE = (64, 96)
@@ -29,6 +30,8 @@ TILE = (64, 96)
 MODEL_ERROR = 0.01
 #: Relative error granted to the zero-order colour as a constraint on the spectrum.
 COLOUR_ERROR = 0.02
+#: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
+PARAMETERS = 25
 #: Bands whose centre lies this far outside the projector's frame still belong to the model, px.
 EDGE_PX = 8.0
 #: Mean squared offset (camera px) of the samples that bilinear demosaicing averages.
@@ -62,12 +65,15 @@ class SpectralMaps:
     data_share: NDArray[np.float32]
     reach: NDArray[np.uint8]
     at_bound: NDArray[np.bool_]
+    chi_square: NDArray[np.float32]
 
     @classmethod
     def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
         """Maps full of NaN, to be filled by tiles."""
         nan = [np.full((bands, *shape), np.nan, np.float32) for _ in range(3)]
-        return cls(*nan, np.zeros((bands, *shape), np.uint8), np.zeros(shape, bool))
+        return cls(
+            *nan, np.zeros((bands, *shape), np.uint8), np.zeros(shape, bool), np.zeros(shape, np.float32)
+        )
 
 
 class SpectralReconstruction:
@@ -98,7 +104,9 @@ class SpectralReconstruction:
     def run(self, progress: Progress | None = None, threads: int = 2) -> SpectralMaps:
         """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy."""
         progress = progress or NoProgress()
-        out = SpectralMaps.empty(self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape)
+        out = SpectralMaps.empty(
+            self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
+        )
         tiles = list(self._tiles())
         before = torch.get_num_threads()
         torch.set_num_threads(1)
@@ -146,14 +154,16 @@ class SpectralReconstruction:
         flat = (y + rows.start) * self.pixels.valid.shape[1] + x + columns.start
         traced = {order: self._footprint(order, flat, self.bands.centroids_nm[order]) for order in ORDERS}
         window = _Window(self, rows, columns, inside_tile)
-        spectra = self._banded(flat, traced, window) if self._is_banded else self._dense(flat, traced, window)
-        self._store(spectra, flat, traced, out)
+        spectra, misfit = (self._banded if self._is_banded else self._dense)(flat, traced, window)
+        self._store(spectra, misfit, flat, traced, out)
 
     @property
     def _is_banded(self) -> bool:
         return self.lines is not None and self.lines.frames == self.lines.lines
 
-    def _banded(self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window) -> Spectra:
+    def _banded(
+        self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window
+    ) -> tuple[Spectra, Tensor]:
         assert self.lines is not None
         shading = self._map(self.pixels.shading, flat)
         system = BandedAccumulator(self.rig, self.bands, self.lines, len(flat), shading)
@@ -167,9 +177,14 @@ class SpectralReconstruction:
                 system.add(order, footprint.columns, inside, radiance, weight, frames.start, blur)
         right = system.right * shading
         rows = self._colour_rows(flat, shading, window, right)
-        return solve_spectra(system.matrix * shading**2, right, rows, self.prior)
+        spectra = solve_spectra(system.matrix * shading**2, right, rows, self.prior)
+        radiance = spectra.nodes * shading
+        explained = (radiance * (2 * system.right - multiply(system.matrix, radiance))).sum(0)
+        return spectra, (system.square - explained) / (system.samples - PARAMETERS).clip(min=1)
 
-    def _colour_rows(self, flat: NDArray[np.intp], shading: Tensor, window: _Window, right: Tensor) -> Tensor | None:
+    def _colour_rows(
+        self, flat: NDArray[np.intp], shading: Tensor, window: _Window, right: Tensor
+    ) -> Tensor | None:
         """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None where no pixel needs them."""
         kappa = self._map(self.colour_weight, flat)
         if float(kappa.max()) < 1e-3:
@@ -181,7 +196,9 @@ class SpectralReconstruction:
         right += torch.einsum("jcp,cp->jp", rows, colour * root)
         return rows
 
-    def _dense(self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window) -> Spectra:
+    def _dense(
+        self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window
+    ) -> tuple[Spectra, Tensor]:
         from dsl_core.patterns.images import drive_levels, spectral_profiles
         from dsl_core.reconstruction.dense_solver import solve_dense
 
@@ -190,23 +207,37 @@ class SpectralReconstruction:
         profiles = (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
         shading = self._map(self.pixels.shading, flat)
         radiance, weight = window.colours(range(len(self.radiance)), None)
-        matrix, right = dense_equations(
+        matrix, right, square = dense_equations(
             self.rig, self.bands, profiles, self._map(self.pixels.column_px, flat),
             traced, {m: f.inside(*self.plan.projector_size_px, margin_px=EDGE_PX) for m, f in traced.items()}, radiance, weight,
         )  # fmt: skip
-        return solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
+        spectra = solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
+        radiance = (spectra.nodes * shading).T
+        explained = (radiance * (2 * right - (matrix @ radiance[..., None])[..., 0])).sum(1)
+        samples = (weight > 0).sum((0, 1))
+        return spectra, (square - explained) / (samples - PARAMETERS).clip(min=1)
 
     def _map(self, values: NDArray[np.float32], flat: NDArray[np.intp]) -> Tensor:
         return torch.as_tensor(values.ravel()[flat], device=self.device, dtype=self.dtype)
 
     def _store(
-        self, spectra: Spectra, flat: NDArray[np.intp], traced: dict[int, Footprint], out: SpectralMaps
+        self,
+        spectra: Spectra,
+        misfit: Tensor,
+        flat: NDArray[np.intp],
+        traced: dict[int, Footprint],
+        out: SpectralMaps,
     ) -> None:
         reported = self.bands.reported
         mean = spectra.mean[reported]
         relative = self._map(self.pixels.shading_rel_std, flat).nan_to_num(nan=0.0)
-        std = torch.hypot(spectra.std[reported], mean * relative)
-        for cube, values in ((out.reflectance, mean), (out.std, std), (out.data_share, spectra.data_share[reported])):
+        # What the model cannot explain makes the answer that much less certain (Birge ratio).
+        std = torch.hypot(spectra.std[reported] * misfit.clip(min=1).sqrt(), mean * relative)
+        for cube, values in (
+            (out.reflectance, mean),
+            (out.std, std),
+            (out.data_share, spectra.data_share[reported]),
+        ):
             cube.reshape(len(cube), -1)[:, flat] = values.float().cpu().numpy()
         bits = {1: Reach.PLUS_ONE, -1: Reach.MINUS_ONE}
         reach = torch.zeros_like(mean, dtype=torch.uint8)
@@ -215,13 +246,16 @@ class SpectralReconstruction:
             reach |= inside[reported].to(torch.uint8) * int(bits[order])
         reach[reach == 0] = int(Reach.ZERO_ONLY)
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
+        out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()
         out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
 
 
 class _Window:
     """The frames of one tile with the neighbours that demosaicing needs."""
 
-    def __init__(self, owner: SpectralReconstruction, rows: slice, columns: slice, inside: NDArray[np.intp]) -> None:
+    def __init__(
+        self, owner: SpectralReconstruction, rows: slice, columns: slice, inside: NDArray[np.intp]
+    ) -> None:
         self.owner = owner
         height, width = owner.pixels.valid.shape
         self.rows = slice(max(rows.start - 2, 0), min(rows.stop + 2, height))
@@ -255,7 +289,9 @@ class _Window:
         if lines is not None:
             index = torch.arange(frames.start, frames.stop, device=y.device)[:, None, None]
             distance = self._part(pixels.column_px) - lines.centre_px(index).to(y.dtype)
-            y = y - self._part(pixels.amplitude) * halo_of_line(distance, lines, self.owner.rig.projector_response)
+            y = y - self._part(pixels.amplitude) * halo_of_line(
+                distance, lines, self.owner.rig.projector_response
+            )
         bayer = self.owner.rig.sensor.bayer
         rgb = self._pick(demosaic(y, bayer))
         spread = self._pick(demosaic_variance(variance, bayer))
@@ -275,6 +311,3 @@ class _Window:
         colour = demosaic(self._part(pixels.amplitude), bayer).reshape(3, -1)[:, self.at]
         variance = demosaic_variance(self._part(pixels.amplitude_std) ** 2, bayer).reshape(3, -1)[:, self.at]
         return colour, variance
-
-
-__all__ = ["Pixels", "SpectralMaps", "SpectralReconstruction", "data_share"]

@@ -92,6 +92,8 @@ class BandedAccumulator:
         self.rig, self.bands, self.lines = rig, bands, lines
         self.matrix = torch.zeros((1, bands.count, pixels), device=other.device, dtype=other.dtype)
         self.right = torch.zeros_like(self.matrix[0])
+        #: Weighted sum of squares of the data that entered, and their number, (pixels,).
+        self.square, self.samples = torch.zeros_like(self.right[0]), torch.zeros_like(self.right[0])
 
     def frames(self, footprint: Footprint, inside: Tensor) -> range:
         """Frames that light any band of any pixel of the tile through an order; empty when none does."""
@@ -104,7 +106,14 @@ class BandedAccumulator:
         return range(max(math.floor(first), 0), min(math.ceil(last) + 1, self.lines.lines))
 
     def add(
-        self, order: int, columns: Tensor, inside: Tensor, radiance: Tensor, weight: Tensor, first_line: int, blur_px: float
+        self,
+        order: int,
+        columns: Tensor,
+        inside: Tensor,
+        radiance: Tensor,
+        weight: Tensor,
+        first_line: int,
+        blur_px: float,
     ) -> None:
         """Add one order: ``radiance`` and ``weight`` are (3, frames, pixels), frame 0 being ``first_line``.
 
@@ -115,17 +124,39 @@ class BandedAccumulator:
         # The outermost diagonals hold products of two tails, below 1e-4 of the main one.
         bandwidth = max(min(math.ceil(2 * table.support_px / half), self.bands.count - 1) - 2, 1)
         if self.matrix.shape[0] < bandwidth + 1:
-            self.matrix = torch.nn.functional.pad(self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0]))
+            self.matrix = torch.nn.functional.pad(
+                self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])
+            )
         reached = [j for j, any_pixel in enumerate(inside.any(1).tolist()) if any_pixel]
         if not reached:
             return
         white = like(self.bands.moments[order].sum(1), columns)
         masked = None if bool(inside[reached[0] : reached[-1] + 1].all()) else inside
-        flat = weight.reshape(3, -1), (radiance * weight).reshape(3, -1)
+        weighted = radiance * weight
+        self._add_squares(columns, inside, radiance, weight, weighted, first_line, table.support_px)
+        flat = weight.reshape(3, -1), weighted.reshape(3, -1)
         for start in range(reached[0], reached[-1] + 1, GROUP):
             group = range(start, min(start + GROUP, reached[-1] + 1))
             stop = min(group[-1] + bandwidth, reached[-1]) + 1
             self._add_group(group, stop, columns, masked, white, flat, first_line, table)
+
+    def _add_squares(
+        self,
+        columns: Tensor,
+        inside: Tensor,
+        radiance: Tensor,
+        weight: Tensor,
+        weighted: Tensor,
+        first_line: int,
+        support_px: float,
+    ) -> None:
+        low = torch.where(inside, columns, torch.inf).amin(0) - support_px
+        high = torch.where(inside, columns, -torch.inf).amax(0) + support_px
+        index = torch.arange(first_line, first_line + radiance.shape[1], device=columns.device)[:, None]
+        centre = self.lines.centre_px(index)
+        used = ((centre > low) & (centre < high)).to(radiance.dtype)
+        self.square += torch.einsum("cfp,cfp,fp->p", weighted, radiance, used)
+        self.samples += torch.einsum("cfp,fp->p", (weight > 0).to(radiance.dtype), used)
 
     def _add_group(
         self,
@@ -147,7 +178,10 @@ class BandedAccumulator:
         start = ((lowest - table.support_px - self.lines.first_px) / self.lines.step_px).ceil().int()
         frame = (start - first_line) + offsets
         valid = (frame >= 0) & (frame < count)
-        index = (frame.clip_(0, count - 1) * pixels + torch.arange(pixels, device=columns.device, dtype=torch.int32)).reshape(-1)
+        index = (
+            frame.clip_(0, count - 1) * pixels
+            + torch.arange(pixels, device=columns.device, dtype=torch.int32)
+        ).reshape(-1)
         weights, weighted = (values.index_select(1, index) for values in flat)
         relative = columns[group[0] : stop] - (start * self.lines.step_px + self.lines.first_px)
         profiles = table.at(relative[:, None] - (offsets * self.lines.step_px))
@@ -174,8 +208,8 @@ def dense_equations(
     inside: dict[int, Tensor],
     radiance: Tensor,
     weight: Tensor,
-) -> tuple[Tensor, Tensor]:
-    """Full matrix (pixels, bands, bands) and right side (pixels, bands) of unit shading, for any pattern set.
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Full matrix (pixels, bands, bands), right side (pixels, bands) and sum of squares (pixels,) of unit shading.
 
     ``profiles`` (frames, width, LEDs) are radiances relative to full drive; ``radiance`` and ``weight`` are
     (3, frames, pixels). The zero order is part of the model: patterns may light a pixel by several orders at once.
@@ -201,7 +235,7 @@ def dense_equations(
     w = weight.permute(2, 0, 1).reshape(pixels, -1, 1)
     y = radiance.permute(2, 0, 1).reshape(pixels, -1, 1)
     weighted = flat * w
-    return weighted.mT @ flat, (weighted.mT @ y)[..., 0]
+    return weighted.mT @ flat, (weighted.mT @ y)[..., 0], (w * y * y).sum((1, 2))
 
 
 class SampledProfiles:

@@ -43,7 +43,7 @@ def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: i
     weight = np.where(valid, 1 / np.maximum(std, 1e-9) ** 2, 0.0)
     weight = weight / (weight.max(initial=0) or 1.0)
     fit, covariance, mean_square, count = _plane_fits(rays, inverse, weight, window)
-    noise = np.sqrt(_box(weight * std**2, window) / np.maximum(_box(weight, window), 1e-30))
+    noise = np.sqrt(np.maximum(_box(weight * std**2, window), 0) / np.maximum(_box(weight, window), 1e-30))
     normal, spread = _normals(fit, covariance, noise)
     # Curvature bends smooth surfaces away from their tangent plane; a jump is many times that and the noise.
     jump = np.sqrt(np.maximum(mean_square, 0)) > 5 * noise + 0.004 * inverse
