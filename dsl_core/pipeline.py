@@ -7,11 +7,13 @@ command line starts at once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, DecodeError, DeviceError, StoreError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -24,7 +26,9 @@ if TYPE_CHECKING:
     from dsl_core.capture.status import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.evaluation.report import ReportContent
     from dsl_core.evaluation.summary import Evaluation, Truth
+    from dsl_core.io.published import FileRecord
 
 
 @dataclass(frozen=True)
@@ -49,14 +53,52 @@ def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
     )
 
 
-def scan(rig: DeviceRig, plan: CapturePlan, folder: Path, progress: Progress | None = None) -> Status:
+def scan(
+    rig: DeviceRig,
+    plan: CapturePlan,
+    folder: Path,
+    progress: Progress | None = None,
+    notes: dict[str, str] | None = None,
+) -> Status:
     """Capture a plan into a session folder; an interrupted one goes on at its next missing frame."""
     from dsl_core.capture.runner import Runner
     from dsl_core.io.session import SessionWriter
     from dsl_core.patterns.images import pattern_image
 
-    with SessionWriter.open(folder, plan, rig) as sink:
+    with SessionWriter.open(folder, plan, rig, notes) as sink:
         return Runner(rig, plan, sink, pattern_image, progress=progress).run()
+
+
+def reopen_rig(folder: Path) -> DeviceRig:
+    """The rig that a session was started with; raises `StoreError` when the session does not say which."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.origin import rig_of_notes
+    from dsl_core.io.session_manifest import read_manifest
+
+    origin = rig_of_notes(read_manifest(folder).notes)
+    if origin is None:
+        raise StoreError(
+            f"{folder} does not say with which rig it was taken. Name it with --rig and --option."
+        )
+    return open_rig(*origin)
+
+
+def resume(
+    rig: DeviceRig, folder: Path, progress: Progress | None = None, check_drift: bool = True
+) -> Status:
+    """Go on with a session after a look at whether anything moved; raises `DeviceError` if it did."""
+    from dsl_core.capture import drift
+    from dsl_core.io.session import SessionReader
+    from dsl_core.patterns.images import pattern_image
+
+    reader = SessionReader(folder)
+    missing = {shot.index for shot in reader.missing()}
+    done = [shot for shot in reader.plan.shots() if shot.index not in missing]
+    if check_drift and done and missing:
+        report = drift.check_drift(rig, reader, drift.pick_reference_shots(done), pattern_image)
+        if not report.is_stable:
+            raise DeviceError(report.message)
+    return scan(rig, reader.plan, folder, progress)
 
 
 def reconstruct(
@@ -71,6 +113,7 @@ def reconstruct(
     from dsl_core.optics.correspondence import correspondence
     from dsl_core.reconstruction.geometry import reconstruct_geometry
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
+    from dsl_core.reconstruction.sanity import require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectra import SpectralReconstruction
 
@@ -79,12 +122,14 @@ def reconstruct(
     with timer.stage("read, merge, decode the binary code"):
         merged = MergedScan(source, rig)
         code, white = decode_columns(merged, progress)
+        require_light(white.radiance, white.saturated)
     with timer.stage("read and merge the line frames"):
         stack = stack_lines(merged, progress)
     with timer.stage("columns, depth, normals"):
         geometry = reconstruct_geometry(
             rig, plan, code, white, stack, refine_columns=options.refine_columns, device=options.device
         )
+        require_pixels(geometry.flags)
     spectra = None
     if options.spectra:
         with timer.stage("spectra"):
@@ -108,6 +153,32 @@ def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:
     return rig
 
 
+def reconstruct_session(
+    folder: Path,
+    calibration: Rig | None = None,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    timer: StageTimer | None = None,
+) -> xr.Dataset:
+    """The result of a complete session, with its origin and the cost of each stage among its attributes."""
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.session import SessionReader
+    from dsl_core.io.session_check import require_complete
+
+    reader, timer = SessionReader(folder), timer or StageTimer()
+    require_complete(reader)
+    result = reconstruct(reader, calibration_of(reader, calibration), options, progress, timer)
+    return result.assign_attrs(
+        {
+            **reader.manifest.notes,
+            "captured": reader.manifest.created,
+            "captured_with": reader.manifest.rig_name,
+            "capture_plan": reader.plan.model_dump_json(exclude_defaults=True),
+            "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
+        }
+    )
+
+
 def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
     """What the twin knows of its scene; None for a real rig."""
     from dsl_core.evaluation.summary import Truth
@@ -118,8 +189,42 @@ def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
     truth = rig.camera.world.truth
     materials = truth.materials
     return Truth(
-        truth.depth_mm, truth.lit, truth.material, materials.names, materials.at(grid.centres_nm), materials.targets
+        truth.depth_mm,
+        truth.lit,
+        truth.material,
+        materials.names,
+        materials.at(grid.centres_nm),
+        materials.targets,
     )
+
+
+def truth_of(
+    result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
+) -> Truth:
+    """Truth from the rig that took the scan, or from the one named; raises `DecodeError` where there is none."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.origin import rig_of_notes
+
+    origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
+    if origin is None:
+        raise DecodeError(
+            "The result does not say with which rig it was taken, so that there is no truth to compare with."
+            " Name a twin of the scene with --truth-rig twin and --option."
+        )
+    with open_rig(*origin) as rig:
+        truth = twin_truth(rig, _grid_of(result))
+    if truth is None:
+        raise DecodeError(
+            f"The rig {origin[0]!r} knows no truth of its scene. Name a twin of it with --truth-rig twin and --option."
+        )
+    return truth
+
+
+def _grid_of(result: xr.Dataset) -> WavelengthGrid:
+    if "wavelength_nm" not in result.coords:
+        return WavelengthGrid()
+    nm = result["wavelength_nm"].values
+    return WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=nm[1] - nm[0])
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
@@ -127,3 +232,55 @@ def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     from dsl_core.evaluation import summary
 
     return summary.evaluate(result, truth)
+
+
+def write_report(content: ReportContent, path: Path, overwrite: bool = False) -> Path:
+    """Write the report as one HTML page; raises `StoreError`."""
+    from dsl_core.evaluation.report import render_report
+    from dsl_core.io.staging import staged
+
+    page = render_report(content)
+    with staged([path], overwrite=overwrite) as (draft,):
+        draft.write_text(page, encoding="utf-8")
+    return path
+
+
+def export_scan(
+    folder: Path, target: Path, overwrite: bool = False, progress: Progress | None = None
+) -> list[Path]:
+    """Write a complete session in the published dataset layout and return the files; raises `StoreError`."""
+    from dsl_core.io.published import export_dataset
+    from dsl_core.io.session import SessionReader
+    from dsl_core.io.session_check import require_complete
+
+    reader = SessionReader(folder)
+    require_complete(reader)
+    sensor = calibration_of(reader).sensor
+    return export_dataset(
+        reader, target, bayer=sensor.bayer, bit_depth=sensor.bit_depth, overwrite=overwrite, progress=progress
+    )
+
+
+def import_scan(
+    root: Path, target: Path | None, calibration: Rig, progress: Progress | None = None
+) -> Sequence[FileRecord]:
+    """Check a published dataset, and make a session of it when a target is given; return the table of its files.
+
+    Raises `StoreError` naming the first file that is needed and cannot be used; then nothing is written.
+    """
+    from dsl_core.devices.replay import replay_rig
+    from dsl_core.io.published import open_dataset
+
+    source = open_dataset(root, bayer=calibration.sensor.bayer, bit_depth=calibration.sensor.bit_depth)
+    if target is not None:
+        source.require_frames()
+        scan(replay_rig(source, calibration), source.plan, target, progress, {"imported_from": root.name})
+    return source.table
+
+
+def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int]) -> Rig:
+    """A rig from published lenses, pose and curves on the film, sensor and scales of ``base``."""
+    from dsl_core.io.published import load_calibration
+
+    size = (base.projector.width_px, base.projector.height_px)
+    return load_calibration(root, size, camera_size_px).rig(base)

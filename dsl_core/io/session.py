@@ -37,7 +37,7 @@ from dsl_core.io.session_reader import FRAMES_NAME, LOG_NAME, SessionReader, sto
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 
-__all__ = ["SUFFIX", "SessionReader", "SessionWriter", "check_space"]
+__all__ = ["SUFFIX", "SessionReader", "SessionWriter", "check_space", "needed_bytes"]
 
 SUFFIX = ".dsl"
 #: Share of the raw size that compressed frames take at most in practice (measured 0.27 to 0.5 on 12 bit
@@ -46,10 +46,15 @@ COMPRESSED_SHARE = 0.6
 MARGIN_BYTES = 64 << 20
 
 
+def needed_bytes(plan: CapturePlan, frames: int) -> int:
+    """Bytes to have free for that many frames of a plan."""
+    return int(plan.raw_bytes * frames / plan.shot_count * COMPRESSED_SHARE) + MARGIN_BYTES
+
+
 def check_space(folder: Path, plan: CapturePlan, frames: int) -> None:
     """Raise `StoreError` when the disk under ``folder`` cannot take that many frames of the plan."""
     place = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    need = int(plan.raw_bytes * frames / plan.shot_count * COMPRESSED_SHARE) + MARGIN_BYTES
+    need = needed_bytes(plan, frames)
     free = shutil.disk_usage(place).free
     if free < need:
         raise StoreError(

@@ -21,7 +21,7 @@ def staged(targets: Sequence[Path], *, overwrite: bool = False) -> Iterator[list
     are as before and nothing is left behind. Raises `StoreError` when a target exists and may not be
     replaced, when the folder cannot be used, or when the disk fails.
     """
-    _check_targets(targets, overwrite=overwrite)
+    check_targets(targets, overwrite=overwrite)
     home = targets[0].parent
     room = home / f".{targets[0].name}.{uuid.uuid4().hex[:8]}{PARTIAL_SUFFIX}"
     try:
@@ -39,8 +39,8 @@ def staged(targets: Sequence[Path], *, overwrite: bool = False) -> Iterator[list
         shutil.rmtree(room, ignore_errors=True)
 
 
-def _check_targets(targets: Sequence[Path], *, overwrite: bool) -> None:
-    """Raise `StoreError` when a target exists and may not be replaced."""
+def check_targets(targets: Sequence[Path], *, overwrite: bool) -> None:
+    """Raise `StoreError` when a target exists and may not be replaced; asked before long work too."""
     taken = [target for target in targets if target.exists()]
     if taken and not overwrite:
         names = ", ".join(str(target) for target in taken)

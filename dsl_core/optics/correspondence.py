@@ -42,7 +42,9 @@ class Footprint(NamedTuple):
 class Correspondence(Protocol):
     """A model of the projector pixel of every (camera pixel, depth, order, wavelength)."""
 
-    def trace(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+    def trace(
+        self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
+    ) -> Footprint:
         """Projector pixels that light camera pixels.
 
         ``pixels`` are flat indices into the camera image (int64), ``depth_mm`` has the same shape.
@@ -71,14 +73,18 @@ def zero_order(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tens
 def chebyshev_nodes(start_nm: float, stop_nm: float, count: int = NODES) -> NDArray[np.float64]:
     """Chebyshev nodes of the first kind over a wavelength range, nm, rising."""
     k = np.arange(count)[::-1]
-    return np.asarray(0.5 * (start_nm + stop_nm) + 0.5 * (stop_nm - start_nm) * np.cos(np.pi * (k + 0.5) / count))
+    return np.asarray(
+        0.5 * (start_nm + stop_nm) + 0.5 * (stop_nm - start_nm) * np.cos(np.pi * (k + 0.5) / count)
+    )
 
 
 def interpolation_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
     """Matrix of polynomial interpolation from values at nodes to values at targets (Lagrange)."""
     scale = lambda x: (x - nodes.mean()) / np.ptp(nodes)  # noqa: E731 - keeps the Vandermonde matrix well conditioned
     order = len(nodes) - 1
-    return np.asarray(np.linalg.solve(np.vander(scale(nodes), order + 1).T, np.vander(scale(targets), order + 1).T).T)
+    return np.asarray(
+        np.linalg.solve(np.vander(scale(nodes), order + 1).T, np.vander(scale(targets), order + 1).T).T
+    )
 
 
 def like(array: NDArray[np.floating[Any]], other: Tensor) -> Tensor:
@@ -104,10 +110,14 @@ class GratingModel:
         self.rig = rig
         self.film = FilmFrame.of(rig.film)
 
-    def exact(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+    def exact(
+        self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
+    ) -> Footprint:
         """Projector pixels solved at every wavelength, without interpolation."""
         nm = like(wavelengths_nm, depth_mm)[:, None]
-        columns = torch.empty((len(wavelengths_nm), len(pixels)), device=depth_mm.device, dtype=depth_mm.dtype)
+        columns = torch.empty(
+            (len(wavelengths_nm), len(pixels)), device=depth_mm.device, dtype=depth_mm.dtype
+        )
         rows = torch.empty_like(columns)
         # In chunks, so that the dozens of intermediate arrays stay in the cache.
         for i in range(0, len(pixels), CHUNK):
@@ -118,7 +128,9 @@ class GratingModel:
             )
         return Footprint(columns, rows)
 
-    def trace(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+    def trace(
+        self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
+    ) -> Footprint:
         """Projector pixels, solved at Chebyshev nodes and interpolated in wavelength."""
         if order == 0:
             return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
@@ -139,12 +151,16 @@ class GridModel:
         self.rig = rig
         self.grid = rig.correspondence
 
-    def trace(self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]) -> Footprint:
+    def trace(
+        self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
+    ) -> Footprint:
         """Projector pixels; the rows, which the fit does not cover, are those of the analytic model."""
         if order == 0:
             return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
         if order not in self.grid.orders:
-            raise CalibrationError(f"The data-driven correspondence knows orders {self.grid.orders}, not {order}.")
+            raise CalibrationError(
+                f"The data-driven correspondence knows orders {self.grid.orders}, not {order}."
+            )
         alpha, beta, gamma = self._coefficients(order, pixels, depth_mm)
         at_nodes = alpha * (depth_mm / self.grid.depth_unit_mm) ** beta + gamma
         matrix = like(_linear_matrix(np.array(self.grid.wavelengths_nm), wavelengths_nm), depth_mm)
@@ -167,8 +183,12 @@ def _upsampled(grid: object, order: int, width: int, height: int) -> NDArray[np.
 
     assert isinstance(grid, CorrespondenceGrid)
     nodes = grid.array[grid.orders.index(order)]
-    rows = make_interp_spline(np.array(grid.rows_px), nodes, k=min(3, len(grid.rows_px) - 1), axis=1)(np.arange(height))
-    both = make_interp_spline(np.array(grid.columns_px), rows, k=min(3, len(grid.columns_px) - 1), axis=2)(np.arange(width))
+    rows = make_interp_spline(np.array(grid.rows_px), nodes, k=min(3, len(grid.rows_px) - 1), axis=1)(
+        np.arange(height)
+    )
+    both = make_interp_spline(np.array(grid.columns_px), rows, k=min(3, len(grid.columns_px) - 1), axis=2)(
+        np.arange(width)
+    )
     return np.ascontiguousarray(np.moveaxis(both, 3, 0), np.float32).reshape(3, len(grid.wavelengths_nm), -1)
 
 

@@ -69,9 +69,7 @@ def diffract(a: Tensor, b: Tensor, order: int, wavelength_over_period: Tensor | 
     return Vectors(out, b, torch.sqrt(1 - out * out - b * b))
 
 
-def incoming_direction(
-    frame: FilmFrame, point: Vectors, order: int, wavelength_nm: Tensor
-) -> Vectors:
+def incoming_direction(frame: FilmFrame, point: Vectors, order: int, wavelength_nm: Tensor) -> Vectors:
     """Direction in which light must leave the projector's centre to reach a point through an order.
 
     ``point`` is in projector coordinates (mm); shapes broadcast with ``wavelength_nm``. The result is in

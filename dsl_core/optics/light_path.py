@@ -17,12 +17,18 @@ def step_edge(distance_px: Tensor, blur_px: float) -> Tensor:
 
 def halo_integral(distance_px: Tensor, response: ProjectorResponse) -> Tensor:
     """Integral of the halo ``peak * exp(-|d| / decay)`` from minus infinity to a distance (px)."""
-    tail = response.halo_peak_per_px * response.halo_decay_px * torch.exp(-distance_px.abs() / response.halo_decay_px)
+    tail = (
+        response.halo_peak_per_px
+        * response.halo_decay_px
+        * torch.exp(-distance_px.abs() / response.halo_decay_px)
+    )
     full = 2 * response.halo_peak_per_px * response.halo_decay_px
     return torch.where(distance_px < 0, tail, full - tail)
 
 
-def zero_order_profile(columns: Tensor, start_px: float, stop_px: float, response: ProjectorResponse) -> Tensor:
+def zero_order_profile(
+    columns: Tensor, start_px: float, stop_px: float, response: ProjectorResponse
+) -> Tensor:
     """Light of the zero order at projector columns from a band of columns between two edges (px).
 
     Box blurred by the Gaussian plus the halo; 1 inside a wide band.

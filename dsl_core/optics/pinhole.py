@@ -16,7 +16,9 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.geometry import Lens
 
 
-def distort(x: Any, y: Any, coefficients: tuple[float, ...], max_radius_sq: float = np.inf) -> tuple[Any, Any]:
+def distort(
+    x: Any, y: Any, coefficients: tuple[float, ...], max_radius_sq: float = np.inf
+) -> tuple[Any, Any]:
     """Distorted image-plane coordinates of undistorted ones (any shape, unit focal length).
 
     OpenCV's model: radial ``1 + k1 r^2 + k2 r^4 + k3 r^6`` and tangential p1, p2. Beyond
@@ -63,9 +65,7 @@ def undistort(
 def pixel_rays(lens: Lens) -> NDArray[np.float64]:
     """Direction of every pixel's ray in camera coordinates with z = 1, shape (3, rows, columns)."""
     columns, rows = np.meshgrid(np.arange(lens.width_px), np.arange(lens.height_px))
-    x, y = undistort(
-        (columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px, lens.distortion
-    )
+    x, y = undistort((columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px, lens.distortion)
     rays = np.stack([x, y, np.ones_like(x)])
     rays.setflags(write=False)
     return rays

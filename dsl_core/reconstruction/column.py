@@ -21,6 +21,8 @@ from dsl_core.reconstruction.line_set import LineSet
 ITERATIONS = 6
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
 MODEL_ERROR = 0.004
+#: The same for combs, where the first orders of other lines lie under the peak.
+COMB_ERROR = 0.05
 #: A refined column this far from the decoded one is not the same peak.
 MAX_SHIFT_PX = 2.0
 #: Columns on either side of the zero order that no order lights, at any wavelength of the projector.
@@ -51,9 +53,10 @@ def refine(
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
     q = coarse_px.clone()
     amplitude = y.amax(0)
+    error = MODEL_ERROR if lines.frames == lines.lines else COMB_ERROR
     for _ in range(ITERATIONS):
         g, slope = _profile(q - centres, lines.width_px, response)
-        weight = 1 / (variance + (MODEL_ERROR * amplitude) ** 2)
+        weight = 1 / (variance + (error * amplitude) ** 2)
         wg = weight * g
         gg = (wg * g).sum(0).clip(min=1e-30)
         amplitude = (wg * y).sum(0) / gg

@@ -21,7 +21,7 @@ from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import halo_of_line
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
-from dsl_core.reconstruction.spectral_system import ORDERS, BandedAccumulator, Bands, dense_equations
+from dsl_core.reconstruction.spectral_system import ORDERS, BandedAccumulator, Bands, dense_equations, lit_by_zero_order
 from dsl_core.solve.banded import multiply
 
 #: Pixels of a tile; even numbers keep the Bayer phase.
@@ -34,6 +34,8 @@ COLOUR_ERROR = 0.02
 PARAMETERS = 25
 #: Bands whose centre lies this far outside the projector's frame still belong to the model, px.
 EDGE_PX = 8.0
+#: Relative error of the zero order in frames that light a pixel by several orders at once.
+DIRECT_ERROR = 0.05
 #: Mean squared offset (camera px) of the samples that bilinear demosaicing averages.
 DEMOSAIC_SPREAD = 0.4
 
@@ -206,9 +208,13 @@ class SpectralReconstruction:
         response = self.rig.projector_response
         profiles = (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
         shading = self._map(self.pixels.shading, flat)
+        column = self._map(self.pixels.column_px, flat)
         radiance, weight = window.colours(range(len(self.radiance)), None)
+        colour, _ = window.zero_order_colour()
+        lit = lit_by_zero_order(self.rig, profiles, column)
+        weight = 1 / (1 / weight + (DIRECT_ERROR * colour[:, None] * lit) ** 2)
         matrix, right, square = dense_equations(
-            self.rig, self.bands, profiles, self._map(self.pixels.column_px, flat),
+            self.rig, self.bands, profiles, column,
             traced, {m: f.inside(*self.plan.projector_size_px, margin_px=EDGE_PX) for m, f in traced.items()}, radiance, weight,
         )  # fmt: skip
         spectra = solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)

@@ -269,3 +269,13 @@ def sampled_profiles(
         spread = torch.as_tensor(band_profile(at, 1.0, rig.projector_response.blur_px, band_px))
     table = torch.einsum("sx,fxl->slf", spread, torch.as_tensor(profiles, dtype=torch.float64))
     return SampledProfiles(table.to(like_this), oversample)
+
+
+def lit_by_zero_order(rig: Rig, profiles: NDArray[np.float64], column_px: Tensor) -> Tensor:
+    """Largest zero-order light within a column of each pixel's, (frames, pixels), any LED.
+
+    The edges of lines are where a small error of the column or the blur matters most.
+    """
+    sampled = sampled_profiles(rig, profiles, 0.0, column_px)
+    near = torch.stack([sampled.at(column_px + shift).amax(1) for shift in (-1.0, 0.0, 1.0)])
+    return near.amax(0).T

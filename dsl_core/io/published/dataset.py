@@ -57,6 +57,16 @@ class PublishedScan:
         """Every file that the plan wants or that is in its way."""
         return self.found.records
 
+    def require_frames(self) -> None:
+        """Raise `StoreError` naming the first frame of the plan that cannot be used, and how many more."""
+        lacking = [s for s in self.plan.shots() if (s.role, s.setting, s.pattern) not in self.found.files]
+        if lacking:
+            first = self.found.by_place[lacking[0].role, lacking[0].setting, lacking[0].pattern]
+            raise StoreError(
+                f"{self.root} lacks {len(lacking)} of {self.plan.shot_count} frames: {first.expected} is"
+                f" {first.status} ({first.advice}). Complete the folder; the table of the import lists every file."
+            )
+
     def read(self, shot: Shot) -> NDArray[np.uint16]:
         """The mosaic of a shot, shape (rows, columns), DN; raises `StoreError` when it is not there."""
         image = self.read_rgb(shot)
