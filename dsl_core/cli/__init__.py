@@ -1,0 +1,22 @@
+"""``dsl-scan``: a thin command for each function of the pipeline.
+
+Figures and findings go to standard output, progress and complaints to standard error. Exit codes: 0 all is
+well, 1 a bug, 2 wrong input (one sentence says what to do), 130 stopped by the user.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command line (that of the process if not given) and return its exit code."""
+    try:
+        # Inside, so that Ctrl-C while it loads ends in a sentence as well.
+        from dsl_core.cli.run import run
+
+        return run(list(sys.argv[1:] if arguments is None else arguments))
+    except KeyboardInterrupt:
+        print("Stopped before anything was done.", file=sys.stderr)
+        return 130

@@ -1,0 +1,48 @@
+"""The commands of ``dsl-scan`` and its global options."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import dsl_core
+from dsl_core.cli import demo, files, results, scans
+
+app = typer.Typer(
+    name="dsl-scan",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (
+    demo.demo,
+    scans.rigs,
+    scans.scenes,
+    scans.plan,
+    scans.scan,
+    scans.resume,
+    results.reconstruct,
+    results.evaluate,
+    results.export,
+):
+    app.command()(command)
+app.command("import")(files.import_)
+app.command()(files.info)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"dsl-scan {dsl_core.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _globally(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+) -> None:
+    """Hyperspectral 3D scanning by Dispersed Structured Light."""

@@ -1,0 +1,139 @@
+"""The demo: a scan of a Color Checker on the twin, from the first pattern to the report."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsl_core.cli.options import Json, parse_size
+from dsl_core.cli.output import Output
+from dsl_core.errors import Cancelled
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.model.plan import CapturePlan
+
+SCAN, RESULT, REPORT = "scan.dsl", "result.zarr", "report.html"
+#: Shin et al., CVPR 2024: mean over the Color Checker on the real rig.
+PUBLISHED = {"spectral_rmse": 0.038, "spectral_angle_rad": 0.138}
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder to write; a number is added if it is taken.")] = Path("dsl-demo"),
+    size: Annotated[str, typer.Option(help="Camera pixels; 890x580 is the published rig's.")] = "445x290",
+    scene: Annotated[str, typer.Option(help="A scene of the twin; 'dsl-scan scenes' lists them.")] = "color-checker",
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the report in a browser.")] = False,
+    json: Json = False,
+) -> None:
+    """Scan, reconstruct and evaluate a Color Checker on the digital twin, ending in a report."""
+    from dsl_core.evaluation.cost import StageTimer
+
+    output, timer = Output(json), StageTimer()
+    width, height = parse_size("--size", size)
+    options = {"scene": scene, "size": f"{width}x{height}"}
+    folder = _choose_folder(out, options)
+    try:
+        _capture(output, timer, folder, options)
+        result = _reconstruct(output, timer, folder)
+    except (KeyboardInterrupt, Cancelled):
+        raise Cancelled(f"Stopped; 'dsl-scan demo --out {out}' goes on where it was.") from None
+    figures = _evaluate(output, timer, folder, result)
+    output.costs(timer.stages)
+    for name, line in _lines(folder).items():
+        output.say(f"{name:14s} {line}")
+    output.put(folder=folder, report=folder / REPORT, figures=figures, published=PUBLISHED)
+    output.finish()
+    if open_:
+        typer.launch((folder / REPORT).absolute().as_uri())
+
+
+def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
+    """The first folder of that name or its numbered neighbours that is free or holds this very demo, unfinished."""
+    from dsl_core.io.origin import rig_notes
+    from dsl_core.io.session_manifest import MANIFEST_NAME, read_manifest
+
+    for number in itertools.count(1):
+        folder = wanted if number == 1 else wanted.with_name(f"{wanted.name}-{number}")
+        if not folder.exists():
+            return folder
+        started = (folder / SCAN / MANIFEST_NAME).is_file() and not (folder / RESULT).exists()
+        if started and read_manifest(folder / SCAN).notes == rig_notes("twin", options):
+            return folder
+    raise AssertionError("numbers do not end")
+
+
+def _plan() -> CapturePlan:
+    """The published line frames; of the binary code the columns, since rows do not enter the result."""
+    from dsl_core.model.plan import CapturePlan, GrayCode
+
+    return CapturePlan(name="demo", code=GrayCode(rows=False))
+
+
+def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str, str]) -> None:
+    from dsl_core import pipeline
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.origin import rig_notes
+
+    with output.progress() as progress, timer.stage("scan on the twin"), open_rig("twin", options) as rig:
+        plan = pipeline.fit_plan(_plan(), rig)
+        output.say(f"Scanning {options['scene']} on the twin, {options['size']} px, {plan.shot_count} frames.")
+        pipeline.scan(rig, plan, folder / SCAN, progress, rig_notes("twin", options))
+
+
+def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
+    from dsl_core.io.result_file import save_result
+    from dsl_core.pipeline import reconstruct_session
+
+    with output.progress() as progress:
+        result = reconstruct_session(folder / SCAN, progress=progress, timer=timer)
+    with timer.stage("save the result"):
+        save_result(result, folder / RESULT)
+    return result
+
+
+def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Dataset) -> dict[str, float]:
+    """Figures, exports and the report."""
+    from dsl_core import pipeline
+    from dsl_core.cli.results import print_figures, report_content
+    from dsl_core.evaluation.verdict import Goal, figures
+    from dsl_core.io.export import export
+
+    with timer.stage("evaluate"):
+        truth = pipeline.truth_of(result)
+        evaluation = pipeline.evaluate(result, truth)
+    with timer.stage("export PLY, PNG, ENVI"):
+        for form, name in (("ply", "points.ply"), ("png", "picture.png"), ("envi", "cube.hdr")):
+            export(result, folder / name, form)
+    found = figures(evaluation)
+    goals = {name: Goal(limit) for name, limit in PUBLISHED.items() if name in found}
+    with timer.stage("report"):
+        content = report_content("Demo on the digital twin", result, truth, evaluation, _summary(found), goals)
+        pipeline.write_report(content, folder / REPORT)
+    print_figures(output, evaluation)
+    output.say(_summary(found))
+    return found
+
+
+def _summary(found: dict[str, float]) -> str:
+    if "spectral_rmse" not in found:
+        return "The scene has no patches with a known spectrum."
+    return (
+        f"Mean spectral RMSE {found['spectral_rmse']:.4f} and angle {found['spectral_angle_rad']:.4f} rad on the twin;"
+        f" published, on the real rig: {PUBLISHED['spectral_rmse']} and {PUBLISHED['spectral_angle_rad']} rad."
+    )
+
+
+def _lines(folder: Path) -> dict[str, str]:
+    return {
+        "frames": f"{folder / SCAN}",
+        "result": f"{folder / RESULT}",
+        "points": f"{folder / 'points.ply'}",
+        "pictures": f"{folder / 'picture_*.png'}",
+        "spectral cube": f"{folder / 'cube.hdr'}",
+        "report": f"{folder / REPORT}",
+    }

@@ -1,0 +1,97 @@
+"""Commands around files of others and our own: import, info."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsl_core.cli.options import Force, Json, parse_size
+from dsl_core.cli.output import Output
+from dsl_core.errors import StoreError
+
+if TYPE_CHECKING:
+    from dsl_core.io.published import FileRecord
+    from dsl_core.model.rig import Rig
+
+
+def import_(
+    source: Annotated[Path, typer.Argument(metavar="FOLDER", help="A published dataset or calibration.")],
+    target: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="SCAN.dsl or RIG.json to write; without it, only check the folder."),
+    ] = None,
+    base: Annotated[
+        Path | None,
+        typer.Option("--calibration", help="Rig with film, sensor and scales; the published rig if not given."),
+    ] = None,
+    camera_size: Annotated[
+        str, typer.Option("--camera-size", help="Image size of a published calibration.")
+    ] = "890x580",
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Read the published dataset or calibration layout; say what is missing or misnamed."""
+    from dsl_core import pipeline
+    from dsl_core.io.published import check_calibration
+    from dsl_core.io.published.calibration import STEREO_NAME, TABLE_FOLDER
+    from dsl_core.io.rig_file import load_rig, save_rig
+    from dsl_core.simulation.published_rig import published_rig
+
+    if not source.is_dir():
+        raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
+    output, rig = Output(json), load_rig(base) if base else published_rig()
+    if (source / STEREO_NAME.parent).is_dir() or (source / TABLE_FOLDER).is_dir():
+        _print_files(output, "calibration", check_calibration(source))
+        if target is not None:
+            imported = pipeline.import_calibration(source, rig, parse_size("--camera-size", camera_size))
+            save_rig(imported, target, overwrite=force)
+    else:
+        _import_dataset(output, source, target, rig)
+    if target is not None:
+        output.say(f"Imported to {target}")
+        output.put(imported=target)
+    output.finish()
+
+
+def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig) -> None:
+    """The table comes first, so that it is there when the import is refused."""
+    from dsl_core import pipeline
+
+    _print_files(output, "dataset", pipeline.import_scan(source, None, rig))
+    if target is not None:
+        with output.progress() as progress:
+            pipeline.import_scan(source, target, rig, progress)
+
+
+def _print_files(output: Output, kind: str, records: Sequence[FileRecord]) -> None:
+    """Everything that is not as it should be, and how much is."""
+    odd = [record for record in records if record.status != "ok"]
+    output.say(f"A published {kind}: {len(records) - len(odd)} of {len(records)} entries are as published.")
+    if odd:
+        output.table(
+            ("expected", "found", "status", "what to do"),
+            [(r.expected or "-", r.found or "-", r.status, r.advice) for r in odd],
+        )
+    output.put(kind=kind, as_published=not odd, files=[vars(record) for record in records])
+
+
+def info(
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="A scan, result, rig or plan.")],
+    verify: Annotated[bool, typer.Option("--verify", help="Also read every frame of a scan.")] = False,
+    json: Json = False,
+) -> None:
+    """Say what a folder or file holds and whether it is complete."""
+    from dsl_core.io.describe import describe
+
+    output, facts = Output(json), describe(path, verify)
+    for name, value in facts.items():
+        if isinstance(value, dict):
+            value = "; ".join(f"{key}: {item}" for key, item in value.items())
+        elif isinstance(value, list):
+            value = ", ".join(map(str, value)) or "none"
+        output.say(f"{name.replace('_', ' '):18s} {value}")
+    output.put(**facts)
+    output.finish()

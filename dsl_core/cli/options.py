@@ -1,0 +1,178 @@
+"""Options that several commands share, and how their text becomes records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeVar
+
+import typer
+
+from dsl_core.errors import DeviceError, PlanError
+
+if TYPE_CHECKING:
+    from dsl_core.model.plan import CapturePlan, SpectralSet
+    from dsl_core.model.spectral import WavelengthGrid
+
+T = TypeVar("T")
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+RigName = Annotated[str, typer.Option("--rig", help="Name of a rig; 'dsl-scan rigs' lists them.")]
+RigOptions = Annotated[
+    list[str], typer.Option("--option", "-o", help="Option of the rig as key=value; may be repeated.")
+]
+PlanFile = Annotated[Path | None, typer.Option("--plan", help="A plan written by 'dsl-scan plan'.")]
+Code = Annotated[
+    str | None, typer.Option("--code", help="Binary code: 'full' (columns and rows) or 'columns'.")
+]
+Lines = Annotated[
+    str | None, typer.Option("--lines", help="One line a frame, as WIDTHxSTEP in projector px, like 5x2.")
+]
+Comb = Annotated[
+    str | None, typer.Option("--comb", help="Several lines a frame, as WIDTHxSTEPxPERIOD, like 5x2x106.")
+]
+Settings = Annotated[
+    list[str],
+    typer.Option("--setting", help="EXPOSURE_MS@LEVEL, like 166.7@0.2; repeat for a bracket, darkest first."),
+]
+
+
+@dataclass(frozen=True)
+class PlanChoice:
+    """What the command line says of a plan."""
+
+    file: Path | None = None
+    code: str | None = None
+    lines: str | None = None
+    comb: str | None = None
+    settings: Sequence[str] = ()
+
+    def build(self) -> CapturePlan:
+        """The plan; raises `PlanError` when the choices contradict each other or make no sense."""
+        from dsl_core.io.plan_file import load_plan
+        from dsl_core.model.plan import CapturePlan
+
+        details = {
+            "--code": self.code,
+            "--lines": self.lines,
+            "--comb": self.comb,
+            "--setting": tuple(self.settings) or None,
+        }
+        given = [name for name, value in details.items() if value is not None]
+        if self.file is not None:
+            if given:
+                raise PlanError(f"--plan holds the whole plan; leave out {', '.join(given)}, or --plan.")
+            return load_plan(self.file)
+        return _checked("plan", lambda: CapturePlan(**self._fields()))
+
+    def _fields(self) -> dict[str, object]:
+        from dsl_core.model.plan import GrayCode
+
+        fields: dict[str, object] = {}
+        if self.code is not None:
+            if self.code not in ("full", "columns"):
+                raise PlanError(f"--code must be 'full' or 'columns', not {self.code!r}.")
+            fields["code"] = GrayCode(rows=self.code == "full")
+        spectral = self._spectral()
+        if spectral is not None:
+            fields["spectral"] = spectral
+        if self.settings:
+            fields["settings"] = tuple(_setting(text) for text in self.settings)
+            fields["code_settings"] = tuple(range(len(self.settings)))
+        return fields
+
+    def _spectral(self) -> SpectralSet | None:
+        from dsl_core.model.plan import LineComb, ScanLines
+
+        if self.lines is not None and self.comb is not None:
+            raise PlanError("--lines and --comb exclude each other; choose one.")
+        if self.lines is not None:
+            width, step = _numbers("--lines", self.lines, "WIDTHxSTEP", 2)
+            return _checked("--lines", lambda: ScanLines(width_px=width, step_px=step))
+        if self.comb is not None:
+            width, step, period = _numbers("--comb", self.comb, "WIDTHxSTEPxPERIOD", 3)
+            return _checked("--comb", lambda: LineComb(width_px=width, step_px=step, period_px=period))
+        return None
+
+
+def parse_options(texts: Sequence[str]) -> dict[str, str]:
+    """Options of a rig from texts like ``key=value``; raises `DeviceError`.
+
+    >>> parse_options(["scene=plane", "size=112x72"])
+    {'scene': 'plane', 'size': '112x72'}
+    """
+    options: dict[str, str] = {}
+    for text in texts:
+        key, sign, value = text.partition("=")
+        if not (key and sign):
+            raise DeviceError(f"An option must be like key=value, for instance scene=plane, not {text!r}.")
+        if key in options:
+            raise DeviceError(f"The option {key!r} is given twice: {options[key]!r} and {value!r}. Choose one.")
+        options[key] = value
+    return options
+
+
+def parse_bands(text: str) -> WavelengthGrid:
+    """Bands from ``START:STOP:STEP`` in nm; raises `PlanError`."""
+    from dsl_core.model.spectral import WavelengthGrid
+
+    try:
+        start, stop, step = (float(part) for part in text.split(":"))
+    except ValueError as error:
+        raise PlanError(f"--bands must be START:STOP:STEP in nm, like 430:660:5, not {text!r}.") from error
+    return _checked("--bands", lambda: WavelengthGrid(start_nm=start, stop_nm=stop, step_nm=step))
+
+
+def parse_pixels(texts: Sequence[str]) -> list[tuple[int, int]]:
+    """Pixels as (x, y) from texts like ``120,80``; raises `PlanError`.
+
+    >>> parse_pixels(["120,80"])
+    [(120, 80)]
+    """
+    pixels = []
+    for text in texts:
+        try:
+            x, y = (int(part) for part in text.split(","))
+        except ValueError as error:
+            raise PlanError(f"--pixel must be x,y in whole pixels, like 120,80, not {text!r}.") from error
+        pixels.append((x, y))
+    return pixels
+
+
+def parse_size(name: str, text: str) -> tuple[int, int]:
+    """Width and height from ``890x580``; raises `PlanError`."""
+    width, height = _numbers(name, text, "WIDTHxHEIGHT", 2)
+    return width, height
+
+
+def _numbers(name: str, text: str, form: str, count: int) -> list[int]:
+    try:
+        numbers = [int(part) for part in text.lower().split("x")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or min(numbers) < 1:
+        raise PlanError(f"{name} must be {form} in whole pixels of at least 1, not {text!r}.")
+    return numbers
+
+
+def _setting(text: str) -> dict[str, float]:
+    try:
+        exposure, level = (float(part) for part in text.split("@"))
+    except ValueError as error:
+        raise PlanError(f"--setting must be EXPOSURE_MS@LEVEL, like 166.7@0.2, not {text!r}.") from error
+    return {"exposure_ms": exposure, "level": level}
+
+
+def _checked(name: str, make: Callable[[], T]) -> T:
+    """What ``make`` makes; a value that its record refuses becomes a `PlanError`."""
+    from pydantic import ValidationError
+
+    try:
+        return make()
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        what = first["msg"].removeprefix("Value error, ")
+        raise PlanError(f"{name}{f' ({where})' if where else ''}: {what}. Change the value.") from error

@@ -1,0 +1,191 @@
+"""Commands around results: reconstruct, evaluate, export."""
+
+from __future__ import annotations
+
+import json as json_format
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsl_core.cli.options import Force, Json, RigOptions, parse_bands, parse_options, parse_pixels
+from dsl_core.cli.output import Output
+from dsl_core.errors import DecodeError, PlanError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.evaluation.report import ReportContent
+    from dsl_core.evaluation.summary import Evaluation, Truth
+    from dsl_core.evaluation.verdict import Goal
+
+MODELS = ("auto", "grating", "grid")
+DEVICES = ("cpu", "cuda", "auto")
+
+Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
+
+
+def reconstruct(
+    session: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="A complete scan.")],
+    target: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder to write; SCAN.zarr if not given.")
+    ] = None,
+    calibration: Annotated[Path | None, typer.Option(help="A rig's JSON file instead of the scan's own.")] = None,
+    bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
+    model: Annotated[str, typer.Option(help="Correspondence: auto, grating or grid.")] = "auto",
+    refine: Annotated[bool, typer.Option("--refine/--no-refine", help="Columns below one pixel.")] = True,
+    depth_only: Annotated[bool, typer.Option("--depth-only", help="No spectra.")] = False,
+    device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda where there is one.")] = "cpu",
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Turn frames into depth, points, normals, reflectance and their uncertainty."""
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.result_file import save_result
+    from dsl_core.io.rig_file import load_rig
+    from dsl_core.io.staging import check_targets
+    from dsl_core.pipeline import Options, reconstruct_session
+
+    output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
+    if model not in MODELS:
+        raise PlanError(f"--model must be one of {', '.join(MODELS)}, not {model!r}.")
+    grid = parse_bands(bands)
+    check_targets([target], overwrite=force)
+    rig = load_rig(calibration) if calibration else None
+    options = Options(grid, model, refine, not depth_only, _torch_device(device))
+    with output.progress() as progress:
+        result = reconstruct_session(session, rig, options, progress, timer)
+        with timer.stage("save the result"):
+            save_result(result, target, overwrite=force)
+    output.costs(timer.stages)
+    share = coverage(result)
+    output.say(f"{share:.1%} of the pixels have a depth. The result lies in {target}")
+    output.put(result=target, pixels_with_depth=share)
+    output.finish()
+
+
+def evaluate(
+    path: Result,
+    truth_rig: Annotated[str | None, typer.Option(help="Rig that knows the truth, if not the scan's.")] = None,
+    option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
+    report: Annotated[
+        Path | None, typer.Option(help="HTML page to write; RESULT.html beside the result if not given.")
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Compare a result with known truth, in figures and one self-contained HTML page."""
+    from dsl_core import pipeline
+    from dsl_core.evaluation.verdict import figures
+    from dsl_core.io.result_file import load_result
+    from dsl_core.io.staging import check_targets
+
+    output, report = Output(json), report or path.with_suffix(".html")
+    check_targets([report], overwrite=force)
+    result = load_result(path)
+    truth = pipeline.truth_of(result, truth_rig, parse_options(option))
+    evaluation = pipeline.evaluate(result, truth)
+    pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
+    print_figures(output, evaluation)
+    output.say(f"The report lies in {report}")
+    output.put(report=report, figures=figures(evaluation))
+    output.finish()
+
+
+def export(
+    path: Annotated[Path, typer.Argument(metavar="SOURCE", help="A result; a scan for 'dataset'.")],
+    form: Annotated[
+        str, typer.Argument(metavar="FORMAT", help="ply, envi, exr, csv, png, dataset or calibration.")
+    ],
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
+    pixel: Annotated[list[str], typer.Option(help="x,y of a pixel for csv; may be repeated.")] = [],  # noqa: B006
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Write a result for other programs, or a scan or rig in the published layout."""
+    output = Output(json)
+    files = _export(output, path, form, target, parse_pixels(pixel), force)
+    shown = [str(file) for file in files[:10]] + (["..."] if len(files) > 10 else [])
+    output.say(f"Written ({len(files)} files): {', '.join(shown)}")
+    output.put(files=[str(file) for file in files])
+    output.finish()
+
+
+def _export(
+    output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
+) -> list[Path]:
+    from dsl_core import pipeline
+    from dsl_core.io.export import export as export_result
+    from dsl_core.io.export import export_csv
+    from dsl_core.io.published import export_calibration
+    from dsl_core.io.result_file import load_result
+    from dsl_core.io.rig_file import load_rig
+    from dsl_core.io.session import SessionReader
+
+    if pixels and form != "csv":
+        raise PlanError(f"--pixel is for csv; {form} holds all pixels. Leave it out.")
+    if form == "dataset":
+        with output.progress() as progress:
+            return pipeline.export_scan(path, target, force, progress)
+    if form == "calibration":
+        rig = load_rig(path) if path.is_file() else pipeline.calibration_of(SessionReader(path))
+        return export_calibration(rig, target, overwrite=force)
+    if form == "csv":
+        return export_csv(load_result(path), target, overwrite=force, pixels=pixels)
+    return export_result(load_result(path), target, form, overwrite=force)
+
+
+def coverage(result: xr.Dataset) -> float:
+    """Share of the pixels that have a depth."""
+    return float(result["depth_mm"].notnull().mean())
+
+
+def print_figures(output: Output, evaluation: Evaluation) -> None:
+    """Every figure of an evaluation, one a line."""
+    from dsl_core.evaluation.verdict import verdicts
+
+    output.table(("figure", "value", "unit"), [(v.figure, v.value, v.unit) for v in verdicts(evaluation)])
+
+
+def report_content(
+    title: str,
+    result: xr.Dataset,
+    truth: Truth,
+    evaluation: Evaluation,
+    summary: str = "",
+    goals: dict[str, Goal] | None = None,
+) -> ReportContent:
+    """What the report of a result says; plan and costs come from the result's attributes."""
+    from dsl_core.evaluation.cost import StageCost
+    from dsl_core.evaluation.report import ReportContent
+    from dsl_core.evaluation.verdict import verdicts
+    from dsl_core.model.plan import CapturePlan
+
+    attributes = dict(result.attrs)
+    costs = [StageCost(**cost) for cost in json_format.loads(attributes.pop("stage_costs", "[]"))]
+    plan = attributes.pop("capture_plan", None)
+    return ReportContent(
+        title,
+        result,
+        summary=summary,
+        evaluation=evaluation,
+        truth=truth,
+        verdicts=verdicts(evaluation, goals),
+        costs=costs,
+        plan=CapturePlan.model_validate_json(plan) if plan else None,
+        provenance={str(key).replace("_", " "): str(value) for key, value in attributes.items()},
+    )
+
+
+def _torch_device(name: str) -> str:
+    """``cpu`` or ``cuda``; raises `DecodeError` when the one asked for is not there."""
+    if name not in DEVICES:
+        raise PlanError(f"--device must be one of {', '.join(DEVICES)}, not {name!r}.")
+    if name == "cpu":
+        return name
+    import torch
+
+    found = torch.cuda.is_available()
+    if name == "cuda" and not found:
+        raise DecodeError("There is no CUDA device, or torch was built without CUDA. Use --device cpu.")
+    return "cuda" if found else "cpu"

@@ -1,0 +1,92 @@
+"""From a command line to an exit code: what goes wrong becomes a sentence, never a traceback unasked."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+import traceback
+import warnings
+
+import typer
+
+from dsl_core.cli.app import app
+from dsl_core.errors import Cancelled, DslError
+
+OK, BUG, WRONG_INPUT, STOPPED = 0, 1, 2, 130
+#: Wrong use of a command line; typer gives this class no public name.
+_WrongUse: type[BaseException] = typer.BadParameter.__mro__[2]
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command and return its exit code."""
+    debug = "--debug" in arguments
+    # A global option may stand anywhere, also behind the command.
+    arguments = [a for a in arguments if a != "--debug"]
+    logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
+    if not debug:
+        warnings.simplefilter("ignore")
+    try:
+        code = app(arguments, prog_name="dsl-scan", standalone_mode=False)
+        sys.stdout.flush()
+    except BaseException as error:
+        if isinstance(error, BrokenPipeError):
+            return _leave_quietly()
+        code, sentence = _judge(error)
+        if debug:
+            traceback.print_exc()
+        return _complain(code, sentence, type(error).__name__, "--json" in arguments)
+    if code == STOPPED:  # typer turns Ctrl-C into this code
+        return _complain(code, "Stopped. What was finished before is kept.", "Cancelled", "--json" in arguments)
+    return code or OK
+
+
+def _judge(error: BaseException) -> tuple[int, str]:
+    """Exit code and sentence for anything that was raised."""
+    if isinstance(error, Cancelled):
+        return STOPPED, str(error)
+    if isinstance(error, KeyboardInterrupt | typer.Abort):
+        return STOPPED, "Stopped. What was finished before is kept."
+    if isinstance(error, DslError):
+        return WRONG_INPUT, str(error)
+    if isinstance(error, _WrongUse):
+        return WRONG_INPUT, _usage(error)
+    if isinstance(error, OSError):
+        return WRONG_INPUT, _of_system(error)
+    if isinstance(error, MemoryError):
+        return WRONG_INPUT, "There is not enough memory. Use a smaller image, fewer bands, or another machine."
+    if isinstance(error, SystemExit):
+        return (error.code if isinstance(error.code, int) else BUG), ""
+    return BUG, (
+        f"This is a bug in dsl-scan ({type(error).__name__}: {error})."
+        " Give the command again with --debug and report what it prints."
+    )
+
+
+def _usage(error: BaseException) -> str:
+    """What was wrong with the command line, and which help to ask for."""
+    message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "dsl-scan"
+    return f"{message.rstrip('.')}. '{command} --help' lists what is possible."
+
+
+def _of_system(error: OSError) -> str:
+    where = f"{error.filename}: " if error.filename else ""
+    reason = error.strerror or str(error) or type(error).__name__
+    return f"{where}{reason}. Check the path, its permissions and the space on its drive."
+
+
+def _complain(code: int, sentence: str, kind: str, as_json: bool) -> int:
+    if as_json:
+        print(json.dumps({"error": {"kind": kind, "message": sentence}, "exit_code": code}))
+    if sentence:
+        print(sentence, file=sys.stderr)
+    return code
+
+
+def _leave_quietly() -> int:
+    """The reader of our output went away, as ``head`` does: not a fault."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return OK

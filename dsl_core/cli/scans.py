@@ -1,0 +1,175 @@
+"""Commands around capture: rigs, scenes, plan, scan, resume."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsl_core.cli.options import (
+    Code,
+    Comb,
+    Force,
+    Json,
+    Lines,
+    PlanChoice,
+    PlanFile,
+    RigName,
+    RigOptions,
+    Settings,
+    parse_options,
+)
+from dsl_core.cli.output import Output
+from dsl_core.errors import Cancelled, StoreError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from dsl_core.devices.base import DeviceRig
+    from dsl_core.model.plan import CapturePlan
+
+
+def rigs(json: Json = False) -> None:
+    """List the rigs that are installed."""
+    from dsl_core.devices.registry import list_rigs
+
+    output, entries = Output(json), list_rigs()
+    output.table(
+        ("rig", "package", "what it is"),
+        [(e.name, f"{e.package} {e.version}", e.error or e.description) for e in entries],
+    )
+    output.put(rigs=[vars(entry) for entry in entries])
+    output.finish()
+
+
+def scenes(json: Json = False) -> None:
+    """List the scenes of the twin and their options."""
+    from dsl_core.simulation.scenes import scene_catalogue
+
+    output, entries = Output(json), scene_catalogue()
+    output.table(
+        ("scene", "what it shows", "options with defaults"),
+        [(e.name, e.description, ", ".join(f"{k}={v}" for k, v in e.options.items())) for e in entries],
+    )
+    output.put(scenes=[vars(entry) for entry in entries])
+    output.finish()
+
+
+def plan(
+    target: Annotated[Path, typer.Argument(metavar="PLAN.json", help="File to write.")],
+    rig: RigName = "twin",
+    option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
+    code: Code = None,
+    lines: Lines = None,
+    comb: Comb = None,
+    setting: Settings = [],  # noqa: B006
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Write down what to capture, with frames, minutes and bytes."""
+    from dsl_core.capture.preflight import require_possible
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.plan_file import save_plan
+    from dsl_core.pipeline import fit_plan
+
+    output, choice = Output(json), PlanChoice(None, code, lines, comb, setting).build()
+    with open_rig(rig, parse_options(option)) as devices:
+        made = fit_plan(choice, devices)
+        _require_patterns(made)
+        require_possible(devices, made)
+        _state(output, made, target.parent, devices)
+    save_plan(made, target, overwrite=force)
+    output.say(f"The plan lies in {target}. Next: dsl-scan scan SCAN.dsl --plan {target} and the same rig.")
+    output.put(plan=target)
+    output.finish()
+
+
+def scan(
+    target: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="New folder for the frames.")],
+    rig: RigName = "twin",
+    option: RigOptions = [],  # noqa: B006
+    plan: PlanFile = None,
+    code: Code = None,
+    lines: Lines = None,
+    comb: Comb = None,
+    setting: Settings = [],  # noqa: B006
+    json: Json = False,
+) -> None:
+    """Capture a plan; every frame is safe on disk before the next is taken."""
+    from dsl_core import pipeline
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.origin import rig_notes
+    from dsl_core.io.session_manifest import MANIFEST_NAME
+
+    output, options = Output(json), parse_options(option)
+    choice = PlanChoice(plan, code, lines, comb, setting).build()
+    if (target / MANIFEST_NAME).exists():
+        raise StoreError(
+            f"{target} already holds a scan. Go on with it by 'dsl-scan resume {target}', or choose a new name."
+        )
+    with open_rig(rig, options) as devices:
+        fitted = choice if plan else pipeline.fit_plan(choice, devices)
+        _require_patterns(fitted)
+        _state(output, fitted, target, devices)
+        with output.progress() as progress, _resumable(target):
+            status = pipeline.scan(devices, fitted, target, progress, rig_notes(rig, options))
+    _done(output, target, status.done, status.elapsed_s)
+
+
+def resume(
+    target: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="Folder of the scan.")],
+    rig: Annotated[str | None, typer.Option("--rig", help="Another rig than the one the scan notes.")] = None,
+    option: RigOptions = [],  # noqa: B006
+    drift: Annotated[
+        bool, typer.Option("--drift-check/--no-drift-check", help="Compare two old frames before going on.")
+    ] = True,
+    json: Json = False,
+) -> None:
+    """Go on with a scan that was stopped, or killed, at its next missing frame."""
+    from dsl_core import pipeline
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.session import SessionReader
+
+    output = Output(json)
+    missing = len(SessionReader(target).missing())
+    output.say(f"{target} lacks {missing} frames.")
+    with open_rig(rig, parse_options(option)) if rig else pipeline.reopen_rig(target) as devices:
+        with output.progress() as progress, _resumable(target):
+            status = pipeline.resume(devices, target, progress, drift)
+    _done(output, target, status.done, status.elapsed_s)
+
+
+def _require_patterns(plan: CapturePlan) -> None:
+    """Raise `PlanError` when the plan's patterns cannot be made, before anything is written."""
+    from dsl_core.patterns.images import spectral_profiles
+
+    spectral_profiles(plan)
+
+
+def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) -> None:
+    """Say what a plan will take."""
+    from dsl_core.io.estimate import estimate
+
+    needs = estimate(plan, folder, devices.projector.info.latency_ms)
+    output.say(f"{devices.name}: {needs}.")
+    output.put(frames=needs.frames, minutes=round(needs.seconds / 60, 3))
+    output.put(needed_bytes=needs.needed_bytes, free_bytes=needs.free_bytes)
+
+
+def _done(output: Output, target: Path, frames: int, seconds: float) -> None:
+    output.say(f"All {frames} frames are stored in {target} ({seconds:.1f} s). Next: dsl-scan reconstruct {target}")
+    output.put(session=target, frames=frames, seconds=round(seconds, 2), state="finished")
+    output.finish()
+
+
+@contextmanager
+def _resumable(target: Path) -> Iterator[None]:
+    """Ctrl-C ends in the command that goes on."""
+    try:
+        yield
+    except (KeyboardInterrupt, Cancelled):
+        raise Cancelled(
+            f"Stopped; every frame taken so far is stored. Go on with: dsl-scan resume {target}"
+        ) from None

@@ -1,0 +1,114 @@
+"""What a folder or file of this program holds, in facts by name."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from dsl_core.errors import StoreError
+from dsl_core.io.plan_file import load_plan
+from dsl_core.io.result_file import load_result
+from dsl_core.io.rig_file import load_rig
+from dsl_core.io.session import SessionReader
+from dsl_core.io.session_check import find_problems
+from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.model.plan import CapturePlan
+
+Facts = dict[str, Any]
+
+
+def describe(path: Path, verify: bool = False) -> Facts:
+    """Facts about a session, result, calibration or plan; ``verify`` also reads every frame of a session.
+
+    Raises `StoreError` when the path is none of them, and the reader's own error when it is a damaged one.
+    """
+    if (path / MANIFEST_NAME).is_file():
+        return _session(path, verify)
+    if (path / "zarr.json").is_file():
+        return _result(path)
+    if path.is_file() and path.suffix.lower() == ".json":
+        return _json(path)
+    if not path.exists():
+        raise StoreError(f"{path} does not exist. Give a scan (NAME.dsl), a result, a rig or a plan.")
+    raise StoreError(
+        f"{path} is neither a session (it has no {MANIFEST_NAME}) nor a result (no zarr.json), nor the JSON file"
+        " of a rig or plan. For a published dataset use 'dsl-scan import'."
+    )
+
+
+def _session(path: Path, verify: bool) -> Facts:
+    reader = SessionReader(path)
+    manifest = reader.manifest
+    problems = find_problems(reader, verify)
+    return {
+        "kind": "session",
+        "created": manifest.created,
+        "rig": manifest.rig_name,
+        "camera": manifest.camera.model if manifest.camera else None,
+        "projector": manifest.projector.model if manifest.projector else None,
+        "calibration": manifest.calibration.name if manifest.calibration else None,
+        **_plan_facts(reader.plan),
+        "frames_stored": reader.plan.shot_count - len(reader.missing()),
+        "bytes": sum(file.stat().st_size for file in path.rglob("*") if file.is_file()),
+        "complete": not problems,
+        "checked": "every pixel" if verify else "names, sizes and log",
+        "problems": problems,
+        "notes": manifest.notes,
+    }
+
+
+def _result(path: Path) -> Facts:
+    import numpy as np
+
+    result = load_result(path)
+    facts: Facts = {
+        "kind": "result",
+        "size_px": [result.sizes["x"], result.sizes["y"]],
+        "variables": [str(name) for name in result.data_vars],
+    }
+    if "wavelength_nm" in result.coords:
+        centres = result["wavelength_nm"].values
+        facts["bands"] = f"{len(centres)} from {centres[0]:g} to {centres[-1]:g} nm"
+    if "depth_mm" in result:
+        depth = result["depth_mm"].values
+        known = depth[np.isfinite(depth)]
+        facts["pixels_with_depth"] = round(known.size / depth.size, 4)
+        if known.size:
+            facts["depth_mm"] = [round(float(v), 2) for v in (known.min(), np.median(known), known.max())]
+    return {**facts, "attributes": {str(key): value for key, value in result.attrs.items()}}
+
+
+def _json(path: Path) -> Facts:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path} is not JSON ({error}). The file may be cut off; restore it from a copy.") from error
+    keys = set(content) if isinstance(content, dict) else set()
+    if "camera_size_px" in keys or "spectral" in keys:
+        return {"kind": "plan", **_plan_facts(load_plan(path))}
+    if "film" not in keys and "response" not in keys:
+        raise StoreError(f"{path} holds neither a rig nor a plan. Give a file that dsl-scan wrote.")
+    rig = load_rig(path)
+    return {
+        "kind": "rig",
+        "name": rig.name,
+        "camera_px": [rig.camera.width_px, rig.camera.height_px],
+        "projector_px": [rig.projector.width_px, rig.projector.height_px],
+        "film_lines_per_mm": rig.film.lines_per_mm,
+        "depth_range_mm": list(rig.depth_range_mm),
+        "orders": sorted(rig.efficiency),
+        "provenance": rig.provenance.model_dump(),
+    }
+
+
+def _plan_facts(plan: CapturePlan) -> Facts:
+    return {
+        "plan": plan.name,
+        "frames": plan.shot_count,
+        "camera_px": list(plan.camera_size_px),
+        "projector_px": list(plan.projector_size_px),
+        "code_frames": plan.code_count,
+        "spectral_patterns": f"{plan.spectral_count} ({plan.spectral.kind})",
+        "settings": [f"{s.exposure_ms:.4g} ms at level {s.level:g}" for s in plan.settings],
+    }

@@ -1,0 +1,39 @@
+"""A capture plan as one JSON file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from dsl_core.errors import PlanError
+from dsl_core.io.staging import staged
+from dsl_core.model.plan import CapturePlan
+
+_MOST_PROBLEMS = 3
+
+
+def save_plan(plan: CapturePlan, path: Path, *, overwrite: bool = False) -> Path:
+    """Write a plan, whole or not at all, and return its path; raises `StoreError`."""
+    with staged([path], overwrite=overwrite) as (draft,):
+        draft.write_text(plan.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def load_plan(path: Path) -> CapturePlan:
+    """Read a plan; raises `PlanError` that names every field that is wrong."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise PlanError(f"The plan {path} cannot be read ({error}). 'dsl-scan plan' writes one.") from error
+    try:
+        return CapturePlan.model_validate_json(text)
+    except ValidationError as error:
+        problems = [
+            f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'].removeprefix('Value error, ')}"
+            for item in error.errors()
+        ]
+        raise PlanError(
+            f"The plan {path} is not valid: {'; '.join(problems[:_MOST_PROBLEMS])}."
+            " Correct it, or write a new one with 'dsl-scan plan'."
+        ) from error
