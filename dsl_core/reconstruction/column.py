@@ -33,7 +33,7 @@ MAX_CHI_SQUARE = 25.0
 
 @dataclass(frozen=True)
 class Column:
-    """Refined columns of some pixels: value and deviation (px), zero-order amplitude and its deviation, validity."""
+    """Refined columns of some pixels and their deviation (px), zero-order amplitude and its deviation."""
 
     column_px: Tensor
     std_px: Tensor
@@ -47,8 +47,9 @@ def refine(
 ) -> Column:
     """Refine decoded columns.
 
-    ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where saturated.
-    Where the fit fails, the decoded column stays with the deviation of a whole pixel, ``1/sqrt(12)``.
+    ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
+    saturated. Where the fit fails, the decoded column stays, with the deviation of a whole pixel,
+    ``1/sqrt(12)``.
     """
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
     q = coarse_px.clone()

@@ -19,7 +19,10 @@ from dsl_core.solve import banded
 
 
 def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
-    """Posterior of every pixel's spectrum from full normal equations (pixels, bands, bands) and (pixels, bands)."""
+    """Posterior of every pixel's spectrum from full normal equations.
+
+    ``data`` is (pixels, bands, bands), ``right`` (pixels, bands).
+    """
     bands = right.shape[1]
     shape = banded.to_dense(roughness(bands, data)[..., None])[0]
     ridge = torch.eye(bands).to(data) * prior.level_std**-2

@@ -23,14 +23,14 @@ from dsl_core.reconstruction.surface import Surface, reconstruct_surface
 
 #: A pixel is lit when white stands this many standard deviations above black.
 LIT_SIGMAS = 8.0
-#: The zero order must carry this share of the white signal; less means that only first orders reach the pixel.
+#: The zero order must carry this share of the white signal; with less, only first orders reach the pixel.
 ZERO_ORDER_SHARE = 0.4
 CHUNK = 16384
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """Maps (rows, columns): column, depth and their deviations, zero-order amplitude, dark offset, flags, surface."""
+    """Maps (rows, columns) of columns, depths and deviations, zero-order amplitude, dark offset and flags."""
 
     column_px: NDArray[np.float32]
     column_std_px: NDArray[np.float32]
@@ -142,8 +142,8 @@ def _flags(
 
     mark(~finite, Flag.NON_FINITE)
     mark(finite & ~lit, Flag.NO_LIGHT)
-    # A bit at the edge of a stripe is close to its inverse, but then both answers are one column apart and the
-    # refinement finds the right one; without it, or where it fails, the doubt stands.
+    # A bit at the edge of a stripe is close to its inverse, but then both answers are one column apart and
+    # the refinement finds the right one; without it, or where it fails, the doubt stands.
     mark(code.undecided.ravel() & ~refined & lit, Flag.CODE_UNSURE)
     if has_lines:
         # The amplitude is a lower bound of nothing: first orders alone never reach this share of white.

@@ -11,7 +11,7 @@ from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
 
 @dataclass(frozen=True)
 class LineSet:
-    """Virtual line ``i`` is centred on column ``first_px + step_px * i`` and shown by frame ``i mod frames``."""
+    """Virtual line ``i`` is centred on column ``first_px + step_px * i``, shown by frame ``i mod frames``."""
 
     width_px: int
     step_px: int

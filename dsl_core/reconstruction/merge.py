@@ -33,8 +33,8 @@ class MergedScan:
         for shot in self.plan.shots():
             self._shots.setdefault((shot.role, shot.pattern), []).append(shot)
         blacks = [black_frame([source.read(shot)], rig.sensor) for shot in self._shots["black", 0]]
-        # The noise of a black frame is the same for all frames of a pixel: it is no noise from frame to frame.
-        # What it shifts is measured later on unlit frames.
+        # The noise of a black frame is common to all frames of a pixel: it does not scatter between them.
+        # What it shifts is measured later, on unlit frames.
         self.blacks = [BlackFrame(black.mean, np.zeros_like(black.variance)) for black in blacks]
         self.gains_ms = setting_gains_ms(self.plan.settings, rig.projector_response)
         self._local = threading.local()
@@ -55,7 +55,7 @@ class MergedScan:
 
 @dataclass(frozen=True)
 class LineStack:
-    """Merged line frames: radiance (DN per ms) and deviation, each (frames, rows, columns); infinite = saturated."""
+    """Merged line frames (frames, rows, columns): radiance, DN per ms, and deviation, infinite if saturated."""
 
     radiance: NDArray[np.float32]
     std: NDArray[np.float16]

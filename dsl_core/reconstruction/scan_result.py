@@ -73,6 +73,8 @@ def assemble(
 def _spectral_flags(spectra: SpectralMaps) -> NDArray[np.uint16]:
     with np.errstate(invalid="ignore"):
         unreached = (spectra.data_share < DECIDED_FROM).any(0)
-    flags = np.where(unreached, np.uint16(int(Flag.BANDS_UNREACHED)), np.uint16(0))
-    flags |= np.where(spectra.chi_square > POOR_FIT_FROM, np.uint16(int(Flag.POOR_FIT)), np.uint16(0))
-    return flags | np.where(spectra.at_bound, np.uint16(int(Flag.AT_BOUND)), np.uint16(0))
+    flags = np.zeros(unreached.shape, np.uint16)
+    flags[unreached] |= np.uint16(int(Flag.BANDS_UNREACHED))
+    flags[spectra.chi_square > POOR_FIT_FROM] |= np.uint16(int(Flag.POOR_FIT))
+    flags[spectra.at_bound] |= np.uint16(int(Flag.AT_BOUND))
+    return flags

@@ -21,7 +21,13 @@ from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import halo_of_line
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
-from dsl_core.reconstruction.spectral_system import ORDERS, BandedAccumulator, Bands, dense_equations, lit_by_zero_order
+from dsl_core.reconstruction.spectral_system import (
+    ORDERS,
+    BandedAccumulator,
+    Bands,
+    dense_equations,
+    lit_by_zero_order,
+)
 from dsl_core.solve.banded import multiply
 
 #: Pixels of a tile; even numbers keep the Bayer phase.
@@ -72,14 +78,19 @@ class SpectralMaps:
     @classmethod
     def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
         """Maps full of NaN, to be filled by tiles."""
-        nan = [np.full((bands, *shape), np.nan, np.float32) for _ in range(3)]
+        cube = (bands, *shape)
         return cls(
-            *nan, np.zeros((bands, *shape), np.uint8), np.zeros(shape, bool), np.zeros(shape, np.float32)
+            reflectance=np.full(cube, np.nan, np.float32),
+            std=np.full(cube, np.nan, np.float32),
+            data_share=np.full(cube, np.nan, np.float32),
+            reach=np.zeros(cube, np.uint8),
+            at_bound=np.zeros(shape, bool),
+            chi_square=np.zeros(shape, np.float32),
         )
 
 
 class SpectralReconstruction:
-    """One scan's spectra: radiance and deviation stacks (frames, rows, columns) and what is known of its pixels."""
+    """One scan's spectra, from stacks of radiance and deviation (frames, rows, columns) and known pixels."""
 
     def __init__(
         self,
@@ -114,7 +125,7 @@ class SpectralReconstruction:
         torch.set_num_threads(1)
         try:
             with ThreadPoolExecutor(threads) as pool:
-                for done, _ in enumerate(pool.map(lambda tile: self._tile(*tile, out), tiles), 1):
+                for done, _ in enumerate(pool.map(lambda tile: self._tile(tile[0], tile[1], out), tiles), 1):
                     progress.report("spectra", done, len(tiles))
         finally:
             torch.set_num_threads(before)
@@ -127,7 +138,7 @@ class SpectralReconstruction:
                 yield slice(y, min(y + TILE[0], height)), slice(x, min(x + TILE[1], width))
 
     def _colour_weight(self) -> NDArray[np.float32]:
-        """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed section 7.1)."""
+        """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed 7.1)."""
         import cv2
 
         valid = np.flatnonzero(self.pixels.valid)
@@ -187,7 +198,7 @@ class SpectralReconstruction:
     def _colour_rows(
         self, flat: NDArray[np.intp], shading: Tensor, window: _Window, right: Tensor
     ) -> Tensor | None:
-        """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None where no pixel needs them."""
+        """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None if unneeded."""
         kappa = self._map(self.colour_weight, flat)
         if float(kappa.max()) < 1e-3:
             return None
@@ -213,10 +224,11 @@ class SpectralReconstruction:
         colour, _ = window.zero_order_colour()
         lit = lit_by_zero_order(self.rig, profiles, column)
         weight = 1 / (1 / weight + (DIRECT_ERROR * colour[:, None] * lit) ** 2)
+        width, height = self.plan.projector_size_px
+        inside = {order: f.inside(width, height, margin_px=EDGE_PX) for order, f in traced.items()}
         matrix, right, square = dense_equations(
-            self.rig, self.bands, profiles, column,
-            traced, {m: f.inside(*self.plan.projector_size_px, margin_px=EDGE_PX) for m, f in traced.items()}, radiance, weight,
-        )  # fmt: skip
+            self.rig, self.bands, profiles, column, traced, inside, radiance, weight
+        )
         spectra = solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
         radiance = (spectra.nodes * shading).T
         explained = (radiance * (2 * right - (matrix @ radiance[..., None])[..., 0])).sum(1)
@@ -302,7 +314,7 @@ class _Window:
         rgb = self._pick(demosaic(y, bayer))
         spread = self._pick(demosaic_variance(variance, bayer))
         weight = spread.addcmul_(rgb, rgb, value=MODEL_ERROR**2).reciprocal_()
-        # An infinite variance has weight zero by itself; a value that is no number must not survive the product.
+        # An infinite variance has weight zero by itself; what is no number must not survive the product.
         return torch.nan_to_num_(rgb, 0.0, 0.0, 0.0), torch.nan_to_num_(weight, 0.0, 0.0, 0.0)
 
     def _pick(self, images: Tensor) -> Tensor:

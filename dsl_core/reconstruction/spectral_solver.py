@@ -1,7 +1,7 @@
 """Smooth, bounded, weighted least squares for many spectra, with the smoothness found in each pixel's data.
 
-The prior is Gaussian: second differences of reflectance have the standard deviation ``tau``, levels a wide one.
-For each of a few values of tau the evidence of the data is computed from the same factorisation that
+The prior is Gaussian: second differences of reflectance have the standard deviation ``tau``, levels a wide
+one. For each of a few values of tau the evidence of the data is computed from the same factorisation that
 solves the system; a pixel takes the tau under which its data are most probable. Narrow peaks then get a
 loose prior and smooth spectra a tight one, from one setting. Bounds follow by an active-set iteration.
 """
@@ -16,7 +16,7 @@ from torch import Tensor
 from dsl_core.solve import banded
 
 #: Deviation between centre and mean of a band, relative to the second difference of its spectrum.
-WITHIN_BAND = 1 / 48
+WITHIN_BAND = 1 / 36
 #: Deviation against which local data are weighed in the data share.
 LOCAL_STD = 0.1
 #: How far outside a bound counts, how stiffly a bound holds, and how often bands change sides.
@@ -35,7 +35,7 @@ class Prior:
 
 @dataclass(frozen=True)
 class Spectra:
-    """Node values, band means, their deviation and data share, (bands, pixels); chosen tau (pixels,); bound mask."""
+    """Node values, band means, deviation, data share, bound mask (bands, pixels); chosen tau (pixels,)."""
 
     nodes: Tensor
     mean: Tensor
@@ -59,7 +59,10 @@ class Posterior:
     """One factorisation of data and prior: banded plus a few broad-band rows, or full."""
 
     def __init__(self, data: Tensor, prior: Tensor, rows: Tensor | None) -> None:
-        """``data`` banded (bandwidth + 1, bands, pixels); ``prior`` (3, bands, 1 or pixels); ``rows`` (bands, n, pixels)."""
+        """Factorise: ``data`` (bandwidth + 1, bands, pixels) and ``prior`` (3, bands, 1 or pixels).
+
+        ``rows`` (bands, n, pixels) are weighted broad-band equations.
+        """
         matrix = data.clone()
         matrix[:3] += prior
         self.matrix, self.rows = matrix, rows
@@ -78,7 +81,7 @@ class Posterior:
         return value
 
     def solve(self, right: Tensor) -> Tensor:
-        """Solution for a right side (bands, pixels), by the Woodbury identity where there are broad-band rows."""
+        """Solution for a right side (bands, pixels); by the Woodbury identity with broad-band rows."""
         x = banded.solve(self.factor, right)
         if self.rows is not None:
             seen = torch.einsum("jap,jp->pa", self.rows, x)
@@ -87,7 +90,7 @@ class Posterior:
         return x
 
     def band_mean_variance(self) -> Tensor:
-        """Variance of the band means, (bands, pixels); the outermost two, never reported, repeat their neighbours."""
+        """Variance of the band means, (bands, pixels); the outermost repeat their neighbours."""
         diagonal, first, second = banded.inverse_band(self.factor)[:3]
         inner = (
             diagonal[:-2]
@@ -113,8 +116,9 @@ def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> T
 def solve_spectra(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior) -> Spectra:
     """Posterior of every pixel's spectrum.
 
-    ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal equations in
-    reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are already in ``right``.
+    ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal
+    equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are already in
+    ``right``.
     """
     if data.shape[0] < 3:
         data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))
@@ -201,7 +205,7 @@ def _bounded(
     mean: Tensor,
     bounds: tuple[float, float],
 ) -> tuple[Tensor, Tensor]:
-    """Minimum inside the bounds by an active-set iteration on the pixels that need it, and the active bands."""
+    """Minimum inside the bounds by an active-set iteration where it is needed, and the active bands."""
     low, high = bounds
     active = torch.zeros_like(mean, dtype=torch.bool)
     todo = torch.nonzero(((mean < low - TOLERANCE) | (mean > high + TOLERANCE)).any(0)).ravel()

@@ -52,7 +52,7 @@ class Bands:
         """Extend a grid and integrate the rig's response over its bands."""
         pad = math.ceil(PAD_NM / grid.step_nm)
         step = grid.step_nm
-        centres = grid.start_nm + step * np.arange(-pad, grid.count + pad)
+        centres = np.asarray(grid.start_nm + step * np.arange(-pad, grid.count + pad), np.float64)
         moments, centroids = {}, {}
         for order in (0, *ORDERS):
             moments[order], centroids[order] = hat_moments(rig, order, centres, step)
@@ -209,10 +209,12 @@ def dense_equations(
     radiance: Tensor,
     weight: Tensor,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Full matrix (pixels, bands, bands), right side (pixels, bands) and sum of squares (pixels,) of unit shading.
+    """Normal equations of unit shading for any pattern set.
 
+    Full matrix (pixels, bands, bands), right side (pixels, bands) and weighted sum of squares (pixels,).
     ``profiles`` (frames, width, LEDs) are radiances relative to full drive; ``radiance`` and ``weight`` are
-    (3, frames, pixels). The zero order is part of the model: patterns may light a pixel by several orders at once.
+    (3, frames, pixels). The zero order is part of the model, as patterns may light a pixel by several orders
+    at once.
     """
     frames, pixels = radiance.shape[1:]
     model = torch.zeros((pixels, 3, frames, bands.count), device=radiance.device, dtype=radiance.dtype)

@@ -63,7 +63,7 @@ def _box(values: Map, window: int) -> Map:
 
 
 def _plane_fits(rays: Map, inverse: Map, weight: Map, window: int) -> tuple[Map, Map, Map, Map]:
-    """Coefficients (3, ...), their unit covariance (xx, xy, yy), weighted mean square residual, pixel count."""
+    """Coefficients (3, ...), unit covariance (xx, xy, yy), weighted mean square residual, pixel count."""
     x, y = rays[0], rays[1]
     total = np.maximum(_box(weight, window), 1e-30)
 
