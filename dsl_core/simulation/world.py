@@ -12,6 +12,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.truth import Scene, SceneTruth
+from dsl_core.solve.threads import one_kernel_thread
 
 
 @dataclass
@@ -71,7 +72,8 @@ class World:
     def renderer(self) -> Renderer:
         """Renderer of the scene as it stands."""
         if self._renderer is None:
-            self._renderer = Renderer(self.rig, self.truth, film=self.film, device=self.device)
+            with one_kernel_thread():
+                self._renderer = Renderer(self.rig, self.truth, film=self.film, device=self.device)
         return self._renderer
 
     def rate(self) -> NDArray[np.float32]:
@@ -79,7 +81,8 @@ class World:
         if self._rate is None:
             shape = (self.rig.projector.height_px, self.rig.projector.width_px, 3)
             image = np.zeros(shape, np.uint8) if self.image is None else self.image
-            self._rate = self.renderer.expected(image) + np.float32(self.ambient_dn_per_ms)
+            with one_kernel_thread():
+                self._rate = self.renderer.expected(image) + np.float32(self.ambient_dn_per_ms)
         return self._rate
 
     def expose(self, exposure_ms: float, shot: int, attempt: int = 0) -> NDArray[np.uint16]:
