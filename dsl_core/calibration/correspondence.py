@@ -1,0 +1,243 @@
+"""The data-driven correspondence of seed section 4, fitted to samples of a flat target on a stage.
+
+At every node of a grid over the camera image, and for every order and filter wavelength, the projector
+column that lights the node is known at a few depths. Eq. (2) of the seed is fitted to them::
+
+    q = alpha * z**beta + gamma
+
+For a given exponent the other two are linear, so that only the exponent is searched (variable projection):
+first on a fixed set, which no start value can mislead, then by golden sections, all nodes at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import CorrespondenceGrid, Rig
+from dsl_core.optics.correspondence import GratingModel
+
+Floats = NDArray[np.float64]
+
+#: The published sampling: grid of 48 x 85 nodes, filters in nm.
+GRID = (48, 85)
+PUBLISHED_NM = (430.0, 600.0, 610.0, 620.0, 640.0, 650.0, 660.0)
+DEPTH_UNIT_MM = 1000.0
+#: Exponents that are searched. A point seen off the projector's axis moves as 1/z; lens distortion and film
+#: bend change that a little. Near zero the model degenerates to a line in log z, which is left out.
+EXPONENTS = np.concatenate([np.linspace(-4.0, -0.1, 40), np.linspace(0.1, 2.0, 20)])
+GOLDEN_STEPS = 30
+#: Residuals beyond this many robust deviations are wrong samples (a lost peak, a neighbouring order).
+OUTLIER_SIGMAS = 6.0
+#: Columns are never better than this (px), so that exact samples have no outliers.
+FLOOR_PX = 0.02
+ROBUST_ROUNDS = 3
+#: Depths a node needs, and nodes a wavelength needs to carry the polynomials of this degree.
+MIN_DEPTHS, MIN_NODES, DEGREE = 3, 20, 3
+
+
+@dataclass(frozen=True)
+class GridSamples:
+    """Measured columns (px) on a grid; NaN where no peak was found.
+
+    ``columns_px`` has shape (orders, wavelengths, depths, rows, columns).
+    """
+
+    orders: tuple[int, ...]
+    wavelengths_nm: Floats
+    depths_mm: Floats
+    rows_px: Floats
+    columns_at_px: Floats
+    columns_px: Floats
+
+
+@dataclass(frozen=True)
+class GridFit:
+    """The fitted model, residuals (px) shaped like the samples (NaN where unused), and a sentence on them."""
+
+    grid: CorrespondenceGrid
+    residual_px: Floats
+
+    @property
+    def rms_px(self) -> float:
+        """Root mean square of the used residuals."""
+        return float(np.sqrt(np.nanmean(self.residual_px**2)))
+
+    @property
+    def used_share(self) -> float:
+        """Share of the samples that the fit used."""
+        return float(np.isfinite(self.residual_px).mean())
+
+
+def grid_nodes(rig: Rig, grid: tuple[int, int] = GRID) -> tuple[Floats, Floats]:
+    """Rows and columns (px) of a grid over the whole camera image, edges included."""
+    rows = np.linspace(0, rig.camera.height_px - 1, grid[0])
+    columns = np.linspace(0, rig.camera.width_px - 1, grid[1])
+    return rows, columns
+
+
+def sample_grating(
+    rig: Rig,
+    depths_mm: Floats,
+    wavelengths_nm: Floats,
+    orders: tuple[int, ...] = (1, -1),
+    grid: tuple[int, int] = GRID,
+) -> GridSamples:
+    """Samples of a rig's analytic model at whole camera pixels; NaN outside the projector's frame."""
+    rows, columns = (np.unique(np.round(nodes)) for nodes in grid_nodes(rig, grid))
+    flat = (rows[:, None] * rig.camera.width_px + columns).astype(np.int64).ravel()
+    pixels, model = torch.as_tensor(flat), GratingModel(rig)
+    values = np.empty((len(orders), len(wavelengths_nm), len(depths_mm), len(rows), len(columns)))
+    for i, order in enumerate(orders):
+        for k, depth in enumerate(depths_mm):
+            at = torch.full((flat.size,), float(depth), dtype=torch.float64)
+            seen = model.exact(pixels, at, order, wavelengths_nm)
+            inside = seen.inside(rig.projector.width_px, rig.projector.height_px)
+            lit = torch.where(inside, seen.columns, torch.nan).numpy()
+            values[i, :, k] = lit.reshape(len(wavelengths_nm), len(rows), len(columns))
+    return GridSamples(orders, np.asarray(wavelengths_nm), np.asarray(depths_mm), rows, columns, values)
+
+
+def fit_grid(samples: GridSamples) -> GridFit:
+    """Fit Eq. (2) of the seed at every node, order and wavelength, leaving wrong samples out.
+
+    Alpha, beta and gamma of a node nearly compensate each other, so that noise moves all three; the exponents
+    are therefore smoothed over the image and the other two fitted again, which keeps them fit to be
+    interpolated. Nodes that too few depths reach are extrapolated. Raises `CalibrationError` when depths,
+    wavelengths or samples do not suffice.
+    """
+    _check(samples)
+    maps = np.empty((*samples.columns_px.shape[:2], len(samples.rows_px), len(samples.columns_at_px), 3))
+    residual = np.full_like(samples.columns_px, np.nan)
+    for order, nm in np.ndindex(maps.shape[:2]):
+        values = samples.columns_px[order, nm]
+        name = f"Order {samples.orders[order]:+d} at {samples.wavelengths_nm[nm]:g} nm"
+        maps[order, nm], residual[order, nm] = _fit_map(values, samples, name)
+    return GridFit(_record(samples, maps), residual)
+
+
+def _fit_map(values: Floats, samples: GridSamples, name: str) -> tuple[Floats, Floats]:
+    """Coefficients (rows, columns, 3) and residuals of samples (depths, rows, columns) of one wavelength."""
+    shape = values.shape[1:]
+    z = samples.depths_mm / DEPTH_UNIT_MM
+    q = values.reshape(len(z), -1).T
+    used = np.isfinite(q)
+    for _ in range(ROBUST_ROUNDS):
+        enough = used.sum(1) >= MIN_DEPTHS
+        if enough.sum() < MIN_NODES:
+            raise CalibrationError(
+                f"{name} was found at {MIN_DEPTHS} or more depths at only {enough.sum()} grid nodes;"
+                f" {MIN_NODES} are needed. Check the filter and the exposure, or leave this wavelength out."
+            )
+        beta, weight = np.full(len(q), np.nan), np.zeros(len(q))
+        beta[enough] = _exponents(z, q[enough], used[enough])
+        weight[enough] = _sensitivity(beta[enough], z, q[enough], used[enough])
+        beta = _smooth(beta.reshape(shape), weight.reshape(shape)).ravel()
+        linear = np.full((len(q), 2), np.nan)
+        linear[enough] = _linear(beta[enough], z, q[enough], used[enough])[1]
+        residual = q - (linear[:, :1] * z ** beta[:, None] + linear[:, 1:])
+        wrong = used & (np.abs(residual) > _outlier_limit(residual, used))
+        if not wrong.any():
+            break
+        used &= ~wrong
+    alpha, gamma = (_filled(part.reshape(shape)) for part in linear.T)
+    kept = np.where(used & enough[:, None], residual, np.nan)
+    return np.stack([alpha, beta.reshape(shape), gamma], -1), kept.T.reshape(values.shape)
+
+
+def _check(samples: GridSamples) -> None:
+    if (
+        len(set(samples.depths_mm.tolist())) < 3
+        or np.ptp(samples.depths_mm) < 0.05 * samples.depths_mm.mean()
+    ):
+        raise CalibrationError(
+            f"The correspondence needs samples at three or more depths that differ; given are"
+            f" {', '.join(f'{z:g}' for z in samples.depths_mm)} mm. Move the stage further between scans."
+        )
+    if len(samples.wavelengths_nm) < 2 or (np.diff(samples.wavelengths_nm) <= 0).any():
+        raise CalibrationError(
+            "The correspondence needs two or more wavelengths in rising order, given are"
+            f" {', '.join(f'{nm:g}' for nm in samples.wavelengths_nm)} nm. Add bandpass filters or sort them."
+        )
+    if min(len(samples.rows_px), len(samples.columns_at_px)) < 2:
+        raise CalibrationError("The correspondence needs a grid of at least 2 x 2 camera pixels.")
+
+
+def _exponents(z: Floats, q: Floats, used: NDArray[np.bool_]) -> Floats:
+    """Exponents (nodes,) that minimise the squared residuals of used samples (nodes, depths)."""
+    costs = np.stack([_linear(np.full(len(q), beta), z, q, used)[0] for beta in EXPONENTS])
+    best = costs.argmin(0)
+    low = EXPONENTS[np.maximum(best - 1, 0)]
+    high = EXPONENTS[np.minimum(best + 1, len(EXPONENTS) - 1)]
+    ratio = (np.sqrt(5) - 1) / 2
+    for _ in range(GOLDEN_STEPS):
+        left, right = high - ratio * (high - low), low + ratio * (high - low)
+        smaller = _linear(left, z, q, used)[0] < _linear(right, z, q, used)[0]
+        low, high = np.where(smaller, low, left), np.where(smaller, right, high)
+    return np.asarray(0.5 * (low + high))
+
+
+def _sensitivity(beta: Floats, z: Floats, q: Floats, used: NDArray[np.bool_]) -> Floats:
+    """Information (nodes,) that samples hold on the exponent, per variance of a sample."""
+    alpha = _linear(beta, z, q, used)[1][:, :1]
+    slope = alpha * np.log(z) * z ** beta[:, None]
+    return _linear(beta, z, slope, used)[0]
+
+
+def _linear(beta: Floats, z: Floats, q: Floats, used: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Cost (nodes,) and alpha, gamma (nodes, 2) for given exponents, by centred sums."""
+    power = z ** beta[:, None]
+    count = used.sum(1)
+    mean_p = np.where(used, power, 0).sum(1) / count
+    mean_q = np.where(used, q, 0).sum(1) / count
+    dp = np.where(used, power - mean_p[:, None], 0.0)
+    dq = np.where(used, q - mean_q[:, None], 0.0)
+    alpha = (dp * dq).sum(1) / np.maximum((dp * dp).sum(1), 1e-30)
+    cost = ((dq - alpha[:, None] * dp) ** 2).sum(1)
+    return cost, np.stack([alpha, mean_q - alpha * mean_p], 1)
+
+
+def _outlier_limit(residual: Floats, used: NDArray[np.bool_]) -> float:
+    """Limit (px) from the median absolute residual of all nodes."""
+    median = float(np.median(np.abs(residual[used & np.isfinite(residual)])))
+    return OUTLIER_SIGMAS * max(1.4826 * median, FLOOR_PX)
+
+
+def _smooth(values: Floats, weight: Floats) -> Floats:
+    """Weighted cubic polynomial of a map (rows, columns), everywhere; robust by cutting the weights."""
+    v, u = (np.linspace(-1, 1, n) for n in values.shape)
+    terms = [np.outer(v**i, u**j).ravel() for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
+    basis = np.stack(terms, 1)
+    # No node outweighs typical ones much: at the edge of the image a few would else decide everywhere.
+    known = weight.ravel() > 0
+    root = np.sqrt(np.minimum(weight.ravel()[known], 4 * np.median(weight.ravel()[known])))
+    solution = np.linalg.lstsq(basis[known] * root[:, None], values.ravel()[known] * root, rcond=None)[0]
+    return np.asarray((basis @ solution).reshape(values.shape))
+
+
+def _filled(values: Floats) -> Floats:
+    """Extrapolate a map smoothly into nodes without a value: polynomial plus the nearest node's deviation."""
+    from scipy.ndimage import distance_transform_edt
+
+    missing = ~np.isfinite(values)
+    if not missing.any():
+        return values
+    trend = _smooth(np.where(missing, 0.0, values), (~missing).astype(float))
+    nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
+    return np.asarray(np.where(missing, trend + (values - trend)[tuple(nearest)], values))
+
+
+def _record(samples: GridSamples, maps: Floats) -> CorrespondenceGrid:
+    return CorrespondenceGrid(
+        orders=samples.orders,
+        wavelengths_nm=tuple(samples.wavelengths_nm.tolist()),
+        rows_px=tuple(samples.rows_px.tolist()),
+        columns_px=tuple(samples.columns_at_px.tolist()),
+        depth_unit_mm=DEPTH_UNIT_MM,
+        depth_range_mm=(float(samples.depths_mm.min()), float(samples.depths_mm.max())),
+        coefficients=tuple(maps.ravel().tolist()),
+    )

@@ -1,0 +1,86 @@
+"""A small scan of the twin through both correspondence models and both spectral solvers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core import pipeline
+from dsl_core.calibration.correspondence import fit_grid, sample_grating
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import PlanError
+from dsl_core.evaluation.summary import Evaluation
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.result import build_result
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.reconstruction.published_objective import AdamOptions, PublishedReconstruction
+from dsl_core.reconstruction.spectra import SpectralReconstruction
+from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
+
+GRID = WavelengthGrid(step_nm=10.0)
+
+
+@pytest.fixture(scope="module")
+def scanned() -> tuple[DeviceRig, MemoryScan]:
+    """A plane of the ColorChecker's patches at 112 x 72 pixels."""
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
+    return twin_scan(plan, size="112x72", scene="color-checker")
+
+
+def grid_rig(rig: Rig) -> Rig:
+    samples = sample_grating(rig, np.linspace(500, 1000, 5), np.linspace(430, 660, 7), grid=(12, 16))
+    return rig.model_copy(update={"correspondence": fit_grid(samples).grid})
+
+
+def evaluate(scanned: tuple[DeviceRig, MemoryScan], cube: NDArray[np.float32]) -> Evaluation:
+    truth = pipeline.twin_truth(scanned[0], GRID)
+    assert truth is not None
+    return pipeline.evaluate(build_result({"reflectance": cube}, GRID.centres_nm, {}), truth)
+
+
+def test_both_correspondence_models_give_the_same_spectra(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    rig = grid_rig(devices.calibration)
+    of = {
+        name: pipeline.reconstruct(scan, rig, pipeline.Options(grid=GRID, correspondence=name))
+        for name in ("grating", "grid")
+    }
+    with np.errstate(invalid="ignore"):
+        difference = np.abs(of["grid"]["reflectance"].values - of["grating"]["reflectance"].values)
+    assert np.isfinite(difference).mean() > 0.5
+    assert np.nanmedian(difference) < 0.01
+    assert np.nanmax(difference) > 0
+
+
+def test_published_objective_is_close_and_the_banded_solver_closer(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    rig = devices.calibration
+    assert rig is not None
+    stack, pixels = solver_input(rig, scan)
+    model = correspondence(rig)
+    banded = SpectralReconstruction(rig, scan.plan, GRID, model, stack.radiance, stack.std, pixels).run()
+    published = PublishedReconstruction(
+        rig, scan.plan, GRID, model, stack.radiance, stack.std, pixels, options=AdamOptions(steps=250)
+    ).run()
+    assert np.array_equal(np.isfinite(published.reflectance).all(0), pixels.valid)
+    assert np.isnan(published.std).all()
+    ours, theirs = (evaluate(scanned, maps.reflectance) for maps in (banded, published))
+    assert theirs.mean("rmse") < 0.06
+    assert ours.mean("rmse") < theirs.mean("rmse")
+    assert ours.mean("pixel_angle_rad") < theirs.mean("pixel_angle_rad")
+
+
+def test_published_objective_refuses_several_lines_a_frame(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    devices, scan = scanned
+    rig = devices.calibration
+    assert rig is not None
+    stack, pixels = solver_input(rig, scan)
+    plan = scan.plan.model_copy(update={"spectral": LineComb()})
+    with pytest.raises(PlanError, match="one line per frame"):
+        PublishedReconstruction(rig, plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
