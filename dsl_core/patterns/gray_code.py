@@ -78,11 +78,12 @@ class DecodedCode:
     """What a Gray code says of each camera pixel; arrays share one shape.
 
     ``column`` and ``row`` are projector pixels, int32, -1 where ``undecided``; ``row`` is None when rows
-    are not coded. ``margin`` is the smallest ``|positive - inverse|`` over all bits, float32, in the
+    are not coded. ``likely_column`` is the better guess there too, within the projector. ``margin`` is the smallest ``|positive - inverse|`` over all bits, float32, in the
     unit of the input; ``margin_sigmas`` the smallest in standard deviations, None when none were given.
     """
 
     column: NDArray[np.int32]
+    likely_column: NDArray[np.int32]
     row: NDArray[np.int32] | None
     margin: NDArray[np.float32]
     margin_sigmas: NDArray[np.float32] | None
@@ -151,6 +152,7 @@ class GrayDecoder:
         undecided = ~decided
         return DecodedCode(
             column=_without(self._column, undecided),
+            likely_column=self._column.clip(0, self._size_px[0] - 1),
             row=_without(self._row, undecided) if self._bits[1] else None,
             margin=self._margin,
             margin_sigmas=self._margin_sigmas,

@@ -59,7 +59,8 @@ def reconstruct_geometry(
 ) -> Geometry:
     """Refine decoded columns on the line frames, triangulate, and fit the surface."""
     shape = code.column.shape
-    coarse = code.column.astype(np.float32).ravel()
+    # Also where a bit is undecided: its two answers are neighbours, and the refinement tells them apart.
+    coarse = code.likely_column.astype(np.float32).ravel()
     maps = {name: np.empty(coarse.size, np.float32) for name in ("q", "dq", "a", "da", "offset")}
     refined = np.zeros(coarse.size, bool)
     depth, slope = np.empty(coarse.size), np.empty(coarse.size)

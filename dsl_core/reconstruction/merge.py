@@ -55,7 +55,7 @@ class MergedScan:
 
 @dataclass(frozen=True)
 class LineStack:
-    """Merged line frames (frames, rows, columns): radiance, DN per ms, and deviation, infinite if saturated."""
+    """Merged line frames (frames, rows, columns): radiance (DN per ms), deviation (infinite: saturated)."""
 
     radiance: NDArray[np.float32]
     std: NDArray[np.float16]

@@ -117,8 +117,8 @@ def solve_spectra(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior
     """Posterior of every pixel's spectrum.
 
     ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal
-    equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are already in
-    ``right``.
+    equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are
+    already in ``right``.
     """
     if data.shape[0] < 3:
         data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))

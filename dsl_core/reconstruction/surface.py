@@ -43,6 +43,9 @@ def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: i
     weight = np.where(valid, 1 / np.maximum(std, 1e-9) ** 2, 0.0)
     weight = weight / (weight.max(initial=0) or 1.0)
     fit, covariance, mean_square, count = _plane_fits(rays, inverse, weight, window)
+    fit, covariance, mean_square, count = _best_window(
+        rays, inverse, window // 2, fit, covariance, mean_square, count
+    )
     noise = np.sqrt(np.maximum(_box(weight * std**2, window), 0) / np.maximum(_box(weight, window), 1e-30))
     normal, spread = _normals(fit, covariance, noise)
     # Curvature bends smooth surfaces away from their tangent plane; a jump is many times that and the noise.
@@ -80,6 +83,32 @@ def _plane_fits(rays: Map, inverse: Map, weight: Map, window: int) -> tuple[Map,
     count = _box((weight > 0).astype(float), window) * window**2
     unit = np.stack([c, -b, a]) / (determinant * np.maximum(count, 1))
     return np.stack([alpha, beta, level - alpha * mx - beta * my]), unit, residual, count
+
+
+def _best_window(
+    rays: Map, inverse: Map, shift: int, fit: Map, unit: Map, residual: Map, count: Map
+) -> tuple[Map, Map, Map, Map]:
+    """For each pixel the window, centred or beside it, whose plane explains it best (Kuwahara's idea).
+
+    A centred window mixes both sides of a depth jump; one that lies on the pixel's own side does not.
+    """
+    stack = np.concatenate([fit, unit, residual[None], count[None]])
+    best = stack.copy()
+    enough = 0.5 * count.max(initial=1)
+
+    def cost(maps: Map) -> Map:
+        miss = maps[0] * rays[0] + maps[1] * rays[1] + maps[2] - inverse
+        return np.where(maps[7] >= enough, miss**2 + np.maximum(maps[6], 0), np.inf)
+
+    # A window beside the pixel must be clearly better: noise alone should not choose it.
+    lowest = 0.5 * cost(stack)
+    for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+        moved = np.roll(stack, (dy * shift, dx * shift), axis=(1, 2))
+        here = cost(moved)
+        better = here < lowest
+        lowest = np.where(better, here, lowest)
+        best[:, better] = moved[:, better]
+    return best[:3], best[3:6], best[6], best[7]
 
 
 def _normals(fit: Map, unit: Map, noise: Map) -> tuple[Map, Map]:
