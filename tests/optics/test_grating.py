@@ -1,0 +1,122 @@
+"""The film's ray equations: closed form, sign of the orders, convergence, interpolation over wavelength."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.model.rig import Film, Rig
+from dsl_core.optics import grating
+from dsl_core.optics.correspondence import GratingModel, projector_points, zero_order
+from dsl_core.optics.grating import FilmFrame, Vectors, diffract, incoming_direction
+from dsl_core.optics.pinhole import project
+from dsl_core.simulation.published_rig import published_rig
+
+BANDS_NM = np.arange(430.0, 661.0, 5.0)
+NM = torch.tensor([430.0, 550.0, 660.0], dtype=torch.float64)
+
+
+def sampled(rig: Rig, count: int = 400) -> tuple[torch.Tensor, torch.Tensor]:
+    """Random pixels and depths, float64."""
+    rng = np.random.default_rng(5)
+    pixels = rng.integers(0, rig.camera.width_px * rig.camera.height_px, count)
+    return torch.as_tensor(pixels), torch.as_tensor(rng.uniform(520.0, 980.0, count))
+
+
+def point(x: float, y: float, z: float) -> Vectors:
+    return Vectors(*(torch.tensor([v], dtype=torch.float64) for v in (x, y, z)))
+
+
+@pytest.mark.parametrize("order", [1, -1, 2])
+def test_flat_film_and_far_point_obey_the_grating_equation(order: int) -> None:
+    frame = FilmFrame.of(Film(lines_per_mm=500.0))
+    direction = incoming_direction(frame, point(0.0, 0.0, 1e9), order, NM)
+    # Leaving along the axis (a' = 0) through order m needs light that arrives with a = m * wavelength / period.
+    assert direction.x.numpy() == pytest.approx(order * NM.numpy() / 2000.0, abs=1e-6)
+    assert direction.y.abs().max() < 1e-12
+    length = direction.x**2 + direction.y**2 + direction.z**2
+    assert (length - 1).abs().max() < 1e-9
+
+
+def test_order_plus_one_comes_from_columns_right_of_the_zero_order() -> None:
+    rig = published_rig()
+    pixels, depth = sampled(rig)
+    zero = zero_order(rig, pixels, depth)[0]
+    model = GratingModel(rig)
+    plus, minus = (model.exact(pixels, depth, order, BANDS_NM).columns for order in (1, -1))
+    assert (plus > zero).all()
+    assert (minus < zero).all()
+    # Red is bent more than blue, by about half a column a nanometre (measured on the prototype).
+    slope = (plus[-1] - plus[0]) / (BANDS_NM[-1] - BANDS_NM[0])
+    inside = (plus > 0) & (plus < 639)
+    assert (slope > 0).all()
+    assert float(slope[inside.all(0)].mean()) == pytest.approx(0.49, abs=0.03)
+
+
+def test_diffraction_changes_only_the_cosine_across_the_lines() -> None:
+    a, b = torch.tensor([0.1, -0.2]), torch.tensor([0.3, 0.05])
+    out = diffract(a, b, 1, 0.25)
+    assert torch.equal(out.y, b)
+    assert torch.allclose(out.x, a - 0.25)
+    assert torch.allclose(out.x**2 + out.y**2 + out.z**2, torch.ones(2))
+    assert torch.isnan(diffract(torch.tensor([-0.9]), torch.tensor([0.3]), 1, 0.3).z).all()
+
+
+def test_light_traced_forward_through_the_film_meets_the_point() -> None:
+    frame = FilmFrame.of(Film(tilt_x_deg=2.0, tilt_y_deg=-1.0, roll_deg=1.5))
+    target = point(40.0, -60.0, 700.0)
+    out = frame.to_film(incoming_direction(frame, target, 1, NM))
+    distance = (frame.axes @ np.array([0.0, 0.0, frame.distance_mm]))[2]
+    scale = distance / out.z
+    leaving = diffract(out.x, out.y, 1, NM / frame.period_nm)
+    goal = frame.to_film(target)
+    along = (goal.z - distance) / leaving.z
+    assert (out.x * scale + leaving.x * along - goal.x).abs().max() < 1e-3
+    assert (out.y * scale + leaving.y * along - goal.y).abs().max() < 1e-3
+
+
+def test_iteration_has_converged(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = published_rig()
+    pixels, depth = sampled(rig)
+    few = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
+    monkeypatch.setattr(grating, "ITERATIONS", 60)
+    many = GratingModel(rig).exact(pixels, depth, 1, BANDS_NM)
+    inside = many.inside(640, 360)
+    assert (few.columns - many.columns)[inside].abs().max() < 3e-4
+    assert (few.rows - many.rows)[inside].abs().max() < 3e-4
+
+
+def test_interpolation_over_wavelength_is_exact_to_a_hundredth_column() -> None:
+    rig = published_rig()
+    pixels, depth = sampled(rig, 4000)
+    model = GratingModel(rig)
+    for order in (1, -1):
+        exact = model.exact(pixels, depth, order, BANDS_NM)
+        error = (model.trace(pixels, depth, order, BANDS_NM).columns - exact.columns).abs()
+        # The lens model is not smooth far outside the frame; pixels whose spectrum ends there err more.
+        inside = exact.inside(640, 360)
+        assert error[:, inside.all(0)].max() < 0.01
+        assert error[inside].quantile(0.99) < 0.01
+
+
+def test_zero_order_is_the_pinhole() -> None:
+    rig = published_rig()
+    pixels, depth = sampled(rig)
+    column, row = project(rig.projector, *projector_points(rig, pixels, depth))
+    footprint = GratingModel(rig).trace(pixels, depth, 0, BANDS_NM)
+    assert torch.equal(footprint.columns, column.expand(47, -1))
+    assert torch.equal(footprint.rows, row.expand(47, -1))
+    camera = rig.camera
+    x, y = (100 - camera.cx_px) / camera.fx_px, (200 - camera.cy_px) / camera.fy_px
+    assert math.hypot(x, y) < 0.3
+
+
+def test_film_of_no_lines_bends_nothing() -> None:
+    frame = FilmFrame.of(Film(lines_per_mm=1e-6, bend_per_mm=0.002, tilt_x_deg=3.0))
+    target = point(50.0, 20.0, 600.0)
+    direction = incoming_direction(frame, target, 1, NM)
+    assert (direction.x / direction.z - target.x / target.z).abs().max() < 1e-7
+    assert (direction.y / direction.z - target.y / target.z).abs().max() < 1e-7

@@ -1,0 +1,43 @@
+"""The lens model against OpenCV and against itself."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from dsl_core.errors import CalibrationError
+from dsl_core.optics.pinhole import distort, pixel_rays, project, undistort
+from dsl_core.simulation.published_rig import published_rig
+
+LENS = published_rig().camera
+
+
+def test_undistort_inverts_distort_inside_the_image() -> None:
+    x, y = np.meshgrid(np.linspace(-0.25, 0.27, 41), np.linspace(-0.17, 0.17, 31))
+    there = distort(x, y, LENS.distortion)
+    back = undistort(*there, LENS.distortion)
+    assert max(np.abs(back[0] - x).max(), np.abs(back[1] - y).max()) < 1e-11
+    assert np.abs(there[0] - x).max() > 1e-3
+
+
+def test_projection_is_that_of_opencv() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform((-120, -90, 500), (120, 90, 900), (200, 3))
+    expected, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), LENS.matrix, np.array(LENS.distortion))
+    column, row = project(LENS, *points.T)
+    assert np.abs(np.stack([column, row], 1) - expected[:, 0]).max() < 1e-9
+
+
+def test_rays_of_pixels_project_back_onto_them() -> None:
+    rays = pixel_rays(LENS)
+    column, row = project(LENS, *(650.0 * rays))
+    rows, columns = np.indices(column.shape)
+    assert np.abs(column - columns).max() < 1e-8
+    assert np.abs(row - rows).max() < 1e-8
+
+
+def test_distortion_that_folds_back_is_refused() -> None:
+    x = np.linspace(0.0, 2.0, 11)
+    with pytest.raises(CalibrationError, match="cannot be inverted"):
+        undistort(x, np.zeros_like(x), (-2.0, 0.0, 0.0, 0.0, 0.0))
