@@ -61,10 +61,12 @@ def scan(
     notes: dict[str, str] | None = None,
 ) -> Status:
     """Capture a plan into a session folder; an interrupted one goes on at its next missing frame."""
+    from dsl_core.capture.preflight import require_possible
     from dsl_core.capture.runner import Runner
     from dsl_core.io.session import SessionWriter
     from dsl_core.patterns.images import pattern_image
 
+    require_possible(rig, plan)
     with SessionWriter.open(folder, plan, rig, notes) as sink:
         return Runner(rig, plan, sink, pattern_image, progress=progress).run()
 
@@ -173,7 +175,7 @@ def reconstruct_session(
             **reader.manifest.notes,
             "captured": reader.manifest.created,
             "captured_with": reader.manifest.rig_name,
-            "capture_plan": reader.plan.model_dump_json(exclude_defaults=True),
+            "capture_plan": reader.plan.model_dump_json(),
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )

@@ -12,7 +12,6 @@ from dsl_core.cli import demo, files, results, scans
 app = typer.Typer(
     name="dsl-scan",
     add_completion=False,
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

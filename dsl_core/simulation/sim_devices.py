@@ -21,7 +21,6 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scenes import make_scene
-from dsl_core.simulation.truth import Scene
 from dsl_core.simulation.world import Clock, World
 
 LATENCY_MS = 50.0
@@ -128,7 +127,10 @@ class SimStage(Stage):
 
 
 class SimSpectroradiometer(Spectroradiometer):
-    """Measures the spot in the middle of the camera's view, 1 % noise of the peak."""
+    """Measures the spot in the middle of the camera's view under the mean light of the picture shown.
+
+    The scale is that of the rig's emission curves, not absolute; ``NOISE`` is relative to the peak.
+    """
 
     NOISE = 0.002
 
@@ -143,12 +145,9 @@ class SimSpectroradiometer(Spectroradiometer):
         spot = (truth.depth_mm.shape[0] // 2, truth.depth_mm.shape[1] // 2)
         material = int(truth.material[spot])
         reflectance = truth.materials.reflectance[material] if material >= 0 else np.zeros(len(nm))
-        drive = (
-            np.zeros(3)
-            if world.image is None
-            else world.image.reshape(-1, world.image.shape[-1])[:, -3:].mean(0) / 255
-        )
-        light = world.rig.projector_response.radiance(drive)
+        # Grey images drive the three LEDs alike.
+        shown = np.zeros((1, 1, 1), np.uint8) if world.image is None else np.atleast_3d(world.image)
+        light = np.broadcast_to(world.rig.projector_response.radiance(shown / 255).mean((0, 1)), 3)
         value = reflectance * sum(
             w * curve.at(nm) for w, curve in zip(light, world.rig.emission, strict=True)
         )
@@ -190,6 +189,8 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     if name in STAGED:
         world.position_mm = _number("depth_mm", rest.pop("depth_mm", "700"))
         world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **rest)
+    # Built once now, so that a wrong name or option is told before anything is captured.
+    world.scene_at(world.position_mm)
     return assemble(world)
 
 
@@ -204,11 +205,6 @@ def assemble(world: World) -> DeviceRig:
         calibration=world.rig,
         sleep=world.clock.wait,
     )
-
-
-def check_scene(name: str, options: dict[str, str]) -> Scene:
-    """Build the scene once so that a wrong name or option is told before anything is captured."""
-    return make_scene(name, **options)
 
 
 def _size(text: str) -> tuple[int, int]:

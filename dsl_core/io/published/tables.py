@@ -76,7 +76,9 @@ def save_tables(
     Raises `StoreError` when a file exists already (unless ``overwrite``), `CalibrationError` when the rig
     has no efficiency for one of the orders -1, 0, +1.
     """
-    lacking = [order for order in ORDERS if order not in rig.efficiency]
+    # Order zero is one by definition of a rig's efficiencies, and then not in the rig.
+    efficiency = {0: SpectralCurve.of([550.0], [1.0]), **rig.efficiency}
+    lacking = [order for order in ORDERS if order not in efficiency]
     if lacking:
         raise CalibrationError(
             f"The rig {rig.name!r} has no efficiency of order {lacking[0]:+d}, which DG.npy holds."
@@ -85,7 +87,7 @@ def save_tables(
     tables = {
         "response": np.stack([curve.at(centres) for curve in rig.response], axis=-1),
         "emission": np.stack([curve.at(centres) for curve in rig.emission], axis=-1),
-        "efficiency": np.stack([rig.efficiency[order].at(centres) for order in ORDERS]),
+        "efficiency": np.stack([efficiency[order].at(centres) for order in ORDERS]),
     }
     targets = [folder / TABLE_NAMES[name][0] for name in tables]
     with staged(targets, overwrite=overwrite) as drafts:

@@ -1,0 +1,178 @@
+"""Every command does its work and says the same in words and in JSON."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dsl_core
+from dsl_core.io.plan_file import load_plan
+from dsl_core.io.result_file import load_result
+from dsl_core.io.session import SessionReader
+from dsl_core.model.plan import GrayCode, LineComb, Setting
+
+from .conftest import SMALL_PLAN, SMALL_RIG, Give
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_help_and_version_need_no_heavy_library() -> None:
+    program = (
+        "import sys; from dsl_core.cli import main; main(['--help']); main(['--version']);"
+        "print(sorted(set(sys.modules) & {'numpy', 'torch', 'scipy', 'cv2', 'xarray', 'zarr', 'pydantic'}))"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    assert "reconstruct" in answer
+    assert answer.splitlines()[-2:] == [f"dsl-scan {dsl_core.__version__}", "[]"]
+
+
+@pytest.mark.parametrize(
+    "command",
+    "demo rigs scenes plan scan resume reconstruct evaluate export import info".split(),
+)
+def test_every_command_has_help_and_json(give: Give, command: str) -> None:
+    ending = give(command, "--help")
+    assert ending.code == 0
+    assert "--json" in ending.out
+
+
+def test_rigs_and_scenes(give: Give) -> None:
+    assert {rig["name"] for rig in give("rigs", "--json").json["rigs"]} >= {"twin", "replay"}
+    assert "twin of the published rig" in give("rigs").out
+    scenes = {scene["name"]: scene for scene in give("scenes", "--json").json["scenes"]}
+    assert scenes["plane"]["options"]["depth_mm"] > 0
+    assert "color-checker" in give("scenes").out
+
+
+def test_a_plan_is_written_for_the_rig_and_says_what_it_takes(give: Give, tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    said = give(
+        "plan", path, *SMALL_RIG, "--code", "columns", "--comb", "20x20x160",
+        "--setting", "100@0.2", "--setting", "300@0.8", "--json",
+    ).json  # fmt: skip
+    plan = load_plan(path)
+    assert plan.camera_size_px == (112, 72)
+    assert plan.code == GrayCode(rows=False)
+    assert plan.spectral == LineComb(width_px=20, step_px=20, period_px=160)
+    assert plan.settings == (Setting(exposure_ms=100, level=0.2), Setting(exposure_ms=300, level=0.8))
+    assert plan.code_settings == (0, 1)
+    assert said["frames"] == plan.shot_count
+    assert said["minutes"] == pytest.approx(plan.duration_s(50.0) / 60, abs=1e-3)
+    assert said["needed_bytes"] > plan.raw_bytes * 0.5
+    assert said["free_bytes"] > 0
+    info = give("info", path, "--json").json
+    assert (info["kind"], info["frames"]) == ("plan", plan.shot_count)
+    assert give("scan", tmp_path / "a.dsl", *SMALL_RIG, "--plan", path).code == 0
+    assert SessionReader(tmp_path / "a.dsl").plan == plan
+
+
+def test_a_scan_says_before_it_starts_what_it_takes(give: Give, tmp_path: Path) -> None:
+    said = give("scan", tmp_path / "a.dsl", *SMALL_RIG, *SMALL_PLAN).out.splitlines()
+    assert "150 frames, 1.0 min on the rig" in said[0]
+    assert "free" in said[0]
+    assert f"dsl-scan reconstruct {tmp_path / 'a.dsl'}" in said[-1]
+
+
+def test_reconstruct_says_seconds_and_memory_of_each_stage(give: Give, finished: Path, tmp_path: Path) -> None:
+    target = tmp_path / "depth.zarr"
+    ending = give("reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--no-refine", "--json")
+    said = ending.json
+    assert {stage["name"] for stage in said["stages"]} >= {"columns, depth, normals", "save the result"}
+    assert all(stage["seconds"] >= 0 and stage["peak_bytes"] > 0 for stage in said["stages"])
+    result = load_result(target)
+    assert "reflectance" not in result
+    assert said["pixels_with_depth"] == pytest.approx(float(np.isfinite(result["depth_mm"]).mean()))
+    assert said["pixels_with_depth"] > 0.3
+    assert "save the result" in give(
+        "reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--force"
+    ).out  # fmt: skip
+
+
+def test_evaluate_finds_the_truth_by_itself(give: Give, finished: Path, tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    said = give("evaluate", finished / "scan.zarr", "--report", report, "--json").json
+    assert said["figures"]["depth_rmse_mm"] < 2
+    assert said["figures"]["spectral_rmse"] < 0.05
+    page = report.read_text()
+    assert "Dark Skin" in page or "dark skin" in page.lower()
+    assert "columns, depth, normals" in page
+    # Another scene at another distance must give worse figures, or truth would not be looked at.
+    other = give(
+        "evaluate", finished / "scan.zarr", "--report", tmp_path / "other.html", "--json",
+        "--truth-rig", "twin", *SMALL_RIG, "-o", "scene=plane", "-o", "depth_mm=800",
+    ).json  # fmt: skip
+    assert other["figures"]["depth_rmse_mm"] > 50
+
+
+@pytest.mark.parametrize(
+    ("form", "name", "more", "files"),
+    [
+        ("ply", "a.ply", [], 1),
+        ("envi", "a.hdr", [], 4),
+        ("exr", "a.exr", [], 1),
+        ("png", "a.png", [], 4),
+        ("csv", "a.csv", ["--pixel", "50,30", "--pixel", "60,40"], 1),
+    ],
+)
+def test_export_of_a_result(
+    give: Give, finished: Path, tmp_path: Path, form: str, name: str, more: list[str], files: int
+) -> None:
+    said = give("export", finished / "scan.zarr", form, tmp_path / name, *more, "--json").json
+    assert len(said["files"]) == files
+    assert all(Path(file).stat().st_size > 0 for file in said["files"])
+    again = give("export", finished / "scan.zarr", form, tmp_path / name, *more)
+    assert again.code == 2
+    assert "exists already" in again.sentence
+    assert give("export", finished / "scan.zarr", form, tmp_path / name, *more, "--force").code == 0
+
+
+def test_a_scan_goes_out_and_comes_back_in_the_published_layout(
+    give: Give, finished: Path, tmp_path: Path
+) -> None:
+    scan, dataset, rig = finished / "scan.dsl", tmp_path / "dataset", tmp_path / "rig"
+    assert give("export", scan, "dataset", dataset).code == 0
+    assert give("export", scan, "calibration", rig).code == 0
+    checked = give("import", dataset, "--json").json
+    assert checked["kind"] == "dataset"
+    assert not (tmp_path / "again.dsl").exists()
+    assert give("import", dataset, "-o", tmp_path / "again.dsl").code == 2  # the published rig has another size
+    own = tmp_path / "own.json"
+    own.write_text(SessionReader(scan).calibration.model_dump_json())  # type: ignore[union-attr]
+    assert give("import", dataset, "-o", tmp_path / "back.dsl", "--calibration", own).code == 0
+    before, after = SessionReader(scan), SessionReader(tmp_path / "back.dsl")
+    for shot in before.plan.shots():
+        np.testing.assert_array_equal(after.read(shot), before.read(shot))
+    assert give("import", rig, "-o", tmp_path / "rig.json", "--camera-size", "112x72").code == 0
+    info = give("info", tmp_path / "rig.json", "--json").json
+    assert (info["kind"], info["camera_px"]) == ("rig", [112, 72])
+
+
+def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
+    scan = give("info", finished / "scan.dsl", "--verify", "--json").json
+    assert (scan["kind"], scan["complete"], scan["frames_stored"]) == ("session", True, 150)
+    assert scan["notes"]["scanned_with"] == "twin"
+    result = give("info", finished / "scan.zarr", "--json").json
+    assert (result["kind"], result["size_px"]) == ("result", [112, 72])
+    assert result["bands"] == "24 from 430 to 660 nm"
+    assert "frames stored      150" in give("info", finished / "scan.dsl").out
+
+
+def test_the_demo_leaves_a_report_and_never_writes_over_another(give: Give, tmp_path: Path) -> None:
+    out = tmp_path / "demo"
+    out.mkdir()
+    said = give("demo", "--out", out, "--size", "64x42", "--json").json
+    folder = Path(said["folder"])
+    assert folder == tmp_path / "demo-2"
+    assert said["figures"]["depth_rmse_mm"] < 5
+    assert list(out.iterdir()) == []
+    names = {path.name for path in folder.iterdir()}
+    assert names >= {"scan.dsl", "result.zarr", "points.ply", "cube.hdr", "picture_rgb.png", "report.html"}
+    page = (folder / "report.html").read_text()
+    assert "0.038" in page
+    assert "0.138" in page
