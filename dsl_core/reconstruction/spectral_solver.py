@@ -221,11 +221,15 @@ def _bounded(
     for _ in range(ACTIVE_SET_ROUNDS):
         at = torch.where(x < 0.5 * (low + high), low, high)
         release = pinned & torch.where(at == low, slope < 0, slope > 0)
-        pinned = (pinned & ~release) | (x < low - TOLERANCE) | (x > high + TOLERANCE)
-        held = torch.where(pinned, at, 0.0)
+        outside = (x < low - TOLERANCE) | (x > high + TOLERANCE)
+        changed = (pinned & ~release) | outside
+        if bool((changed == pinned).all()):
+            break
+        pinned = changed
+        held = torch.where(pinned, PENALTY * scale, 0.0)
         stiff = sub_prior.clone()
-        stiff[0] += torch.where(pinned, PENALTY * scale, 0.0)
-        x = Posterior(sub_data, stiff, sub_rows).solve(b + PENALTY * scale * held)
+        stiff[0] += held
+        x = Posterior(sub_data, stiff, sub_rows).solve(b + held * torch.where(pinned, at, 0.0))
         slope = gradient(matrix, sub_rows, x, b)
     out = mean.clone()
     out[:, todo] = x

@@ -155,8 +155,9 @@ class BandedAccumulator:
         index = torch.arange(first_line, first_line + radiance.shape[1], device=columns.device)[:, None]
         centre = self.lines.centre_px(index)
         used = ((centre > low) & (centre < high)).to(radiance.dtype)
-        self.square += torch.einsum("cfp,cfp,fp->p", weighted, radiance, used)
-        self.samples += torch.einsum("cfp,fp->p", (weight > 0).to(radiance.dtype), used)
+        for c in range(3):
+            self.square += (weighted[c] * radiance[c] * used).sum(0)
+            self.samples += ((weight[c] > 0) * used).sum(0)
 
     def _add_group(
         self,
