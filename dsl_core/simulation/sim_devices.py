@@ -53,8 +53,8 @@ class SimCamera(Camera):
         low, high = EXPOSURE_RANGE_MS
         if not low <= exposure_ms <= high:
             raise DeviceError(
-                f"The camera was asked for an exposure of {exposure_ms:g} ms; it can do {low:g} to {high:g} ms."
-                " Change the plan's settings."
+                f"The camera was asked for an exposure of {exposure_ms:g} ms; it can do {low:g} to {high:g}"
+                " ms. Change the plan's settings."
             )
         self._exposure_ms = exposure_ms
         return exposure_ms
@@ -162,8 +162,9 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     """The twin of the published rig; scenes, noise and image size as options.
 
     ``scene`` (default ``color-checker``) and its own options, ``size`` (``890x580``), ``seed``, ``noise``
-    (``on``, ``off``), ``sigma`` (extra Gaussian noise as a share of full scale, known to the calibration), ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``),
-    ``realtime`` (``on`` waits as long as real devices would). Raises `DeviceError` for a value that makes no sense.
+    (``on``, ``off``), ``sigma`` (extra Gaussian noise as a share of full scale, known to the calibration),
+    ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``), ``realtime`` (``on`` waits as long as real
+    devices would). Raises `DeviceError` for a value that makes no sense.
     """
     rest = dict(options)
     rig = published_rig()

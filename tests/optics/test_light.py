@@ -43,7 +43,7 @@ def test_step_edge_is_half_at_the_edge_and_has_the_blur() -> None:
 @pytest.mark.parametrize(("width", "blur", "band"), [(5.0, 0.6, 2.4), (1.0, 0.3, 1.0), (8.0, 1.5, 9.8)])
 def test_band_profile_is_box_times_blur_times_triangle(width: float, blur: float, band: float) -> None:
     step = 0.01
-    x = np.arange(-3000, 3001) * step
+    x = np.arange(-3000.0, 3001.0) * step
     triangle = np.clip(1 - np.abs(x) / band, 0, None) / band
     gauss = np.exp(-0.5 * (x / blur) ** 2) / (blur * np.sqrt(2 * np.pi))
     blurred = convolve1d(triangle, gauss[2000:4001] * step, mode="constant")
@@ -64,7 +64,7 @@ def test_profile_table_agrees_with_the_closed_form_and_ends_in_zero() -> None:
 @pytest.mark.parametrize("order", [1, -1])
 def test_band_moments_integrate_the_response_of_a_linear_spectrum(order: int) -> None:
     rig, step = published_rig(), 5.0
-    centres = 430 + step * np.arange(47)
+    centres = np.arange(430.0, 661.0, step)
     moments, centroids = hat_moments(rig, order, centres, step)
     assert moments.shape == (3, 3, 47)
     assert (np.abs(centroids - centres) < step / 2).all()
@@ -78,7 +78,7 @@ def test_band_moments_integrate_the_response_of_a_linear_spectrum(order: int) ->
 
 def test_zero_order_moments_of_white_hold_all_light() -> None:
     rig = published_rig()
-    centres = 430 + 5.0 * np.arange(47)
+    centres = np.arange(430.0, 661.0, 5.0)
     moments, _ = hat_moments(rig, 0, centres, 5.0)
     fine = np.arange(390.0, 700.0, 0.125)
     assert moments.sum(-1) == pytest.approx(chain_response(rig, 0, fine).sum(-1) * 0.125, rel=2e-3)

@@ -1,0 +1,120 @@
+"""The camera's signal as a linear function of a pixel's reflectance, for any pattern set.
+
+For reflectance H at bands j, colour c, frame k and a pixel of shading s (the project's model equation)::
+
+    y_ck = s * sum_m sum_j sum_l moment_mclj * light_mlk(q_m(j)) * H_j
+
+``moment`` is the rig's response to LED l integrated over a band's hat, ``light`` the pattern's radiance at
+the column that lights the pixel through order m, blurred by the projector and, in first orders, by the
+width of a band. The operator comes as products with H and its adjoint, and as matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.correspondence import like
+from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.line_profile import band_profile
+
+OVERSAMPLE = 4
+
+
+@dataclass(frozen=True)
+class OrderPath:
+    """One order's way to some pixels.
+
+    ``columns_px`` and ``inside`` (whether the light starts inside the frame) have shape (bands, pixels), or
+    (1, pixels) for the zero order, where all bands share a column. ``moments`` has shape (3 channels, 3 LEDs,
+    bands), DN per ms; ``band_px`` is the half width of a band's triangle, 0 for the zero order.
+    """
+
+    columns_px: Tensor
+    inside: Tensor
+    moments: NDArray[np.float64]
+    band_px: float
+
+
+class BlurredProfiles:
+    """Column profiles of a pattern set, blurred, looked up at columns."""
+
+    def __init__(
+        self, response: ProjectorResponse, profiles: NDArray[np.float64], band_px: float, other: Tensor
+    ) -> None:
+        """Blur ``profiles`` (frames, width, LEDs): for the zero order (``band_px`` 0, halo) or a band."""
+        width = profiles.shape[1]
+        at = (np.arange(width * OVERSAMPLE)[:, None] + 0.5) / OVERSAMPLE - 0.5 - np.arange(width)
+        if band_px == 0:
+            spread = zero_order_profile(torch.as_tensor(at), -0.5, 0.5, response)
+        else:
+            spread = torch.as_tensor(band_profile(at, 1.0, response.blur_px, band_px))
+        table = torch.einsum("sx,fxl->slf", spread, torch.as_tensor(profiles, dtype=torch.float64))
+        self.table = table.to(other)
+
+    def at(self, columns_px: Tensor) -> Tensor:
+        """Light at columns of shape (pixels,): (pixels, LEDs, frames); the edge's value beyond the frame."""
+        position = ((columns_px + 0.5) * OVERSAMPLE - 0.5).clip(0, len(self.table) - 1.001)
+        whole = position.long()
+        low = self.table[whole]
+        return low + (position - whole)[:, None, None] * (self.table[whole + 1] - low)
+
+
+class ImageFormation:
+    """The operator of some pixels, from reflectance (bands, pixels) to DN per ms (3, frames, pixels)."""
+
+    def __init__(
+        self,
+        response: ProjectorResponse,
+        profiles: NDArray[np.float64],
+        paths: list[OrderPath],
+        shading: Tensor,
+    ) -> None:
+        """``profiles`` (frames, width, LEDs): radiance relative to full drive; ``shading`` is (pixels,)."""
+        self.paths, self.shading, self.frames = paths, shading, len(profiles)
+        self.bands = max(path.moments.shape[2] for path in paths)
+        self._light = {
+            path.band_px: BlurredProfiles(response, profiles, path.band_px, shading) for path in paths
+        }
+
+    def forward(self, reflectance: Tensor) -> Tensor:
+        """Signals (3, frames, pixels) of reflectance (bands, pixels)."""
+        out = torch.zeros(
+            (3, self.frames, len(self.shading)), device=reflectance.device, dtype=reflectance.dtype
+        )
+        for bands, light, moments in self._terms():
+            # Response of each LED to the reflectance of these bands, (3, LEDs, pixels).
+            seen = torch.einsum("clj,jp->clp", moments, reflectance[bands])
+            out += torch.einsum("clp,plf->cfp", seen, light)
+        return out
+
+    def adjoint(self, signals: Tensor) -> Tensor:
+        """The transposed operator: from (3, frames, pixels) to (bands, pixels)."""
+        out = torch.zeros((self.bands, len(self.shading))).to(signals)
+        for bands, light, moments in self._terms():
+            seen = torch.einsum("cfp,plf->clp", signals, light)
+            out[bands] += torch.einsum("clj,clp->jp", moments, seen)
+        return out
+
+    def matrix(self) -> Tensor:
+        """The operator of each pixel, (pixels, 3, frames, bands)."""
+        out = torch.zeros((len(self.shading), 3, self.frames, self.bands)).to(self.shading)
+        for bands, light, moments in self._terms():
+            out[..., bands] += torch.einsum("plf,clj->pcfj", light, moments)
+        return out
+
+    def _terms(self) -> Iterator[tuple[slice, Tensor, Tensor]]:
+        """Bands that share a column, their light (pixels, LEDs, frames) with shading, their moments."""
+        for path in self.paths:
+            moments, blurred = like(path.moments, self.shading), self._light[path.band_px]
+            shared = len(path.columns_px) == 1
+            for j, columns in enumerate(path.columns_px):
+                lit = blurred.at(columns) * (self.shading * path.inside[j])[:, None, None]
+                bands = slice(0, self.bands) if shared else slice(j, j + 1)
+                yield bands, lit, moments[:, :, bands]

@@ -1,0 +1,194 @@
+"""Columns below a pixel, depth and surface from exact and noisy synthetic data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
+from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.optics.correspondence import zero_order
+from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.reconstruction.column import dark_offset, halo_of_line, refine
+from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.surface import reconstruct_surface
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.scenes import make_scene
+
+LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=318, frames=318)
+RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=31.0)
+PIXELS = 4000
+
+
+def peaks(column: torch.Tensor, amplitude: torch.Tensor) -> torch.Tensor:
+    """Exact zero-order signal of every line frame, (frames, pixels)."""
+    centre = LINES.centre_px(torch.arange(LINES.lines))[:, None]
+    half = LINES.width_px / 2
+    return amplitude * zero_order_profile(column - centre, -half, half, RESPONSE)
+
+
+def noisy(noise: float) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
+    """True columns, amplitudes, radiance and its deviation, float32."""
+    generator = torch.Generator().manual_seed(4)
+    column = 100 + 400 * torch.rand(PIXELS, generator=generator)
+    amplitude = 0.5 + torch.rand(PIXELS, generator=generator)
+    exact = peaks(column, amplitude)
+    return (
+        column,
+        amplitude,
+        exact + noise * torch.randn(exact.shape, generator=generator),
+        torch.full_like(exact, noise),
+    )
+
+
+def test_refinement_is_unbiased_and_states_its_deviation() -> None:
+    column, amplitude, radiance, std = noisy(0.03)
+    found = refine(column.round(), radiance, std, LINES, RESPONSE)
+    assert found.refined.all()
+    error = found.column_px - column
+    z = error / found.std_px
+    assert abs(float(z.mean())) < 0.08
+    # The stated deviation also holds a model error and is widened, never narrowed, by the chi-square.
+    assert 0.85 < float((z**2).mean()) < 1.1
+    assert float(error.std()) < 0.06
+    relative = (found.amplitude - amplitude) / found.amplitude_std
+    assert 0.8 < float(relative.std()) < 1.1
+
+
+def test_refinement_of_exact_data_is_exact() -> None:
+    column, amplitude, _, std = noisy(0.01)
+    found = refine(column.round(), peaks(column, amplitude), std, LINES, RESPONSE)
+    assert (found.column_px - column).abs().max() < 1e-3
+    assert (found.amplitude / amplitude - 1).abs().max() < 1e-3
+
+
+def test_pixels_without_a_peak_keep_their_decoded_column() -> None:
+    column, amplitude, radiance, std = noisy(0.03)
+    coarse = column.round()
+    radiance[:, :100] -= peaks(column, amplitude)[:, :100]
+    std[:, 100:200] = torch.inf
+    coarse[200:300] += 6
+    # Two surfaces in one pixel: two peaks.
+    radiance[:, 300:400] += peaks(column + 3.0, amplitude)[:, 300:400]
+    std[:, 300:400] = 0.003
+    found = refine(coarse, radiance, std, LINES, RESPONSE)
+    assert found.refined[:100].float().mean() < 0.1
+    assert not found.refined[100:400].any()
+    assert found.refined[400:].all()
+    failed = ~found.refined
+    assert torch.equal(found.column_px[failed], coarse[failed])
+    assert found.std_px[failed].numpy() == pytest.approx(12**-0.5)
+
+
+def test_dark_offset_is_what_unlit_frames_read_beside_the_halo() -> None:
+    column, amplitude, radiance, std = noisy(0.01)
+    offset = dark_offset(column, amplitude, radiance + 0.05, std, LINES, RESPONSE)
+    assert abs(float(offset.mean()) - 0.05) < 1e-3
+    assert float(offset.std()) < 0.01
+    comb = LineSet(5, 2, 2.0, 318, 53)
+    assert not dark_offset(column, amplitude, radiance, std, comb, RESPONSE).any()
+
+
+def test_halo_far_from_a_line_is_the_profile_there() -> None:
+    distance = torch.tensor([30.0, -80.0], dtype=torch.float64)
+    exact = zero_order_profile(distance, -2.5, 2.5, RESPONSE)
+    assert (halo_of_line(distance, LINES, RESPONSE) / exact - 1).abs().max() < 0.01
+
+
+def test_line_set_counts_lines_and_frames() -> None:
+    lines = LineSet.of(CapturePlan(spectral=ScanLines(width_px=5, step_px=2)))
+    assert lines == LINES
+    comb = LineSet.of(CapturePlan(spectral=LineComb(width_px=5, step_px=2, period_px=106)))
+    assert comb is not None
+    assert (comb.frames, comb.lines) == (53, 319)
+    line = torch.tensor([-1, 0, 54, 318, 400])
+    assert comb.exists(line).tolist() == [False, True, True, True, False]
+    assert comb.frame(line).tolist() == [0, 0, 1, 0, 0]
+    assert lines.nearest(torch.tensor([0.0, 4.9, 5.1])).tolist() == [-1, 1, 2]
+    assert lines.centre_px(torch.tensor([0, 3])).tolist() == [2.0, 8.0]
+
+
+@pytest.mark.parametrize(
+    "spectral", [Columns(levels=(((0.5, 0.5, 0.5),) * 640,)), LineComb(step_px=3, period_px=100)]
+)
+def test_other_patterns_are_no_line_set(spectral: Columns | LineComb) -> None:
+    assert LineSet.of(CapturePlan(spectral=spectral)) is None
+
+
+def test_triangulation_inverts_the_zero_order() -> None:
+    rig = published_rig()
+    rng = np.random.default_rng(0)
+    pixels = torch.as_tensor(rng.integers(0, 890 * 580, 3000))
+    depth = torch.as_tensor(rng.uniform(450.0, 1200.0, 3000))
+    column = zero_order(rig, pixels, depth)[0]
+    found, slope = triangulate(rig, pixels, column)
+    # Far outside the projector's frame its lens model is not smooth.
+    inside = (column > -20) & (column < 660)
+    assert inside.float().mean() > 0.8
+    assert (found - depth)[inside].abs().max() < 1e-6
+    ahead = zero_order(rig, pixels, depth + 0.5)[0] - zero_order(rig, pixels, depth - 0.5)[0]
+    assert (slope * ahead.abs() - 1)[inside].abs().max() < 0.01
+
+
+def test_rays_that_miss_the_column_have_no_depth() -> None:
+    rig = published_rig()
+    found, _ = triangulate(rig, torch.tensor([0]), torch.tensor([3000.0], dtype=torch.float64))
+    assert torch.isnan(found).all()
+
+
+def small_rig() -> Rig:
+    rig = published_rig()
+    return rig.model_copy(update={"camera": rig.camera.resized(120, 80)})
+
+
+@pytest.mark.parametrize(
+    ("scene", "options", "limit_deg"),
+    [("plane", {"tilt_x_deg": 20.0, "tilt_y_deg": -15.0}, 0.02), ("sphere", {}, 3.5)],
+)
+def test_normals_of_known_surfaces(scene: str, options: dict[str, float], limit_deg: float) -> None:
+    rig = small_rig()
+    truth = make_scene(scene, **options).render(rig.camera, rig.pose.projector_centre_mm)
+    surface = reconstruct_surface(rig, truth.depth_mm, np.full(truth.depth_mm.shape, 0.3), 5)
+    length = np.linalg.norm(surface.normals, axis=0)
+    cosine = (surface.normals * truth.normals).sum(0)
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    known = np.isfinite(angle) & ~surface.edge
+    # Steep slopes at a sphere's rim are not planes within a window.
+    known &= truth.normals[2] < -0.6
+    assert known.sum() > 300
+    assert length[known] == pytest.approx(1.0)
+    assert np.percentile(angle[known], 75) < limit_deg
+
+
+def test_shading_of_a_plane_is_cosine_over_squared_distance() -> None:
+    rig = small_rig()
+    truth = make_scene("plane", tilt_y_deg=25.0).render(rig.camera, rig.pose.projector_centre_mm)
+    surface = reconstruct_surface(rig, truth.depth_mm, np.full(truth.depth_mm.shape, 0.3))
+    points = pixel_rays(rig.camera) * truth.depth_mm
+    to_light = rig.pose.projector_centre_mm[:, None, None] - points
+    distance = np.linalg.norm(to_light, axis=0)
+    expected = (truth.normals * to_light).sum(0) / distance * (700.0 / distance) ** 2
+    assert surface.shading == pytest.approx(expected, rel=1e-3)
+    assert not surface.edge.any()
+
+
+def test_planes_beside_a_step_are_those_of_their_own_side() -> None:
+    rig = small_rig()
+    depth = np.full((80, 120), 700.0)
+    depth[:, 60:] = 750.0
+    surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.3), 5)
+    inner = surface.normals[:, 4:-4, 4:-4]
+    assert np.isfinite(inner).all()
+    assert inner[2].max() < -0.999
+
+
+def test_a_lonely_pixel_has_no_normal() -> None:
+    rig = small_rig()
+    depth = np.full((80, 120), np.nan)
+    depth[10, 10], depth[40:60, 40:60] = 700.0, 700.0
+    surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.3), 5)
+    assert np.isnan(surface.normals[:, 10, 10]).all()
+    assert np.isfinite(surface.normals[:, 50, 50]).all()

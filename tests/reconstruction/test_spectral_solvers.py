@@ -1,0 +1,148 @@
+"""The smooth bounded solvers against dense algebra, a reference for bounds, and each other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+from torch import Tensor
+
+from dsl_core.reconstruction.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral_solver import (
+    Posterior,
+    Prior,
+    band_mean,
+    gradient,
+    roughness,
+    solve_spectra,
+)
+from dsl_core.solve import banded
+
+BANDS, PIXELS, HALF = 30, 5, 3
+ONE_TAU = (0.05, 0.05001, 0.05002)
+
+
+def observations(truth: NDArray[np.float64], noise: float, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
+    """Weighted rows (pixels, rows, BANDS) that each see a few neighbouring bands, and values (pixels, rows)."""
+    rng = np.random.default_rng(seed)
+    bands = np.arange(BANDS)
+    centres = np.linspace(-1, BANDS, 4 * BANDS)
+    profile = np.clip(1 - np.abs(centres[:, None] - bands) / 2, 0, None)
+    rows = profile[None] * rng.uniform(0.8, 1.2, (PIXELS, centres.size, 1)) / noise
+    values = np.einsum("prj,pj->pr", rows, truth) + rng.standard_normal((PIXELS, centres.size))
+    return rows, values
+
+
+def banded_equations(rows: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[Tensor, Tensor]:
+    """Normal equations in banded storage and right side (BANDS, PIXELS), float64."""
+    full = np.einsum("prj,prk->pjk", rows, rows)
+    data = np.zeros((HALF + 1, BANDS, PIXELS))
+    for o in range(HALF + 1):
+        data[o, : BANDS - o] = np.diagonal(full, o, 1, 2).T
+    return torch.as_tensor(data), torch.as_tensor(np.einsum("prj,pr->jp", rows, values))
+
+
+def prior_rows(tau: float, prior: Prior) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The Gaussian prior as rows and values of a least-squares problem."""
+    differences = np.diff(np.eye(BANDS), 2, axis=0) / tau
+    level = np.eye(BANDS) / prior.level_std
+    return np.vstack([differences, level]), np.append(
+        np.zeros(BANDS - 2), np.full(BANDS, prior.level / prior.level_std)
+    )
+
+
+def smooth_truth() -> NDArray[np.float64]:
+    x = np.linspace(0, 1, BANDS)
+    return np.array([0.4 + 0.3 * np.sin(3 * x + i) for i in range(PIXELS)])
+
+
+def test_free_solution_is_that_of_dense_least_squares() -> None:
+    rows, values = observations(smooth_truth(), 0.02)
+    prior = Prior(taus=ONE_TAU, bounds=(-10.0, 10.0))
+    found = solve_spectra(*banded_equations(rows, values), None, prior)
+    for p in range(PIXELS):
+        more, right = prior_rows(float(found.tau[p]), prior)
+        system = np.vstack([rows[p], more])
+        expected = np.linalg.lstsq(system, np.append(values[p], right), rcond=None)[0]
+        assert found.nodes[:, p].numpy() == pytest.approx(expected, abs=1e-8)
+        covariance = np.linalg.inv(system.T @ system)
+        mean = band_mean(torch.eye(BANDS, dtype=torch.float64)).numpy()
+        spread = np.sqrt(np.diag(mean @ covariance @ mean.T))[1:-1]
+        # The stated deviation also holds what a band's mean cannot say of its centre; it is never smaller.
+        assert (found.std[1:-1, p].numpy() >= spread * (1 - 1e-9)).all()
+        assert found.std[1:-1, p].numpy() == pytest.approx(spread, rel=0.3)
+
+
+def test_bounds_are_those_of_a_reference_solver() -> None:
+    x = np.arange(BANDS)
+    truth = np.array([np.clip(np.sin(0.5 * x + i) * 1.2, 0, 1.0) for i in range(PIXELS)])
+    rows, values = observations(truth, 0.05, seed=3)
+    prior = Prior(taus=ONE_TAU, bounds=(0.0, 1.0))
+    found = solve_spectra(*banded_equations(rows, values), None, prior)
+    touched = 0
+    for p in range(PIXELS):
+        more, right = prior_rows(float(found.tau[p]), prior)
+        exact = lsq_linear(
+            np.vstack([rows[p], more]), np.append(values[p], right), bounds=(0, 1), tol=1e-12
+        ).x
+        assert found.nodes[:, p].numpy() == pytest.approx(exact, abs=2e-3)
+        assert found.at_bound[:, p].numpy()[(exact > 0.01) & (exact < 0.99)].sum() == 0
+        touched += int(found.at_bound[:, p].sum())
+    assert touched > 5
+    assert found.nodes.min() >= 0
+    assert found.nodes.max() <= 1
+
+
+def test_evidence_prefers_loose_priors_for_peaks_and_tight_ones_for_smooth_spectra() -> None:
+    peak = np.full((PIXELS, BANDS), 0.05)
+    peak[:, 14:17] = (0.5, 0.9, 0.5)
+    chosen = {}
+    for name, truth in (("smooth", np.tile(np.linspace(0.3, 0.6, BANDS), (PIXELS, 1))), ("peak", peak)):
+        rows, values = observations(truth, 0.02)
+        spectra = solve_spectra(*banded_equations(rows, values), None, Prior())
+        chosen[name] = spectra.tau
+        assert np.sqrt(np.mean((spectra.nodes.T.numpy() - truth) ** 2)) < 0.03
+    assert chosen["smooth"].max() < 0.02
+    assert chosen["peak"].min() > 0.08
+
+
+def test_broad_rows_by_the_woodbury_identity_equal_dense_algebra() -> None:
+    rows, values = observations(smooth_truth(), 0.1)
+    data, right = banded_equations(rows, values)
+    generator = torch.Generator().manual_seed(0)
+    broad = torch.rand((BANDS, 3, PIXELS), generator=generator, dtype=torch.float64)
+    weights = roughness(BANDS, data)[..., None] * 400
+    posterior = Posterior(data, weights, broad)
+    padded = data.clone()
+    padded[:3] += weights
+    full = banded.to_dense(padded) + torch.einsum("jap,kap->pjk", broad, broad)
+    expected = torch.linalg.solve(full, right.T[..., None])[..., 0].T
+    assert (posterior.solve(right) - expected).abs().max() < 1e-9
+    assert (posterior.log_determinant - torch.logdet(full)).abs().max() < 1e-9
+    assert gradient(padded, broad, expected, right).abs().max() < 1e-7 * float(right.abs().max())
+    mean = band_mean(torch.eye(BANDS, dtype=torch.float64))
+    variance = torch.einsum("jk,pkl,jl->jp", mean, torch.linalg.inv(full), mean)[1:-1]
+    assert (posterior.band_mean_variance()[1:-1] / variance - 1).abs().max() < 1e-9
+
+
+def test_banded_and_dense_solver_agree() -> None:
+    x = np.arange(BANDS)
+    truth = np.array([np.clip(0.5 + np.sin(0.4 * x + i), 0, 1.5) for i in range(PIXELS)])
+    rows, values = observations(truth, 0.05, seed=5)
+    data, right = banded_equations(rows, values)
+    prior = Prior(taus=ONE_TAU)
+    by_band = solve_spectra(data, right, None, prior)
+    dense = solve_dense(banded.to_dense(data), right.T.contiguous(), prior)
+    assert (by_band.mean - dense.mean).abs().max() < 2e-3
+    assert (by_band.std / dense.std - 1).abs().max() < 0.05
+    assert (by_band.data_share - dense.data_share).abs().max() < 1e-9
+
+
+def test_band_mean_keeps_straight_lines_and_area() -> None:
+    line = torch.linspace(0, 1, 9, dtype=torch.float64)[:, None]
+    assert (band_mean(line) - line)[1:-1].abs().max() < 1e-12
+    spike = torch.zeros((9, 1), dtype=torch.float64)
+    spike[4] = 1
+    assert band_mean(spike)[3:6, 0].tolist() == pytest.approx([1 / 6, 2 / 3, 1 / 6])

@@ -1,0 +1,205 @@
+"""The twin's world: what the camera sees of a pattern, and that noise and stage do what they promise."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import zero_order
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.pattern_table import PatternTable
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.renderer import NM, Renderer
+from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.sim_devices import SimCamera, SimSpectroradiometer, open_twin
+from dsl_core.simulation.world import World
+
+SIZE = (64, 42)
+
+
+def small_rig(**projector: float) -> Rig:
+    rig = published_rig()
+    response = rig.projector_response.model_copy(update=projector)
+    return rig.model_copy(update={"camera": rig.camera.resized(*SIZE), "projector_response": response})
+
+
+def renderer(rig: Rig, *, film: bool = True, scene: str = "color-checker") -> Renderer:
+    truth = make_scene(scene).render(rig.camera, rig.pose.projector_centre_mm)
+    return Renderer(rig, truth, film=film)
+
+
+def bands_of_columns(*bands: tuple[int, int], level: int = 255) -> NDArray[np.uint8]:
+    image = np.zeros((360, 640, 3), np.uint8)
+    for start, stop in bands:
+        image[:, start:stop] = level
+    return image
+
+
+@pytest.fixture(scope="module")
+def chart() -> Renderer:
+    return renderer(small_rig())
+
+
+@pytest.mark.parametrize("band", [(300, 340), (100, 116), (0, 640)])
+def test_lines_and_slices_render_the_same_light(
+    chart: Renderer, band: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    image = bands_of_columns(band)
+    lines = chart.expected(image)
+    monkeypatch.setattr("dsl_core.simulation.renderer.MAX_RUNS", 0)
+    sliced = chart.expected(image)
+    assert not np.array_equal(lines, sliced)
+    scale = lines.max()
+    assert np.abs(lines - sliced).max() < 0.01 * scale
+    # Beside the zero order only dispersed light is left: a few percent of it, and the same in both.
+    dim = lines < 0.05 * scale
+    assert np.abs(lines - sliced)[dim].max() < 0.006 * scale
+
+
+def test_disjoint_bands_add_up_to_white(chart: Renderer) -> None:
+    edges = range(0, 641, 80)
+    parts = sum(
+        chart.expected(bands_of_columns((a, b))) - chart.expected(bands_of_columns())
+        for a, b in pairwise(edges)
+    )
+    white = chart.expected(bands_of_columns((0, 640))) - chart.expected(bands_of_columns())
+    assert np.abs(parts - white).max() < 2e-3 * white.max()
+
+
+def test_dark_projector_gives_its_black_share_of_white() -> None:
+    leaking = renderer(small_rig(black_fraction=0.01))
+    dark, white = leaking.expected(bands_of_columns()), leaking.expected(bands_of_columns((0, 640)))
+    lit = white > 0.05 * white.max()
+    assert np.abs(dark[lit] / white[lit] - 0.01).max() < 3e-4
+    assert not renderer(small_rig(black_fraction=0.0)).expected(bands_of_columns()).any()
+
+
+def test_without_film_only_the_zero_order_is_left() -> None:
+    rig = small_rig(black_fraction=0.0)
+    line = bands_of_columns((300, 305))
+    with_film, without = (renderer(rig, film=film) for film in (True, False))
+    assert {tables.order for tables in with_film.orders if len(tables.active)} >= {1, -1}
+    far = (with_film.column - 302).abs() > 100
+    pixels = with_film.pixels[far]
+    assert not without.expected(line).ravel()[pixels].any()
+    assert with_film.expected(line).ravel()[pixels].max() > 0
+
+
+def test_white_plane_without_film_has_the_closed_form() -> None:
+    rig = small_rig(black_fraction=0.0)
+    plane = renderer(rig, film=False, scene="plane")
+    white = plane.expected(bands_of_columns((0, 640)))
+    channel = bayer_channels(rig.sensor.bayer, *white.shape)
+    full = 0.99 * chain_response(rig, 0, NM).sum((1, 2))[channel]
+    y, x = 20, 30
+    flat = torch.tensor([y * SIZE[0] + x])
+    assert 20 < float(zero_order(rig, flat, torch.tensor([700.0]))[0]) < 620
+    truth = make_scene("plane").render(rig.camera, rig.pose.projector_centre_mm)
+    ray = np.array([(x - rig.camera.cx_px) / rig.camera.fx_px, (y - rig.camera.cy_px) / rig.camera.fy_px, 1])
+    to_light = rig.pose.projector_centre_mm - 700 * ray
+    distance = np.linalg.norm(to_light)
+    shading = (truth.normals[:, y, x] @ to_light) / distance * (rig.reference_distance_mm / distance) ** 2
+    assert white[y, x] == pytest.approx(full[y, x] * shading, rel=2e-3)
+
+
+def test_pattern_table_means_are_those_of_the_pattern() -> None:
+    rng = np.random.default_rng(0)
+    levels = rng.random((1, 40, 1)).repeat(6, 0)
+    table = PatternTable.of(levels, small_rig(halo_peak_per_px=0.0).projector_response, torch.device("cpu"))
+    start, stop = torch.tensor([-0.5, 4.5, 9.75]), torch.tensor([39.5, 7.5, 10.25])
+    mean = table.mean_between(0, start, stop, None).numpy()
+    assert mean == pytest.approx([levels[0].mean(), levels[0, 5:8].mean(), levels[0, 10, 0]], rel=1e-4)
+    outside = table.mean_between(0, torch.tensor([-9.0]), torch.tensor([-5.0]), None)
+    assert float(outside) == 0
+    assert table.leds == 1
+    assert not table.has_rows
+
+
+def test_expected_light_moves_with_the_pattern_of_each_led(chart: Renderer) -> None:
+    red = bands_of_columns((0, 640))
+    red[..., 1:] = 0
+    seen = chart.expected(red)
+    channels = bayer_channels(chart.rig.sensor.bayer, *seen.shape)
+    assert seen[channels == 0].mean() > 5 * seen[channels == 2].mean()
+
+
+def world(seed: int = 0) -> World:
+    rig = small_rig()
+    return World(rig, scene_at=lambda mm: make_scene("plane", depth_mm=mm), seed=seed)
+
+
+def test_noise_depends_only_on_seed_shot_and_attempt() -> None:
+    one, other = world(), world()
+    image = bands_of_columns((0, 640))
+    one.show(image)
+    first = one.expose(100.0, 7, 1)
+    other.show(bands_of_columns())
+    other.expose(50.0, 3)
+    other.show(image)
+    assert np.array_equal(other.expose(100.0, 7, 1), first)
+    assert not np.array_equal(other.expose(100.0, 7, 2), first)
+    assert not np.array_equal(other.expose(100.0, 8, 1), first)
+    reseeded = world(seed=1)
+    reseeded.show(image)
+    assert not np.array_equal(reseeded.expose(100.0, 7, 1), first)
+
+
+def test_a_pattern_changed_by_its_owner_does_not_change_what_is_shown() -> None:
+    here = world()
+    image = bands_of_columns((0, 640))
+    here.show(image)
+    image[:] = 0
+    assert here.rate().max() > 1
+
+
+def open_small(**options: str) -> DeviceRig:
+    return open_twin({"size": f"{SIZE[0]}x{SIZE[1]}", "scene": "plane", **options})
+
+
+def test_stage_moves_the_plane_and_dims_it() -> None:
+    rig = open_small(noise="off")
+    assert rig.stage is not None
+    assert isinstance(rig.camera, SimCamera)
+    means = []
+    for position in (600.0, 900.0):
+        assert rig.stage.move_to(position) == position
+        assert rig.camera.world.truth.depth_mm == pytest.approx(position)
+        rig.projector.show(bands_of_columns((0, 640), level=60))
+        means.append(rig.camera.snap().pixels.mean() - 260)
+    assert means[0] / means[1] == pytest.approx((900 / 600) ** 2, rel=0.12)
+    with pytest.raises(DeviceError, match="travels from"):
+        rig.stage.move_to(1200.0)
+
+
+@pytest.mark.parametrize("grey", [True, False])
+def test_spectroradiometer_sees_the_leds_through_the_target(grey: bool) -> None:
+    rig = open_small(noise="off")
+    meter = rig.spectroradiometer
+    assert isinstance(meter, SimSpectroradiometer)
+    dark = np.array(meter.measure().values)
+    image = np.full((360, 640), 255, np.uint8)
+    rig.projector.show(image if grey else np.repeat(image[..., None], 3, 2))
+    curve = meter.measure()
+    emission = sum(led.at(np.array(curve.wavelengths_nm)) for led in published_rig().emission)
+    assert np.array(curve.values) == pytest.approx(0.99 * emission, rel=1e-6)
+    black = published_rig().projector_response.black_fraction
+    assert dark == pytest.approx(black * np.array(curve.values), rel=1e-6)
+
+
+def test_spectroradiometer_noise_is_a_share_of_the_peak() -> None:
+    meters = {noise: open_small(noise=noise) for noise in ("on", "off")}
+    curves = {}
+    for noise, rig in meters.items():
+        assert rig.spectroradiometer is not None
+        rig.projector.show(bands_of_columns((0, 640)))
+        curves[noise] = np.array(rig.spectroradiometer.measure().values)
+    spread = (curves["on"] - curves["off"]).std() / curves["off"].max()
+    assert spread == pytest.approx(SimSpectroradiometer.NOISE, rel=0.15)
