@@ -203,7 +203,7 @@ def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
 def truth_of(
     result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
 ) -> Truth:
-    """Truth from the rig that took the scan, or from the one named; raises `DecodeError` where there is none."""
+    """Truth from the rig that took the scan, or the one named; raises `DecodeError` if there is none."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.origin import rig_of_notes
 
@@ -217,7 +217,8 @@ def truth_of(
         truth = twin_truth(rig, _grid_of(result))
     if truth is None:
         raise DecodeError(
-            f"The rig {origin[0]!r} knows no truth of its scene. Name a twin of it with --truth-rig twin and --option."
+            f"The rig {origin[0]!r} knows no truth of its scene."
+            " Name a twin of it with --truth-rig twin and --option."
         )
     return truth
 
@@ -266,7 +267,7 @@ def export_scan(
 def import_scan(
     root: Path, target: Path | None, calibration: Rig, progress: Progress | None = None
 ) -> Sequence[FileRecord]:
-    """Check a published dataset, and make a session of it when a target is given; return the table of its files.
+    """Check a published dataset, make a session of it if a target is given; return the table of files.
 
     Raises `StoreError` naming the first file that is needed and cannot be used; then nothing is written.
     """

@@ -40,7 +40,8 @@ def _print_version(wanted: bool) -> None:
 @app.callback()
 def _globally(
     version: Annotated[
-        bool, typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end.")
+        bool,
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end."),
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> None:

@@ -24,9 +24,13 @@ PUBLISHED = {"spectral_rmse": 0.038, "spectral_angle_rad": 0.138}
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder to write; a number is added if it is taken.")] = Path("dsl-demo"),
+    out: Annotated[Path, typer.Option(help="Folder to write; a number is added if it is taken.")] = Path(
+        "dsl-demo"
+    ),
     size: Annotated[str, typer.Option(help="Camera pixels; 890x580 is the published rig's.")] = "445x290",
-    scene: Annotated[str, typer.Option(help="A scene of the twin; 'dsl-scan scenes' lists them.")] = "color-checker",
+    scene: Annotated[
+        str, typer.Option(help="A scene of the twin; 'dsl-scan scenes' lists them.")
+    ] = "color-checker",
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the report in a browser.")] = False,
     json: Json = False,
 ) -> None:
@@ -53,7 +57,7 @@ def demo(
 
 
 def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
-    """The first folder of that name or its numbered neighbours that is free or holds this very demo, unfinished."""
+    """The first of the name and its numbered neighbours that is free, or holds this demo unfinished."""
     from dsl_core.io.origin import rig_notes
     from dsl_core.io.session_manifest import MANIFEST_NAME, read_manifest
 
@@ -81,7 +85,9 @@ def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str,
 
     with output.progress() as progress, timer.stage("scan on the twin"), open_rig("twin", options) as rig:
         plan = pipeline.fit_plan(_plan(), rig)
-        output.say(f"Scanning {options['scene']} on the twin, {options['size']} px, {plan.shot_count} frames.")
+        output.say(
+            f"Scanning {options['scene']} on the twin, {options['size']} px, {plan.shot_count} frames."
+        )
         pipeline.scan(rig, plan, folder / SCAN, progress, rig_notes("twin", options))
 
 
@@ -112,7 +118,9 @@ def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Datase
     found = figures(evaluation)
     goals = {name: Goal(limit) for name, limit in PUBLISHED.items() if name in found}
     with timer.stage("report"):
-        content = report_content("Demo on the digital twin", result, truth, evaluation, _summary(found), goals)
+        content = report_content(
+            "Demo on the digital twin", result, truth, evaluation, _summary(found), goals
+        )
         pipeline.write_report(content, folder / REPORT)
     print_figures(output, evaluation)
     output.say(_summary(found))
@@ -123,8 +131,10 @@ def _summary(found: dict[str, float]) -> str:
     if "spectral_rmse" not in found:
         return "The scene has no patches with a known spectrum."
     return (
-        f"Mean spectral RMSE {found['spectral_rmse']:.4f} and angle {found['spectral_angle_rad']:.4f} rad on the twin;"
-        f" published, on the real rig: {PUBLISHED['spectral_rmse']} and {PUBLISHED['spectral_angle_rad']} rad."
+        f"Mean spectral RMSE {found['spectral_rmse']:.4f} and angle"
+        f" {found['spectral_angle_rad']:.4f} rad on the twin;"
+        f" published, on the real rig: {PUBLISHED['spectral_rmse']}"
+        f" and {PUBLISHED['spectral_angle_rad']} rad."
     )
 
 

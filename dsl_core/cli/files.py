@@ -21,11 +21,15 @@ def import_(
     source: Annotated[Path, typer.Argument(metavar="FOLDER", help="A published dataset or calibration.")],
     target: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="SCAN.dsl or RIG.json to write; without it, only check the folder."),
+        typer.Option(
+            "--output", "-o", help="SCAN.dsl or RIG.json to write; without it, only check the folder."
+        ),
     ] = None,
     base: Annotated[
         Path | None,
-        typer.Option("--calibration", help="Rig with film, sensor and scales; the published rig if not given."),
+        typer.Option(
+            "--calibration", help="Rig with film, sensor and scales; the published rig if not given."
+        ),
     ] = None,
     camera_size: Annotated[
         str, typer.Option("--camera-size", help="Image size of a published calibration.")

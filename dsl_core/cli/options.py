@@ -65,7 +65,7 @@ class PlanChoice:
             if given:
                 raise PlanError(f"--plan holds the whole plan; leave out {', '.join(given)}, or --plan.")
             return load_plan(self.file)
-        return _checked("plan", lambda: CapturePlan(**self._fields()))
+        return _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
 
     def _fields(self) -> dict[str, object]:
         from dsl_core.model.plan import GrayCode
@@ -109,7 +109,9 @@ def parse_options(texts: Sequence[str]) -> dict[str, str]:
         if not (key and sign):
             raise DeviceError(f"An option must be like key=value, for instance scene=plane, not {text!r}.")
         if key in options:
-            raise DeviceError(f"The option {key!r} is given twice: {options[key]!r} and {value!r}. Choose one.")
+            raise DeviceError(
+                f"The option {key!r} is given twice: {options[key]!r} and {value!r}. Choose one."
+            )
         options[key] = value
     return options
 

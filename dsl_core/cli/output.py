@@ -1,4 +1,4 @@
-"""What a command says, and where: findings to standard output, progress to standard error, or one JSON object."""
+"""What a command says, and where: findings (or one JSON object) to standard output, progress to error."""
 
 from __future__ import annotations
 
@@ -59,7 +59,9 @@ class Output:
         peak = max((stage.peak_bytes for stage in stages), default=0)
         self.say(f"{sum(s.seconds for s in stages):8.2f} s {peak / 1e6:7.0f} MB  all stages (largest memory)")
         self.put(
-            stages=[{"name": s.name, "seconds": round(s.seconds, 3), "peak_bytes": s.peak_bytes} for s in stages]
+            stages=[
+                {"name": s.name, "seconds": round(s.seconds, 3), "peak_bytes": s.peak_bytes} for s in stages
+            ]
         )
 
     def put(self, **values: Any) -> None:

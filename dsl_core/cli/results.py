@@ -30,7 +30,9 @@ def reconstruct(
     target: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder to write; SCAN.zarr if not given.")
     ] = None,
-    calibration: Annotated[Path | None, typer.Option(help="A rig's JSON file instead of the scan's own.")] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(help="A rig's JSON file instead of the scan's own.")
+    ] = None,
     bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
     model: Annotated[str, typer.Option(help="Correspondence: auto, grating or grid.")] = "auto",
     refine: Annotated[bool, typer.Option("--refine/--no-refine", help="Columns below one pixel.")] = True,
@@ -66,7 +68,9 @@ def reconstruct(
 
 def evaluate(
     path: Result,
-    truth_rig: Annotated[str | None, typer.Option(help="Rig that knows the truth, if not the scan's.")] = None,
+    truth_rig: Annotated[
+        str | None, typer.Option(help="Rig that knows the truth, if not the scan's.")
+    ] = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     report: Annotated[
         Path | None, typer.Option(help="HTML page to write; RESULT.html beside the result if not given.")

@@ -38,7 +38,9 @@ def run(arguments: list[str]) -> int:
             traceback.print_exc()
         return _complain(code, sentence, type(error).__name__, "--json" in arguments)
     if code == STOPPED:  # typer turns Ctrl-C into this code
-        return _complain(code, "Stopped. What was finished before is kept.", "Cancelled", "--json" in arguments)
+        return _complain(
+            code, "Stopped. What was finished before is kept.", "Cancelled", "--json" in arguments
+        )
     return code or OK
 
 
@@ -55,7 +57,10 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if isinstance(error, OSError):
         return WRONG_INPUT, _of_system(error)
     if isinstance(error, MemoryError):
-        return WRONG_INPUT, "There is not enough memory. Use a smaller image, fewer bands, or another machine."
+        return (
+            WRONG_INPUT,
+            "There is not enough memory. Use a smaller image, fewer bands, or another machine.",
+        )
     if isinstance(error, SystemExit):
         return (error.code if isinstance(error.code, int) else BUG), ""
     return BUG, (

@@ -107,7 +107,8 @@ def scan(
     choice = PlanChoice(plan, code, lines, comb, setting).build()
     if (target / MANIFEST_NAME).exists():
         raise StoreError(
-            f"{target} already holds a scan. Go on with it by 'dsl-scan resume {target}', or choose a new name."
+            f"{target} already holds a scan."
+            f" Go on with it by 'dsl-scan resume {target}', or choose a new name."
         )
     with open_rig(rig, options) as devices:
         fitted = choice if plan else pipeline.fit_plan(choice, devices)
@@ -135,9 +136,9 @@ def resume(
     output = Output(json)
     missing = len(SessionReader(target).missing())
     output.say(f"{target} lacks {missing} frames.")
-    with open_rig(rig, parse_options(option)) if rig else pipeline.reopen_rig(target) as devices:
-        with output.progress() as progress, _resumable(target):
-            status = pipeline.resume(devices, target, progress, drift)
+    opened = open_rig(rig, parse_options(option)) if rig else pipeline.reopen_rig(target)
+    with opened as devices, output.progress() as progress, _resumable(target):
+        status = pipeline.resume(devices, target, progress, drift)
     _done(output, target, status.done, status.elapsed_s)
 
 
@@ -159,7 +160,9 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
 
 
 def _done(output: Output, target: Path, frames: int, seconds: float) -> None:
-    output.say(f"All {frames} frames are stored in {target} ({seconds:.1f} s). Next: dsl-scan reconstruct {target}")
+    output.say(
+        f"All {frames} frames are stored in {target} ({seconds:.1f} s). Next: dsl-scan reconstruct {target}"
+    )
     output.put(session=target, frames=frames, seconds=round(seconds, 2), state="finished")
     output.finish()
 

@@ -32,8 +32,8 @@ def describe(path: Path, verify: bool = False) -> Facts:
     if not path.exists():
         raise StoreError(f"{path} does not exist. Give a scan (NAME.dsl), a result, a rig or a plan.")
     raise StoreError(
-        f"{path} is neither a session (it has no {MANIFEST_NAME}) nor a result (no zarr.json), nor the JSON file"
-        " of a rig or plan. For a published dataset use 'dsl-scan import'."
+        f"{path} is neither a session (it has no {MANIFEST_NAME}) nor a result (no zarr.json), nor the"
+        " JSON file of a rig or plan. For a published dataset use 'dsl-scan import'."
     )
 
 
@@ -83,7 +83,9 @@ def _json(path: Path) -> Facts:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise StoreError(f"{path} is not JSON ({error}). The file may be cut off; restore it from a copy.") from error
+        raise StoreError(
+            f"{path} is not JSON ({error}). The file may be cut off; restore it from a copy."
+        ) from error
     keys = set(content) if isinstance(content, dict) else set()
     if "camera_size_px" in keys or "spectral" in keys:
         return {"kind": "plan", **_plan_facts(load_plan(path))}

@@ -12,8 +12,8 @@ import torch
 def one_kernel_thread() -> Iterator[None]:
     """Run each torch kernel of a block on the thread that calls it.
 
-    Kernels of a millisecond lose more by meeting at barriers than they gain by sharing: on a quiet machine
-    little, on a busy one a factor of ten and more, since the waiting threads keep the cores from the working one.
+    Kernels of a millisecond lose more by meeting at barriers than they gain by sharing: a little on a quiet
+    machine, a factor of ten and more on a busy one, where waiting threads keep the cores from working ones.
     """
     before = torch.get_num_threads()
     torch.set_num_threads(1)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import dsl_core
+from dsl_core.cli.options import PlanChoice
 from dsl_core.io.plan_file import load_plan
 from dsl_core.io.result_file import load_result
 from dsl_core.io.session import SessionReader
@@ -34,7 +35,19 @@ def test_help_and_version_need_no_heavy_library() -> None:
 
 @pytest.mark.parametrize(
     "command",
-    "demo rigs scenes plan scan resume reconstruct evaluate export import info".split(),
+    [
+        "demo",
+        "rigs",
+        "scenes",
+        "plan",
+        "scan",
+        "resume",
+        "reconstruct",
+        "evaluate",
+        "export",
+        "import",
+        "info",
+    ],
 )
 def test_every_command_has_help_and_json(give: Give, command: str) -> None:
     ending = give(command, "--help")
@@ -79,7 +92,7 @@ def test_a_scan_says_before_it_starts_what_it_takes(give: Give, tmp_path: Path) 
     assert f"dsl-scan reconstruct {tmp_path / 'a.dsl'}" in said[-1]
 
 
-def test_reconstruct_says_seconds_and_memory_of_each_stage(give: Give, finished: Path, tmp_path: Path) -> None:
+def test_reconstruct_says_what_each_stage_costs(give: Give, finished: Path, tmp_path: Path) -> None:
     target = tmp_path / "depth.zarr"
     ending = give("reconstruct", finished / "scan.dsl", "-o", target, "--depth-only", "--no-refine", "--json")
     said = ending.json
@@ -141,7 +154,7 @@ def test_a_scan_goes_out_and_comes_back_in_the_published_layout(
     checked = give("import", dataset, "--json").json
     assert checked["kind"] == "dataset"
     assert not (tmp_path / "again.dsl").exists()
-    assert give("import", dataset, "-o", tmp_path / "again.dsl").code == 2  # the published rig has another size
+    assert give("import", dataset, "-o", tmp_path / "again.dsl").code == 2  # the published rig's size
     own = tmp_path / "own.json"
     own.write_text(SessionReader(scan).calibration.model_dump_json())  # type: ignore[union-attr]
     assert give("import", dataset, "-o", tmp_path / "back.dsl", "--calibration", own).code == 0
@@ -163,10 +176,14 @@ def test_info_of_a_scan_and_a_result(give: Give, finished: Path) -> None:
     assert "frames stored      150" in give("info", finished / "scan.dsl").out
 
 
-def test_the_demo_leaves_a_report_and_never_writes_over_another(give: Give, tmp_path: Path) -> None:
+def test_the_demo_leaves_a_report_and_never_writes_over_another(
+    give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short = PlanChoice(code="columns", lines="5x5", settings=["333.3@0.8"]).build()
+    monkeypatch.setattr("dsl_core.cli.demo._plan", lambda: short)
     out = tmp_path / "demo"
     out.mkdir()
-    said = give("demo", "--out", out, "--size", "64x42", "--json").json
+    said = give("demo", "--out", out, "--size", "112x72", "--json").json
     folder = Path(said["folder"])
     assert folder == tmp_path / "demo-2"
     assert said["figures"]["depth_rmse_mm"] < 5

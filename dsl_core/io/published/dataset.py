@@ -64,7 +64,7 @@ class PublishedScan:
             first = self.found.by_place[lacking[0].role, lacking[0].setting, lacking[0].pattern]
             raise StoreError(
                 f"{self.root} lacks {len(lacking)} of {self.plan.shot_count} frames: {first.expected} is"
-                f" {first.status} ({first.advice}). Complete the folder; the table of the import lists every file."
+                f" {first.status} ({first.advice}). Complete the folder; the import's table lists every file."
             )
 
     def read(self, shot: Shot) -> NDArray[np.uint16]:

@@ -1,0 +1,81 @@
+"""Ctrl-C at any moment of a scan: exit code 130, the command that goes on, and the same frames in the end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.io.session import SessionReader
+
+from .conftest import SMALL_PLAN, SMALL_RIG, Give
+
+ROOT = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to the whole console")
+
+
+def _interrupted(arguments: list[str], log: Path, lines: int) -> tuple[int, str]:
+    """Run a command, send it SIGINT once its log has that many lines; exit code and complaint."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    process = subprocess.Popen(
+        [sys.executable, "-m", "dsl_core.cli", *arguments],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    deadline = time.monotonic() + 60
+    while process.poll() is None and time.monotonic() < deadline:
+        if log.exists() and log.read_bytes().count(b"\n") >= lines:
+            process.send_signal(signal.SIGINT)
+            break
+        time.sleep(0.005)
+    _, complaint = process.communicate(timeout=60)
+    return process.returncode, complaint
+
+
+@pytest.mark.parametrize("lines", [0, 90])
+def test_an_interrupted_scan_says_how_to_go_on_and_does(
+    give: Give, finished: Path, tmp_path: Path, lines: int
+) -> None:
+    scan = tmp_path / "scan.dsl"
+    code, complaint = _interrupted(["scan", str(scan), *SMALL_RIG, *SMALL_PLAN], scan / "frames.jsonl", lines)
+    assert code == 130, complaint
+    assert complaint.count("\n") == 1, complaint
+    assert f"Go on with: dsl-scan resume {scan}" in complaint
+    stored = 150 - len(SessionReader(scan).missing())
+    assert lines <= stored < 150
+    assert give("reconstruct", scan).code == 2
+    assert give("resume", scan, "--json").json["state"] == "finished"
+    whole, mended = SessionReader(finished / "scan.dsl"), SessionReader(scan)
+    for shot in whole.plan.shots():
+        np.testing.assert_array_equal(mended.read(shot), whole.read(shot))
+
+
+def test_an_interrupted_reconstruction_leaves_nothing(
+    give: Give, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dsl_core.io.result_file._write_variable", stop)
+    ending = give("reconstruct", finished / "scan.dsl", "-o", tmp_path / "a.zarr", "--depth-only")
+    assert ending.code == 130
+    assert ending.sentence.startswith("Stopped.")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scan_of_another_scene_is_not_mixed_in(give: Give, scan_copy: Path) -> None:
+    (scan_copy / "frames" / "c.140.0.0").unlink()
+    moved = [*SMALL_RIG, "-o", "scene=plane", "-o", "depth_mm=760"]
+    ending = give("resume", scan_copy, "--rig", "twin", *moved)
+    assert ending.code == 2
+    assert "changed since the scan stopped" in ending.sentence
+    assert len(SessionReader(scan_copy).missing()) == 1
