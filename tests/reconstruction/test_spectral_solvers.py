@@ -24,8 +24,10 @@ BANDS, PIXELS, HALF = 30, 5, 3
 ONE_TAU = (0.05, 0.05001, 0.05002)
 
 
-def observations(truth: NDArray[np.float64], noise: float, seed: int = 0) -> tuple[NDArray[np.float64], ...]:
-    """Weighted rows (pixels, rows, BANDS) that each see a few neighbouring bands, and values (pixels, rows)."""
+def observations(
+    truth: NDArray[np.float64], noise: float, seed: int = 0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Weighted rows (pixels, rows, BANDS), each seeing a few neighbouring bands; values (pixels, rows)."""
     rng = np.random.default_rng(seed)
     bands = np.arange(BANDS)
     centres = np.linspace(-1, BANDS, 4 * BANDS)

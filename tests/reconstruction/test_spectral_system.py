@@ -1,0 +1,51 @@
+"""Banded normal equations of scan lines against the full image model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.image_formation import ImageFormation, OrderPath
+from dsl_core.patterns.images import spectral_profiles
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.spectral_system import BandedAccumulator, Bands, band_halfwidth_px
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve import banded
+
+PIXELS = 6
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_banded_equations_are_those_of_the_full_model(order: int) -> None:
+    rig, plan = published_rig(), CapturePlan()
+    bands, lines = Bands.of(rig, WavelengthGrid()), LineSet.of(plan)
+    assert lines is not None
+    # Pixels of the middle row: order +1 reaches the left ones whole, order -1 the right ones, others in part.
+    pixels = 290 * 890 + torch.linspace(60, 830, PIXELS).long()
+    depth = torch.full((PIXELS,), 700.0, dtype=torch.float64)
+    footprint = GratingModel(rig).trace(pixels, depth, order, bands.centroids_nm[order])
+    inside = footprint.inside(*plan.projector_size_px)
+    assert inside.any()
+    assert not inside.all()
+    generator = torch.Generator().manual_seed(0)
+    radiance, weight = torch.rand(
+        (2, 3, plan.spectral_count, PIXELS), generator=generator, dtype=torch.float64
+    )
+    system = BandedAccumulator(rig, bands, lines, PIXELS, depth)
+    system.add(order, footprint.columns, inside, radiance, weight, 0, 0.0)
+    half = band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
+    path = OrderPath(footprint.columns, inside, bands.moments[order], half)
+    profiles = spectral_profiles(plan).astype(np.float64)
+    model = ImageFormation(rig.projector_response, profiles, [path], torch.ones_like(depth))
+    full = model.matrix().reshape(PIXELS, -1, bands.count)
+    weighted = full * weight.permute(2, 0, 1).reshape(PIXELS, -1, 1)
+    expected = weighted.mT @ full
+    found = banded.to_dense(system.matrix)
+    assert (found - expected).abs().max() < 0.01 * expected.abs().max()
+    right = model.adjoint(radiance * weight)
+    assert (system.right - right).abs().max() < 0.01 * right.abs().max()
+    assert not system.right[~inside].any()
