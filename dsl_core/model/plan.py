@@ -144,7 +144,7 @@ class CapturePlan(Record):
                 roles = [("code", self.code_count), ("white", 1), ("black", 1)]
             for role, count in [*roles, ("spectral", self.spectral_count)]:
                 for pattern in range(count):
-                    yield Shot(index, role, pattern, i, setting.exposure_ms, setting.level)  # type: ignore[arg-type]
+                    yield Shot(index, role, pattern, i, setting.exposure_ms, setting.level)
                     index += 1
 
     @property

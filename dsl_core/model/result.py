@@ -38,7 +38,9 @@ REASONS: dict[Flag, str] = {
     Flag.DEPTH_EDGE: "depth jumps next to this pixel; normal and shading are unreliable",
     Flag.BANDS_UNREACHED: "no first order reaches some bands; prior and zero-order colour decide there",
     Flag.AT_BOUND: "the spectrum touches a bound of the solver in some bands",
-    Flag.POOR_FIT: "the measured intensities do not fit any spectrum (mixed materials, interreflection, motion)",
+    Flag.POOR_FIT: (
+        "the measured intensities do not fit any spectrum (mixed materials, interreflection, motion)"
+    ),
     Flag.NON_FINITE: "the input or an intermediate value was not a finite number",
 }
 
@@ -78,7 +80,11 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "reflectance": (("wavelength_nm", "y", "x"), "1", "reflectance on the Spectralon scale"),
     "reflectance_std": (("wavelength_nm", "y", "x"), "1", "posterior standard deviation of reflectance"),
     "data_share": (("wavelength_nm", "y", "x"), "1", "share of the answer decided by data, not by the prior"),
-    "reach": (("wavelength_nm", "y", "x"), "bitmask", "orders that reach the band (1: +1, 2: -1, 4: zero only)"),
+    "reach": (
+        ("wavelength_nm", "y", "x"),
+        "bitmask",
+        "orders that reach the band (1: +1, 2: -1, 4: zero only)",
+    ),
     "rgb": (("channel", "y", "x"), "1", "sRGB under D65, 0..1"),
     "flags": (("y", "x"), "bitmask", "reasons why the pixel is limited; 0 is good"),
 }

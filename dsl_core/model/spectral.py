@@ -71,4 +71,4 @@ class SpectralCurve(Record):
 
     def at(self, wavelengths_nm: ArrayLike) -> NDArray[np.float64]:
         """Values at the given wavelengths (nm), same shape, linear between samples."""
-        return np.interp(np.asarray(wavelengths_nm, float), self.wavelengths_nm, self.values)
+        return np.asarray(np.interp(np.asarray(wavelengths_nm, float), self.wavelengths_nm, self.values))

@@ -33,7 +33,7 @@ class Footprint(NamedTuple):
     rows: Tensor
 
     def inside(self, width_px: int, height_px: int, margin_px: float = 0.0) -> Tensor:
-        """Whether the light comes from inside the projector's frame, or a margin left and right of it; bool."""
+        """Whether light comes from inside the projector's frame, or a margin left and right of it; bool."""
         c, r = self
         low, high = -0.5 - margin_px, width_px - 0.5 + margin_px
         return (c > low) & (c < high) & (r > -0.5) & (r < height_px - 0.5)
@@ -80,7 +80,11 @@ def chebyshev_nodes(start_nm: float, stop_nm: float, count: int = NODES) -> NDAr
 
 def interpolation_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> NDArray[np.float64]:
     """Matrix of polynomial interpolation from values at nodes to values at targets (Lagrange)."""
-    scale = lambda x: (x - nodes.mean()) / np.ptp(nodes)  # noqa: E731 - keeps the Vandermonde matrix well conditioned
+
+    def scale(nm: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Near -0.5 to 0.5, which keeps the Vandermonde matrix well conditioned.
+        return np.asarray((nm - nodes.mean()) / np.ptp(nodes))
+
     order = len(nodes) - 1
     return np.asarray(
         np.linalg.solve(np.vander(scale(nodes), order + 1).T, np.vander(scale(targets), order + 1).T).T

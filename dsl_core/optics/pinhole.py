@@ -64,7 +64,9 @@ def undistort(
 @lru_cache(maxsize=8)
 def pixel_rays(lens: Lens) -> NDArray[np.float64]:
     """Direction of every pixel's ray in camera coordinates with z = 1, shape (3, rows, columns)."""
-    columns, rows = np.meshgrid(np.arange(lens.width_px), np.arange(lens.height_px))
+    columns, rows = np.meshgrid(
+        np.arange(lens.width_px, dtype=np.float64), np.arange(lens.height_px, dtype=np.float64)
+    )
     x, y = undistort((columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px, lens.distortion)
     rays = np.stack([x, y, np.ones_like(x)])
     rays.setflags(write=False)

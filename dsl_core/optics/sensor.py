@@ -25,7 +25,7 @@ def raw_variance(sensor: Sensor, signal_dn: NDArray[np.floating]) -> NDArray[np.
     electronic offset without shot noise.
     """
     floor = sensor.read_noise_dn**2 + 1 / 12
-    return floor + np.maximum(signal_dn, 0) / sensor.electrons_per_dn
+    return np.asarray(floor + np.maximum(signal_dn, 0) / sensor.electrons_per_dn)
 
 
 def digitise(
@@ -42,4 +42,4 @@ def digitise(
         variance = np.maximum(signal_dn, 0) * np.float32(1 / sensor.electrons_per_dn)
         variance += np.float32(sensor.read_noise_dn**2)
         value = value + rng.standard_normal(signal_dn.shape, np.float32) * np.sqrt(variance)
-    return np.clip(np.rint(value), 0, sensor.full_scale_dn).astype(np.uint16)
+    return np.asarray(np.clip(np.rint(value), 0, sensor.full_scale_dn), np.uint16)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 
-
 #: Light this far beyond the bands still counts in the zero order.
 BEYOND_NM = 40.0
 

@@ -23,10 +23,14 @@ class PatternTable:
     oversample: tuple[int, int]
 
     @classmethod
-    def of(cls, radiance: NDArray[np.float64], response: ProjectorResponse, device: torch.device) -> PatternTable:
+    def of(
+        cls, radiance: NDArray[np.float64], response: ProjectorResponse, device: torch.device
+    ) -> PatternTable:
         """Make the table of a radiance image, shape (height, width, LEDs)."""
         flat = bool((radiance == radiance[:1]).all())
-        source = torch.as_tensor(np.moveaxis(radiance[:1] if flat else radiance, 2, 0), device=device, dtype=torch.float32)
+        source = torch.as_tensor(
+            np.moveaxis(radiance[:1] if flat else radiance, 2, 0), device=device, dtype=torch.float32
+        )
         kx, ky = (8, 1) if flat else (4, 4)
         across = _spread(radiance.shape[1], kx, response, True).to(device)
         blurred = source @ across.T

@@ -19,8 +19,18 @@ from dsl_core.model.spectral import SpectralCurve
 #: (peak, centre nm, width below nm, width above nm) of each term.
 Terms = tuple[tuple[float, float, float, float], ...]
 RESPONSE: tuple[Terms, Terms, Terms] = (
-    ((0.042, 543.5, 36.6, 6.0), (0.546, 601.2, 12.7, 24.9), (0.486, 658.8, 30.7, 26.2), (0.056, 380.0, 73.9, 43.6)),
-    ((0.602, 508.1, 20.3, 58.5), (0.076, 669.4, 22.9, 22.2), (0.246, 584.3, 36.7, 27.7), (0.063, 380.0, 22.6, 73.6)),
+    (
+        (0.042, 543.5, 36.6, 6.0),
+        (0.546, 601.2, 12.7, 24.9),
+        (0.486, 658.8, 30.7, 26.2),
+        (0.056, 380.0, 73.9, 43.6),
+    ),
+    (
+        (0.602, 508.1, 20.3, 58.5),
+        (0.076, 669.4, 22.9, 22.2),
+        (0.246, 584.3, 36.7, 27.7),
+        (0.063, 380.0, 22.6, 73.6),
+    ),
     ((0.545, 463.5, 52.0, 36.2), (0.041, 501.4, 13.1, 62.5), (0.036, 677.8, 31.7, 4.0)),
 )
 EMISSION: tuple[Terms, Terms, Terms] = (
@@ -42,7 +52,9 @@ WAVELENGTHS_NM = np.arange(390.0, 711.0, 2.0)
 
 def _curve(terms: Terms) -> SpectralCurve:
     nm = WAVELENGTHS_NM
-    values = sum(a * np.exp(-0.5 * ((nm - mu) / np.where(nm < mu, low, high)) ** 2) for a, mu, low, high in terms)
+    values = sum(
+        a * np.exp(-0.5 * ((nm - mu) / np.where(nm < mu, low, high)) ** 2) for a, mu, low, high in terms
+    )
     return SpectralCurve.of(nm, values)
 
 
@@ -65,7 +77,9 @@ def _efficiencies() -> dict[int, SpectralCurve]:
 
 def _rotation() -> tuple[tuple[float, float, float], ...]:
     """The published rotation, made exactly orthonormal."""
-    published = np.array([[0.99702, 0.03338, 0.06958], [-0.01862, 0.97903, -0.20287], [-0.07490, 0.20097, 0.97673]])
+    published = np.array(
+        [[0.99702, 0.03338, 0.06958], [-0.01862, 0.97903, -0.20287], [-0.07490, 0.20097, 0.97673]]
+    )
     u, _, v = np.linalg.svd(published)
     return tuple(tuple(row) for row in (u @ v).tolist())
 
@@ -98,7 +112,9 @@ def published_rig() -> Rig:
         response=_rgb(RESPONSE),
         emission=_rgb(EMISSION),
         efficiency=_efficiencies(),
-        sensor=Sensor(bayer="RGGB", bit_depth=12, black_level_dn=260.0, electrons_per_dn=10.0, read_noise_dn=1.0),
+        sensor=Sensor(
+            bayer="RGGB", bit_depth=12, black_level_dn=260.0, electrons_per_dn=10.0, read_noise_dn=1.0
+        ),
         projector_response=ProjectorResponse(
             gamma=2.21, black_fraction=0.0, blur_px=0.6, halo_peak_per_px=0.0, halo_decay_px=31.0
         ),
@@ -124,5 +140,7 @@ def _with_radiometry(rig: Rig) -> Rig:
     exposure = 1000.0 / 3.0 * rig.projector_response.radiance(0.8)
     scale = BLUE_PEAK * rig.sensor.full_scale_dn / (peak * exposure)
     halo = (0.104 / BLUE_PEAK) * peak / blue_zero / 5.0
-    projector = rig.projector_response.model_copy(update={"halo_peak_per_px": float(halo), "black_fraction": 0.0005})
+    projector = rig.projector_response.model_copy(
+        update={"halo_peak_per_px": float(halo), "black_fraction": 0.0005}
+    )
     return rig.model_copy(update={"white_scale": float(scale), "projector_response": projector})

@@ -8,6 +8,7 @@ summed over spectral slices. Both use the same correspondence and response as th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -59,9 +60,7 @@ class OrderTables:
 class Renderer:
     """Expected signal of one scene on one rig, in DN per ms above black."""
 
-    def __init__(
-        self, rig: Rig, truth: SceneTruth, *, film: bool = True, device: str = "cpu"
-    ) -> None:
+    def __init__(self, rig: Rig, truth: SceneTruth, *, film: bool = True, device: str = "cpu") -> None:
         self.rig = rig
         self.device = torch.device(device)
         self.shape = truth.depth_mm.shape
@@ -80,7 +79,11 @@ class Renderer:
         zero = (chain_response(rig, 0, NM)[None] * reflectance[:, None, None]).sum(-1)
         self.zero_table = self._tensor(np.moveaxis(zero, 2, 0).reshape(3, -1))
         self.orders = [self._order(m, depth, reflectance) for m in ORDERS] if film else []
-        halo = rig.projector_response if film else rig.projector_response.model_copy(update={"halo_peak_per_px": 0.0})
+        halo = (
+            rig.projector_response
+            if film
+            else rig.projector_response.model_copy(update={"halo_peak_per_px": 0.0})
+        )
         self.response = halo
         self._white: Tensor | None = None
 
@@ -142,7 +145,9 @@ class Renderer:
 
         density = chain_response(self.rig, order, NM).sum(1)[None] * reflectance[:, None]
         blurred = gaussian_filter1d(density, sigma_nm, axis=-1, mode="nearest")
-        total = np.concatenate([np.zeros((*blurred.shape[:2], 1)), np.cumsum((blurred[..., 1:] + blurred[..., :-1]) / 2, -1)], -1)
+        total = np.concatenate(
+            [np.zeros((*blurred.shape[:2], 1)), np.cumsum((blurred[..., 1:] + blurred[..., :-1]) / 2, -1)], -1
+        )
         difference = np.diff(total, axis=-1, append=total[..., -1:])
         return self._tensor(np.stack([total, difference], -1).reshape(-1, 2))
 
@@ -151,17 +156,16 @@ class Renderer:
         density = chain_response(self.rig, order, NM)[None] * reflectance[:, None, None]
         weight = np.ones(step + 1)
         weight[[0, -1]] = 0.5
-        windows = np.lib.stride_tricks.sliding_window_view(density, step + 1, axis=-1)[..., ::step, :] @ weight
+        windows = (
+            np.lib.stride_tricks.sliding_window_view(density, step + 1, axis=-1)[..., ::step, :] @ weight
+        )
         return self._tensor(np.moveaxis(windows, [3, 2], [0, 1]).reshape(windows.shape[3], 3, -1))
 
     def expected(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Signal of an image of drive levels, (height, width, 3) or (height, width), DN per ms, (rows, columns)."""
+        """Signal (rows, columns), DN per ms, of drive levels (height, width, 3) or (height, width)."""
         colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
         runs = _white_runs(colour)
-        if runs is not None and len(runs) <= MAX_RUNS:
-            signal = self._lines(runs)
-        else:
-            signal = self._any(colour)
+        signal = self._any(colour) if runs is None or len(runs) > MAX_RUNS else self._lines(runs)
         out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
         out[self.pixels] = signal * self.shading
         return out.reshape(self.shape).cpu().numpy()
@@ -180,13 +184,18 @@ class Renderer:
         signal = torch.zeros_like(self.column) + self._black()
         zero = self.zero_table.sum(0)[self.material_channel]
         for start, stop, level in runs:
-            radiance = float(self.rig.projector_response.radiance(level)) - self.rig.projector_response.black_fraction
+            radiance = (
+                float(self.rig.projector_response.radiance(level))
+                - self.rig.projector_response.black_fraction
+            )
             signal += radiance * zero * zero_order_profile(self.column, start, stop, self.response)
             for tables in self.orders:
                 self._add_order(signal, tables, start, stop, radiance)
         return signal
 
-    def _add_order(self, signal: Tensor, tables: OrderTables, start: float, stop: float, radiance: float) -> None:
+    def _add_order(
+        self, signal: Tensor, tables: OrderTables, start: float, stop: float, radiance: float
+    ) -> None:
         near = torch.nonzero((tables.reach_px[0] < stop + 2) & (tables.reach_px[1] > start - 2)).ravel()
         if len(near) == 0:
             return
@@ -210,7 +219,9 @@ class Renderer:
     def _any(self, colour: NDArray[np.uint8]) -> Tensor:
         response = self.rig.projector_response
         radiance = response.radiance(np.arange(256) / 255)[colour] - response.black_fraction
-        grey = np.array_equal(colour[..., 0], colour[..., 1]) and np.array_equal(colour[..., 0], colour[..., 2])
+        grey = np.array_equal(colour[..., 0], colour[..., 1]) and np.array_equal(
+            colour[..., 0], colour[..., 2]
+        )
         table = PatternTable.of(radiance[..., :1] if grey else radiance, self.response, self.device)
         return self._sliced(table) + self._black()
 
@@ -274,6 +285,4 @@ def _white_runs(colour: NDArray[np.uint8]) -> list[tuple[float, float, float]] |
         return None
     levels = line[:, 0].astype(int)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], levels, [0]])))
-    return [
-        (a - 0.5, b - 0.5, levels[a] / 255) for a, b in zip(edges[:-1], edges[1:], strict=True) if levels[a]
-    ]
+    return [(a - 0.5, b - 0.5, levels[a] / 255) for a, b in pairwise(edges) if levels[a]]
