@@ -1,6 +1,6 @@
 """Time and error of both correspondence models: every pixel of 890 x 580, 47 bands, two orders.
 
-Run ``python tests/benchmarks/bench_correspondence.py``. The published code needs about 3 minutes for the
+Run ``python -m tests.benchmarks.bench_correspondence``. The published code needs about 3 minutes for the
 analytic model and 2.5 s for the data-driven one (seed section 4).
 """
 

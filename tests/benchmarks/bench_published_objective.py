@@ -1,6 +1,6 @@
 """The banded solver against the published objective: same scan, same pixels, same machine, one run.
 
-Run ``python tests/benchmarks/bench_published_objective.py [SCENE ...] [--thin N] [--steps N]``. The twin
+Run ``python -m tests.benchmarks.bench_published_objective [SCENE ...] [--thin N] [--steps N]``. The twin
 is scanned at 445 x 290. Both solvers get two threads and the same valid pixels; the published one fits every
 ``thin``-th pixel only and its time is scaled to all of them, which favours neither: it treats pixels
 independently, in chunks. Errors are taken at the pixels that both solved.
