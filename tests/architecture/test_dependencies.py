@@ -23,7 +23,7 @@ DISTRIBUTIONS = {
     "cv2": "opencv-contrib-python-headless",
 }
 # The desktop application is built on these; until its first window nothing imports them.
-OF_THE_APP = {"pyside6-essentials", "pyqtgraph", "pyvista", "pyvistaqt", "superqt"}
+OF_THE_APP = {"platformdirs", "pyside6-essentials", "pyqtgraph", "pyvista", "pyvistaqt", "superqt"}
 GPL = {"plyfile", "pylablib", "pylablib-lightweight", "thorlabs-apt-device", "pyqt5", "pyqt6"}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -33,7 +34,10 @@ def test_the_rig_of_the_help_page_keeps_every_promise(tmp_path: Path) -> None:
         "no:cacheprovider",
         "test_my_lab.py",
     ]
-    answer = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # the tests run without an installation too
+    answer = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
     assert re.search(r"^\d\d passed", answer.stdout, re.MULTILINE), answer.stdout
 
 
