@@ -153,7 +153,7 @@ def _blinding(rng: np.random.Generator) -> NDArray[np.uint16]:
     ("picture", "sentence"),
     [
         (_dark, "too little projector light"),
-        (_blinding, "saturated"),
+        (_blinding, "The white frame is saturated in 100% of its pixels at every setting"),
     ],
 )
 def test_frames_that_show_nothing(
