@@ -121,8 +121,8 @@ class BandedAccumulator:
         """
         half = band_halfwidth_px(columns, self.bands.step_nm, self.bands.centres_nm)
         table = profile_table(self.rig, self.lines.width_px, half, columns, blur_px)
-        # The outermost diagonals hold products of two tails, below 1e-4 of the main one.
-        bandwidth = max(min(math.ceil(2 * table.support_px / half), self.bands.count - 1) - 2, 1)
+        # All diagonals, also the faintest: a truncated matrix of bright pixels is not positive definite.
+        bandwidth = max(min(math.ceil(2 * table.support_px / half), self.bands.count - 1), 1)
         if self.matrix.shape[0] < bandwidth + 1:
             self.matrix = torch.nn.functional.pad(
                 self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])

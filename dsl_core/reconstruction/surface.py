@@ -54,7 +54,7 @@ def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: i
     normal[:, bad] = np.nan
     shading, incidence_tan = _shading(rig, rays * np.where(valid, depth_mm, np.nan), normal)
     relative = np.hypot(incidence_tan * spread, 2 * np.where(valid, depth_std_mm * inverse, np.nan))
-    return Surface(normal, np.where(bad, np.nan, spread), shading, relative, jump & valid)
+    return Surface(normal, np.where(bad, np.nan, spread), shading, relative, (jump | bad) & valid)
 
 
 def _box(values: Map, window: int) -> Map:
@@ -103,12 +103,23 @@ def _best_window(
     # A window beside the pixel must be clearly better: noise alone should not choose it.
     lowest = 0.5 * cost(stack)
     for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-        moved = np.roll(stack, (dy * shift, dx * shift), axis=(1, 2))
+        moved = _moved(stack, dy * shift, dx * shift)
         here = cost(moved)
         better = here < lowest
         lowest = np.where(better, here, lowest)
         best[:, better] = moved[:, better]
     return best[:3], best[3:6], best[6], best[7]
+
+
+def _moved(stack: Map, down: int, right: int) -> Map:
+    """Maps shifted by whole pixels; windows from beyond the image count no pixels."""
+    moved = np.roll(stack, (down, right), axis=(1, 2))
+    count = moved[-1]
+    if down:
+        count[slice(0, down) if down > 0 else slice(down, None)] = 0
+    if right:
+        count[:, slice(0, right) if right > 0 else slice(right, None)] = 0
+    return moved
 
 
 def _normals(fit: Map, unit: Map, noise: Map) -> tuple[Map, Map]:
