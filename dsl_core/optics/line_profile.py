@@ -53,3 +53,10 @@ class ProfileTable:
         """Profile at distances (px), same shape; zero beyond the support."""
         index = (distance_px + self.support_px).mul_(SAMPLES).add_(0.5).clip_(0, len(self.values) - 1).int()
         return self.values.index_select(0, index.reshape(-1)).reshape(index.shape)
+
+    def overlaps(self, spacing_px: float) -> NDArray[np.float64]:
+        """Products of profiles one, two, ... spacings apart, integrated, relative to none; until they vanish."""
+        values = self.values.double().cpu().numpy()
+        step = round(spacing_px * SAMPLES)
+        shifts = range(step, len(values), step)
+        return np.array([values[s:] @ values[:-s] for s in shifts]) / (values @ values)

@@ -16,19 +16,29 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.geometry import Lens
 
 
+#: How far beyond the image circle the radial factor goes on changing (squared radius, unit focal length).
+FADE_RADIUS_SQ = 0.3
+
+
 def distort(
     x: Any, y: Any, coefficients: tuple[float, ...], max_radius_sq: float = np.inf
 ) -> tuple[Any, Any]:
     """Distorted image-plane coordinates of undistorted ones (any shape, unit focal length).
 
     OpenCV's model: radial ``1 + k1 r^2 + k2 r^4 + k3 r^6`` and tangential p1, p2. Beyond
-    ``max_radius_sq`` the radial factor stays constant, because the polynomial folds back on itself
-    far outside the image and would put impossible points inside it.
+    ``max_radius_sq`` the radial factor fades smoothly into a constant, because the polynomial folds back on
+    itself far outside the image and would put impossible points inside it.
     """
     k1, k2, p1, p2, k3 = coefficients
     r2 = x * x + y * y
-    rc = r2.clip(max=max_radius_sq) if np.isfinite(max_radius_sq) else r2
-    radial = 1 + rc * (k1 + rc * (k2 + rc * k3))
+    if np.isfinite(max_radius_sq):
+        limit = max_radius_sq
+        rc = r2.clip(max=limit)
+        beyond = r2 - rc
+        slope = k1 + limit * (2 * k2 + limit * 3 * k3)
+        radial = 1 + rc * (k1 + rc * (k2 + rc * k3)) + slope * beyond / (1 + beyond / FADE_RADIUS_SQ)
+    else:
+        radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
     xy = 2 * x * y
     return x * radial + p1 * xy + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + p2 * xy
 

@@ -190,7 +190,7 @@ class SpectralReconstruction:
                 system.add(order, footprint.columns, inside, radiance, weight, frames.start, blur)
         right = system.right * shading
         rows = self._colour_rows(flat, shading, window, right)
-        spectra = solve_spectra(system.matrix * shading**2, right, rows, self.prior)
+        spectra = solve_spectra(system.positive_matrix() * shading**2, right, rows, self.prior)
         radiance = spectra.nodes * shading
         explained = (radiance * (2 * system.right - multiply(system.matrix, radiance))).sum(0)
         return spectra, (system.square - explained) / (system.samples - PARAMETERS).clip(min=1)

@@ -33,6 +33,8 @@ ORDERS = (1, -1)
 PAD_NM = 15.0
 #: Tables of line profiles are shared by pixels whose dispersion agrees to this, px per nm.
 SLOPE_STEP = 0.02
+#: Diagonals whose sum is below this share of the main one are left out.
+DROPPED = 2e-5
 #: Bands that share one window of lines while the normal equations are added up.
 GROUP = 3
 
@@ -92,6 +94,8 @@ class BandedAccumulator:
         self.rig, self.bands, self.lines = rig, bands, lines
         self.matrix = torch.zeros((1, bands.count, pixels), device=other.device, dtype=other.dtype)
         self.right = torch.zeros_like(self.matrix[0])
+        #: Bound of the diagonals left out, relative to the main one.
+        self.dropped = 1e-6
         #: Weighted sum of squares of the data that entered, and their number, (pixels,).
         self.square, self.samples = torch.zeros_like(self.right[0]), torch.zeros_like(self.right[0])
 
@@ -121,8 +125,11 @@ class BandedAccumulator:
         """
         half = band_halfwidth_px(columns, self.bands.step_nm, self.bands.centres_nm)
         table = profile_table(self.rig, self.lines.width_px, half, columns, blur_px)
-        # All diagonals, also the faintest: a truncated matrix of bright pixels is not positive definite.
-        bandwidth = max(min(math.ceil(2 * table.support_px / half), self.bands.count - 1), 1)
+        tails = table.overlaps(half)[::-1].cumsum()[::-1]
+        bandwidth = max(min(int((tails > DROPPED).sum()), self.bands.count - 1), 1)
+        # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels
+        # would not be positive definite.
+        self.dropped = max(self.dropped, 2 * float(tails[bandwidth:].max(initial=0)))
         if self.matrix.shape[0] < bandwidth + 1:
             self.matrix = torch.nn.functional.pad(
                 self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])
@@ -139,6 +146,12 @@ class BandedAccumulator:
             group = range(start, min(start + GROUP, reached[-1] + 1))
             stop = min(group[-1] + bandwidth, reached[-1]) + 1
             self._add_group(group, stop, columns, masked, white, flat, first_line, table)
+
+    def positive_matrix(self) -> Tensor:
+        """The banded matrix of unit shading, made safe against what its bandwidth leaves out."""
+        matrix = self.matrix.clone()
+        matrix[0] *= 1 + self.dropped
+        return matrix
 
     def _add_squares(
         self,
