@@ -24,7 +24,8 @@ from dsl_core.optics.correspondence import like
 from dsl_core.optics.light_path import zero_order_profile
 from dsl_core.optics.line_profile import band_profile
 
-OVERSAMPLE = 4
+#: Samples a column, and columns beyond each edge of the frame over which a line's blurred light dies away.
+OVERSAMPLE, MARGIN_PX = 4, 16
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,8 @@ class BlurredProfiles:
     ) -> None:
         """Blur ``profiles`` (frames, width, LEDs): for the zero order (``band_px`` 0, halo) or a band."""
         width = profiles.shape[1]
-        at = (np.arange(width * OVERSAMPLE)[:, None] + 0.5) / OVERSAMPLE - 0.5 - np.arange(width)
+        samples = np.arange((width + 2 * MARGIN_PX) * OVERSAMPLE)[:, None]
+        at = (samples + 0.5) / OVERSAMPLE - 0.5 - MARGIN_PX - np.arange(width)
         if band_px == 0:
             spread = zero_order_profile(torch.as_tensor(at), -0.5, 0.5, response)
         else:
@@ -59,8 +61,8 @@ class BlurredProfiles:
         self.table = table.to(other)
 
     def at(self, columns_px: Tensor) -> Tensor:
-        """Light at columns of shape (pixels,): (pixels, LEDs, frames); the edge's value beyond the frame."""
-        position = ((columns_px + 0.5) * OVERSAMPLE - 0.5).clip(0, len(self.table) - 1.001)
+        """Light at columns of shape (pixels,): (pixels, LEDs, frames); almost none far outside the frame."""
+        position = ((columns_px + 0.5 + MARGIN_PX) * OVERSAMPLE - 0.5).clip(0, len(self.table) - 1.001)
         whole = position.long()
         low = self.table[whole]
         return low + (position - whole)[:, None, None] * (self.table[whole + 1] - low)

@@ -55,8 +55,8 @@ class ProfileTable:
         return self.values.index_select(0, index.reshape(-1)).reshape(index.shape)
 
     def overlaps(self, spacing_px: float) -> NDArray[np.float64]:
-        """Products of profiles one, two, ... spacings apart, integrated, relative to none; until they vanish."""
+        """Integrated products of profiles one, two, ... spacings apart, relative to none; ends at zero."""
         values = self.values.double().cpu().numpy()
         step = round(spacing_px * SAMPLES)
         shifts = range(step, len(values), step)
-        return np.array([values[s:] @ values[:-s] for s in shifts]) / (values @ values)
+        return np.asarray([values[s:] @ values[:-s] for s in shifts], np.float64) / float(values @ values)

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from dsl_core.reconstruction.spectral_solver import (
+    ACTIVE_SET_ROUNDS,
     LOCAL_STD,
     PENALTY,
     TOLERANCE,
@@ -68,21 +69,25 @@ def _share(data: Tensor) -> Tensor:
 def _bounded(
     matrix: Tensor, right: Tensor, mean: Tensor, bounds: tuple[float, float]
 ) -> tuple[Tensor, Tensor]:
-    """Pin bands outside the bounds and solve again, until none is left outside or the rounds are up."""
+    """Minimum inside the bounds by an active-set iteration where it is needed, and the active bands."""
     low, high = bounds
-    pinned = torch.zeros_like(mean, dtype=torch.bool)
-    scale = torch.diagonal(matrix, dim1=1, dim2=2)
-    x = mean
-    for _ in range(5):
+    active = torch.zeros_like(mean, dtype=torch.bool)
+    outside = (mean < low - TOLERANCE) | (mean > high + TOLERANCE)
+    todo = torch.nonzero(outside.any(1)).ravel()
+    x, b, sub = mean[todo], right[todo], matrix[todo]
+    pinned = torch.zeros_like(x, dtype=torch.bool)
+    scale = torch.diagonal(sub, dim1=1, dim2=2)
+    for _ in range(ACTIVE_SET_ROUNDS):
         at = torch.where(x < 0.5 * (low + high), low, high)
-        slope = (matrix @ x[..., None])[..., 0] - right
+        slope = (sub @ x[..., None])[..., 0] - b
         release = pinned & torch.where(at == low, slope < 0, slope > 0)
-        outside = (x < low - TOLERANCE) | (x > high + TOLERANCE)
-        if not bool((outside | release).any()):
+        changed = (pinned & ~release) | (x < low - TOLERANCE) | (x > high + TOLERANCE)
+        if bool((changed == pinned).all()):
             break
-        pinned = (pinned & ~release) | outside
+        pinned = changed
         stiff = torch.where(pinned, PENALTY * scale, 0.0)
-        x = torch.linalg.solve(
-            matrix + torch.diag_embed(stiff), (right + stiff * torch.where(pinned, at, 0.0))
-        )
-    return x.clip(low, high), pinned
+        factor = torch.linalg.cholesky(sub + torch.diag_embed(stiff))
+        x = torch.cholesky_solve((b + stiff * torch.where(pinned, at, 0.0))[..., None], factor)[..., 0]
+    out = mean.clone()
+    out[todo], active[todo] = x, pinned
+    return out.clip(low, high), active

@@ -42,9 +42,12 @@ CHUNK = 1024
 
 @dataclass(frozen=True)
 class AdamOptions:
-    """How the objective is minimised; ``smoothness`` weighs the squared gradient against the L1 terms."""
+    """How the objective is minimised; ``smoothness`` weighs the squared gradient against the L1 terms.
 
-    steps: int = 1000
+    The supplement speaks of 1000 epochs; the published code takes 2000 steps.
+    """
+
+    steps: int = 2000
     learning_rate: float = 0.05
     smoothness: float = 1.0
 

@@ -222,12 +222,15 @@ class SpectralReconstruction:
         column = self._map(self.pixels.column_px, flat)
         radiance, weight = window.colours(range(len(self.radiance)), None)
         colour, _ = window.zero_order_colour()
-        lit = lit_by_zero_order(self.rig, profiles, column)
+        # Demosaicing averages neighbours, which widens every line a little more.
+        blur = float(np.hypot(response.blur_px, window.blur_px()))
+        response = response.model_copy(update={"blur_px": blur})
+        lit = lit_by_zero_order(response, profiles, column)
         weight = 1 / (1 / weight + (DIRECT_ERROR * colour[:, None] * lit) ** 2)
         width, height = self.plan.projector_size_px
         inside = {order: f.inside(width, height, margin_px=EDGE_PX) for order, f in traced.items()}
         matrix, right, square = dense_equations(
-            self.rig, self.bands, profiles, column, traced, inside, radiance, weight
+            response, self.bands, profiles, column, traced, inside, radiance, weight
         )
         spectra = solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
         radiance = (spectra.nodes * shading).T

@@ -21,9 +21,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Footprint, like
+from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath
 from dsl_core.optics.line_profile import ProfileTable
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.reconstruction.line_set import LineSet
@@ -214,7 +215,7 @@ class BandedAccumulator:
 
 
 def dense_equations(
-    rig: Rig,
+    response: ProjectorResponse,
     bands: Bands,
     profiles: NDArray[np.float64],
     column_px: Tensor,
@@ -230,68 +231,26 @@ def dense_equations(
     (3, frames, pixels). The zero order is part of the model, as patterns may light a pixel by several orders
     at once.
     """
-    frames, pixels = radiance.shape[1:]
-    model = torch.zeros((pixels, 3, frames, bands.count), device=radiance.device, dtype=radiance.dtype)
-    for order, footprint in {0: None, **footprints}.items():
-        half = (
-            0.0
-            if footprint is None
-            else band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
-        )
-        sampled = sampled_profiles(rig, profiles, half, radiance)
-        moments = like(bands.moments[order], radiance)
-        if footprint is None:
-            lit = sampled.at(column_px)
-            model += torch.einsum("plf,clj->pcfj", lit, moments)
-            continue
-        for j in range(bands.count):
-            lit = sampled.at(footprint.columns[j]) * inside[order][j][:, None, None]
-            model[..., j] += torch.einsum("plf,cl->pcf", lit, moments[:, :, j])
-    flat = model.reshape(pixels, -1, bands.count)
-    w = weight.permute(2, 0, 1).reshape(pixels, -1, 1)
-    y = radiance.permute(2, 0, 1).reshape(pixels, -1, 1)
+    everywhere = torch.ones_like(column_px[None], dtype=torch.bool)
+    paths = [OrderPath(column_px[None], everywhere, bands.moments[0], 0.0)]
+    for order, footprint in footprints.items():
+        half = band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
+        paths.append(OrderPath(footprint.columns, inside[order], bands.moments[order], half))
+    model = ImageFormation(response, profiles, paths, torch.ones_like(column_px)).matrix()
+    flat = model.reshape(len(column_px), -1, bands.count)
+    w = weight.permute(2, 0, 1).reshape(len(column_px), -1, 1)
+    y = radiance.permute(2, 0, 1).reshape(len(column_px), -1, 1)
     weighted = flat * w
     return weighted.mT @ flat, (weighted.mT @ y)[..., 0], (w * y * y).sum((1, 2))
 
 
-class SampledProfiles:
-    """Profiles of a whole pattern set, blurred, looked up at columns."""
-
-    def __init__(self, table: Tensor, oversample: int) -> None:
-        """``table`` is (samples, LEDs, frames)."""
-        self.table, self.oversample = table, oversample
-
-    def at(self, columns: Tensor) -> Tensor:
-        """Light at columns (px) of shape (pixels,): (pixels, LEDs, frames); zero outside the projector."""
-        position = ((columns + 0.5) * self.oversample - 0.5).clip(0, len(self.table) - 1.001)
-        whole = position.long()
-        part = (position - whole)[:, None, None]
-        low = self.table[whole]
-        return low + part * (self.table[whole + 1] - low)
-
-
-def sampled_profiles(
-    rig: Rig, profiles: NDArray[np.float64], band_px: float, like_this: Tensor
-) -> SampledProfiles:
-    """Blur a pattern set for the zero order (``band_px`` 0: blur and halo) or a band of the first orders."""
-    from dsl_core.optics.light_path import zero_order_profile
-    from dsl_core.optics.line_profile import band_profile
-
-    oversample, width = 4, profiles.shape[1]
-    at = (np.arange(width * oversample)[:, None] + 0.5) / oversample - 0.5 - np.arange(width)
-    if band_px == 0:
-        spread = zero_order_profile(torch.as_tensor(at), -0.5, 0.5, rig.projector_response)
-    else:
-        spread = torch.as_tensor(band_profile(at, 1.0, rig.projector_response.blur_px, band_px))
-    table = torch.einsum("sx,fxl->slf", spread, torch.as_tensor(profiles, dtype=torch.float64))
-    return SampledProfiles(table.to(like_this), oversample)
-
-
-def lit_by_zero_order(rig: Rig, profiles: NDArray[np.float64], column_px: Tensor) -> Tensor:
+def lit_by_zero_order(
+    response: ProjectorResponse, profiles: NDArray[np.float64], column_px: Tensor
+) -> Tensor:
     """Largest zero-order light within a column of each pixel's, (frames, pixels), any LED.
 
     The edges of lines are where a small error of the column or the blur matters most.
     """
-    sampled = sampled_profiles(rig, profiles, 0.0, column_px)
-    near = torch.stack([sampled.at(column_px + shift).amax(1) for shift in (-1.0, 0.0, 1.0)])
+    blurred = BlurredProfiles(response, profiles, 0.0, column_px)
+    near = torch.stack([blurred.at(column_px + shift).amax(1) for shift in (-1.0, 0.0, 1.0)])
     return near.amax(0).T
