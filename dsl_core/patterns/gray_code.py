@@ -77,9 +77,10 @@ def code_images(spec: GrayCode, size_px: tuple[int, int]) -> NDArray[np.uint8]:
 class DecodedCode:
     """What a Gray code says of each camera pixel; arrays share one shape.
 
-    ``column`` and ``row`` are projector pixels, int32, -1 where ``undecided``; ``row`` is None when rows
-    are not coded. ``likely_column`` is the better guess there too, within the projector. ``margin`` is the smallest ``|positive - inverse|`` over all bits, float32, in the
-    unit of the input; ``margin_sigmas`` the smallest in standard deviations, None when none were given.
+    ``column`` and ``row`` are projector pixels, int32, -1 where ``undecided``; ``row`` is None when rows are
+    not coded. ``likely_column`` is the better guess there too, within the projector. ``margin`` is the
+    smallest ``|positive - inverse|`` over all bits, float32, in the unit of the input; ``margin_sigmas`` the
+    smallest in standard deviations, None when none were given.
     """
 
     column: NDArray[np.int32]
