@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from dsl_core.errors import CalibrationError, DecodeError, DeviceError, StoreError
 from dsl_core.model.frames import FrameSource
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.progress import NoProgress, Progress
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from dsl_core.evaluation.report import ReportContent
     from dsl_core.evaluation.summary import Evaluation, Truth
     from dsl_core.io.published import FileRecord
+    from dsl_core.model.board import Board
+    from dsl_core.model.geometry_calibration import GeometryCalibration
+    from dsl_core.model.rig import BayerPattern
 
 
 @dataclass(frozen=True)
@@ -287,3 +290,43 @@ def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int]) -
 
     size = (base.projector.width_px, base.projector.height_px)
     return load_calibration(root, size, camera_size_px).rig(base)
+
+
+def calibrate_geometry(
+    folder: Path,
+    board: Board,
+    projector_size_px: tuple[int, int],
+    bayer: BayerPattern | None = None,
+    camera_binning: float = 1.0,
+    baseline_mm: float | None = None,
+    progress: Progress | None = None,
+) -> GeometryCalibration:
+    """Lenses and pose of camera and projector from folders of pictures, one a board pose, film off.
+
+    Raises `CalibrationError` that names the pose or picture that is missing or wrong.
+    """
+    from dsl_core.calibration.geometric import calibrate_geometry as calibrate
+    from dsl_core.calibration.geometry_diagnosis import exposure_warning
+    from dsl_core.calibration.projector_corners import observe_pose
+    from dsl_core.io.pose_pictures import pose_folders, read_pose, require_one_size
+    from dsl_core.patterns.gray_code import bit_counts
+
+    bits, progress = bit_counts(GrayCode(), projector_size_px), progress or NoProgress()
+    seen, warnings, sizes = [], [], {}
+    folders = pose_folders(folder)
+    for index, pose_folder in enumerate(folders):
+        progress.report("find the board", index, len(folders))
+        frames = read_pose(pose_folder, bits, bayer)
+        sizes[frames.name] = (frames.white.shape[1], frames.white.shape[0])
+        require_one_size(sizes)
+        seen.append(observe_pose(frames, board, projector_size_px))
+        warnings.append(exposure_warning(frames, seen[-1]))
+    return calibrate(
+        seen,
+        board,
+        sizes[folders[0].name],
+        projector_size_px,
+        camera_binning=camera_binning,
+        baseline_mm=baseline_mm,
+        warnings=[warning for warning in warnings if warning],
+    )

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import demo, files, results, scans
+from dsl_core.cli import calibrate, demo, files, results, scans
 
 app = typer.Typer(
     name="dsl-scan",
@@ -29,6 +29,7 @@ for command in (
     app.command()(command)
 app.command("import")(files.import_)
 app.command()(files.info)
+app.add_typer(calibrate.calibrate, name="calibrate")
 
 
 def _print_version(wanted: bool) -> None:

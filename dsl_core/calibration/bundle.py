@@ -1,0 +1,196 @@
+"""Joint least squares of two lenses, their pose to each other and the poses of a board before them.
+
+Zhang, "A flexible new technique for camera calibration" (PAMI 2000), for a camera and a projector that share
+the poses of the board. Derivatives are analytic: those of the lens by OpenCV, those of the motions here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.projector_corners import PoseObservation
+from dsl_core.errors import CalibrationError
+
+Floats = NDArray[np.float64]
+
+#: fx, fy, cx, cy, k1, k2, p1, p2, k3.
+LENS = 9
+#: Both lenses and the pose between them (rotation vector, translation) come before the poses of the board.
+SHARED = 2 * LENS + 6
+#: Corners farther off than this many robust deviations do not lie on the plane of the board, or are misread.
+OUTLIER_SIGMAS, MAX_ROUNDS = 4.0, 12
+CAMERA, PROJECTOR, STEREO = slice(0, LENS), slice(LENS, 2 * LENS), slice(2 * LENS, SHARED)
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """The fitted parameters with their covariance, and the residuals (px) of every corner.
+
+    ``parameters`` holds both lenses (9 each), the pose between them (rotation vector, mm) and 6 numbers a
+    board pose. Residuals are predicted minus seen, (corners, 2); ``used`` marks corners that are no outliers.
+    """
+
+    parameters: Floats
+    covariance: Floats
+    camera_residual_px: Floats
+    projector_residual_px: Floats
+    used: NDArray[np.bool_]
+
+
+class Problem:
+    """Corners of all poses in one array each, and their residuals with derivatives."""
+
+    def __init__(self, poses: Sequence[PoseObservation]) -> None:
+        """Collect the corners."""
+        self.board_mm = np.concatenate([pose.board_mm for pose in poses])
+        self.camera_px = np.concatenate([pose.camera_px for pose in poses])
+        self.projector_px = np.concatenate([pose.projector_px for pose in poses])
+        self.pose_of = np.repeat(np.arange(len(poses)), [len(pose.ids) for pose in poses])
+        self.pose_count = len(poses)
+
+    def evaluate(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Residuals (corners, 2) of camera and projector, and their derivatives (corners, 2, parameters)."""
+        boards = parameters[SHARED:].reshape(-1, 6)
+        in_camera, by_board = move(boards[self.pose_of], self.board_mm)
+        camera, by_lens, by_point = project(parameters[CAMERA], in_camera)
+        camera_jac = np.zeros((len(camera), 2, len(parameters)))
+        camera_jac[:, :, CAMERA] = by_lens
+        self._put_boards(camera_jac, by_point @ by_board)
+        stereo = np.broadcast_to(parameters[STEREO], (len(camera), 6))
+        in_projector, by_stereo = move(stereo, in_camera)
+        projector, by_lens, by_point = project(parameters[PROJECTOR], in_projector)
+        projector_jac = np.zeros_like(camera_jac)
+        projector_jac[:, :, PROJECTOR] = by_lens
+        projector_jac[:, :, STEREO] = by_point @ by_stereo
+        rotation = rotation_of(parameters[STEREO][:3])
+        self._put_boards(projector_jac, by_point @ (rotation @ by_board))
+        return camera - self.camera_px, projector - self.projector_px, camera_jac, projector_jac
+
+    def _put_boards(self, jacobian: Floats, by_board: Floats) -> None:
+        columns = SHARED + 6 * self.pose_of[:, None] + np.arange(6)
+        np.put_along_axis(jacobian, columns[:, None, :].repeat(2, 1), by_board, 2)
+
+
+def rotation_of(vector: Floats) -> Floats:
+    """Rotation matrix (3, 3) of a rotation vector (axis times angle)."""
+    import cv2
+
+    return np.asarray(cv2.Rodrigues(np.asarray(vector, np.float64).reshape(3, 1))[0], np.float64)
+
+
+def vector_of(rotation: Floats) -> Floats:
+    """Rotation vector (3,) of a rotation matrix."""
+    import cv2
+
+    return np.asarray(cv2.Rodrigues(np.asarray(rotation, np.float64))[0], np.float64).ravel()
+
+
+def move(motions: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Points (n, 3) moved by motions (n, 6), and the derivative by the motion, (n, 3, 6)."""
+    import cv2
+
+    unique, which = np.unique(motions, axis=0, return_inverse=True)
+    turned = [cv2.Rodrigues(motion[:3].copy().reshape(3, 1)) for motion in unique]
+    rotations = np.array([rotation for rotation, _ in turned])[which.ravel()]
+    # OpenCV: row k is the derivative of the matrix, row by row, by component k of the vector.
+    slopes = np.array([slope.reshape(3, 3, 3) for _, slope in turned])[which.ravel()]
+    moved = np.einsum("nij,nj->ni", rotations, points) + motions[:, 3:]
+    by_motion = np.empty((len(points), 3, 6))
+    by_motion[:, :, :3] = np.einsum("nkij,nj->nik", slopes, points)
+    by_motion[:, :, 3:] = np.eye(3)
+    return moved, by_motion
+
+
+def project(lens: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
+    """Pixels (n, 2) of points (n, 3), and derivatives by the lens (n, 2, 9) and by the point (n, 2, 3)."""
+    import cv2
+
+    matrix = np.array([[lens[0], 0, lens[2]], [0, lens[1], lens[3]], [0, 0, 1]])
+    zero = np.zeros((3, 1))
+    pixels, slopes = cv2.projectPoints(np.ascontiguousarray(points), zero, zero, matrix, lens[4:].copy())
+    jacobian = np.asarray(slopes, np.float64).reshape(len(points), 2, -1)
+    return np.asarray(pixels, np.float64).reshape(-1, 2), jacobian[:, :, 6:15], jacobian[:, :, 3:6]
+
+
+def adjust(
+    poses: Sequence[PoseObservation], start: Floats, outlier_sigmas: float = OUTLIER_SIGMAS
+) -> Adjustment:
+    """Minimise the weighted squares of all corners, first with a robust loss, then without the outliers.
+
+    Camera and projector are weighted by their own noise, which the residuals of the robust fit tell. Raises
+    `CalibrationError` when the fit does not converge.
+    """
+    problem = Problem(poses)
+    used = np.ones(len(problem.pose_of), bool)
+    parameters = _solve(problem, start, (1.0, 1.0), used, "soft_l1")
+    for _ in range(MAX_ROUNDS):
+        camera, projector, _, _ = problem.evaluate(parameters)
+        sigmas = _noise(camera[used]), _noise(projector[used])
+        farthest = np.maximum(np.abs(camera).max(1) / sigmas[0], np.abs(projector).max(1) / sigmas[1])
+        before, used = used, farthest <= outlier_sigmas
+        if 4 * used.sum() <= len(parameters):
+            raise CalibrationError(
+                "Camera and projector do not fit one board: most corners are outliers. Check the number of"
+                " corners of the board, the projector's size, and that nothing moved during a pose."
+            )
+        parameters = _solve(problem, parameters, sigmas, used, "linear")
+        if np.array_equal(before, used):
+            break
+    return _summary(problem, parameters, used, sigmas)
+
+
+def _solve(
+    problem: Problem, start: Floats, sigmas: tuple[float, float], used: NDArray[np.bool_], loss: Any
+) -> Floats:
+    from scipy.optimize import least_squares
+
+    def residuals(parameters: Floats) -> Floats:
+        camera, projector, _, _ = problem.evaluate(parameters)
+        return np.concatenate([(camera[used] / sigmas[0]).ravel(), (projector[used] / sigmas[1]).ravel()])
+
+    def jacobian(parameters: Floats) -> Floats:
+        _, _, camera, projector = problem.evaluate(parameters)
+        size = (-1, camera.shape[2])
+        camera_rows, projector_rows = camera[used].reshape(size), projector[used].reshape(size)
+        return np.concatenate([camera_rows / sigmas[0], projector_rows / sigmas[1]])
+
+    # The robust fit only has to tell the outliers; MINPACK's is the quicker one for the rest.
+    how: dict[str, Any] = (
+        {"method": "lm"} if loss == "linear" else {"method": "trf", "loss": loss, "ftol": 1e-3}
+    )
+    fit = least_squares(residuals, start, jac=jacobian, x_scale="jac", max_nfev=200, **how)
+    if not np.isfinite(fit.x).all():
+        raise CalibrationError("The joint fit of camera and projector did not converge. Take more poses.")
+    return np.asarray(fit.x, np.float64)
+
+
+def _summary(
+    problem: Problem, parameters: Floats, used: NDArray[np.bool_], sigmas: tuple[float, float]
+) -> Adjustment:
+    """The fit with its covariance, which allows for the errors of a corner being correlated.
+
+    A wrong corner in the camera picture is looked up at a wrong place in the code, so that its camera and
+    projector errors go together: the covariance sums over corners, not over coordinates (Huber's sandwich).
+    """
+    camera, projector, camera_jac, projector_jac = problem.evaluate(parameters)
+    errors = np.concatenate([camera / sigmas[0], projector / sigmas[1]], 1)[used]
+    slopes = np.concatenate([camera_jac / sigmas[0], projector_jac / sigmas[1]], 1)[used]
+    rows = slopes.reshape(-1, len(parameters))
+    scale = np.linalg.norm(rows, axis=0)
+    scale[scale == 0] = 1
+    inverse = np.linalg.pinv((rows / scale).T @ (rows / scale), hermitian=True) / np.outer(scale, scale)
+    pulls = np.einsum("nk,nkp->np", errors, slopes)
+    # Parameters take freedom from the residuals.
+    freed = len(rows) / max(len(rows) - len(parameters), 1)
+    covariance = freed * inverse @ (pulls.T @ pulls) @ inverse
+    return Adjustment(parameters, covariance, camera, projector, used)
+
+
+def _noise(residual: Floats) -> float:
+    """Robust standard deviation of residuals (px), never so small that exact corners become outliers."""
+    return max(1.4826 * float(np.median(np.abs(residual))), 1e-4)

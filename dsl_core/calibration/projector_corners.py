@@ -1,0 +1,187 @@
+"""Where a projector sees the corners of a board: from Gray code, by local homographies.
+
+Moreno and Taubin, "Simple, accurate, and robust projector-camera calibration" (3DIMPVT 2012): a corner is a
+point where four squares meet, where no pixel decodes well; but around it, on the plane of the board, the map
+from camera to projector pixels is a homography, which many decoded pixels determine well below one pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.targets import Corners, find_corners, grey_of, pitches_px
+from dsl_core.errors import CalibrationError
+from dsl_core.model.board import Board, corner_positions_mm
+from dsl_core.model.plan import GrayCode
+from dsl_core.model.pose_frames import PoseFrames
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, frame_count, lit_mask
+
+Floats = NDArray[np.float64]
+
+#: Pixels within this share of the distance between corners tell of a corner: into all four squares around it.
+WINDOW = 0.8
+#: Decoded pixels that a corner needs, and the residual (projector px) beyond which one is decoded wrongly.
+MIN_PIXELS, INLIER_PX = 30, 1.5
+#: A bit counts when it differs from its inverse by this share of the light on its pixel.
+MIN_MARGIN = 0.05
+#: Pixels with less light than this share of the brightest ones are in shadow.
+MIN_LIGHT = 0.03
+#: Share of the corners around which the code must be readable.
+MIN_READ = 0.4
+
+
+@dataclass(frozen=True)
+class PoseObservation:
+    """Corners of one pose as both devices see them; arrays have one row a corner.
+
+    ``board_mm`` (x, y, 0) on the board, ``camera_px`` and ``projector_px`` (column, row).
+    """
+
+    name: str
+    ids: NDArray[np.int64]
+    board_mm: Floats
+    camera_px: Floats
+    projector_px: Floats
+
+    def only(self, keep: NDArray[np.bool_]) -> PoseObservation:
+        """The corners where ``keep`` is true."""
+        return PoseObservation(
+            self.name, self.ids[keep], self.board_mm[keep], self.camera_px[keep], self.projector_px[keep]
+        )
+
+
+def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int, int]) -> PoseObservation:
+    """Corners of the board in camera and projector pixels; without those around which too little decodes.
+
+    Raises `CalibrationError` naming the pose when pictures are missing or differ in size, when the board is
+    not found, or when the code says nothing around its corners.
+    """
+    check_frames(frames, projector_size_px)
+    corners = find_corners(grey_of(frames.white, frames.bayer), board, f"the white picture of {frames.name}")
+    code = decode_pose(frames, projector_size_px)
+    projector_px = corners_on_projector(code, corners)
+    known = np.isfinite(projector_px[:, 0])
+    if known.sum() < max(6, MIN_READ * len(known)):
+        raise CalibrationError(
+            f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be read"
+            f" around {known.sum()} of them only. {explain(frames, corners, projector_size_px)}"
+        )
+    seen = PoseObservation(
+        frames.name, corners.ids, corner_positions_mm(board)[corners.ids], corners.points_px, projector_px
+    )
+    return seen.only(known)
+
+
+def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:
+    """Raise `CalibrationError` when the pictures of a pose are incomplete, of mixed sizes or exchanged."""
+    wanted = frame_count(GrayCode(), projector_size_px) - 2
+    if len(frames.pairs) != wanted:
+        width, height = projector_size_px
+        raise CalibrationError(
+            f"{frames.name} has {len(frames.pairs)} pattern pictures; a projector of {width} x {height} px"
+            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or take the"
+            " pose again."
+        )
+    shapes = {np.shape(picture) for picture in (*frames.pairs, frames.white, frames.black)}
+    if len(shapes) > 1:
+        raise CalibrationError(
+            f"The pictures of {frames.name} differ in size ({', '.join(map(str, sorted(shapes)))})."
+            " Take all pictures with one setting of the camera."
+        )
+    if not all(np.isfinite(np.asarray(p)).all() for p in (*frames.pairs, frames.white, frames.black)):
+        raise CalibrationError(f"Pictures of {frames.name} hold values that are not finite. Take them again.")
+    if np.mean(frames.white) <= np.mean(frames.black):
+        raise CalibrationError(
+            f"{frames.name}: the white picture is not brighter than the black one. They are exchanged, or the"
+            " projector was off; correct the order of the pictures."
+        )
+
+
+def decode_pose(frames: PoseFrames, projector_size_px: tuple[int, int]) -> DecodedCode:
+    """Projector column and row of every camera pixel; undecided in shadow and where a bit is unclear.
+
+    A mosaic is decoded pixel by pixel, since a pixel is compared with itself only.
+    """
+    decoder = GrayDecoder(GrayCode(), projector_size_px)
+    light = _one_channel(frames.white) - _one_channel(frames.black)
+    bright = float(np.quantile(light, 0.99))
+    # Noise of a bit over the light it is made of: the limit is a share, so each pixel has its own scale.
+    scale = np.where(lit_mask(light, 0, MIN_LIGHT * bright), light, np.inf)
+    for pattern, inverse in zip(frames.pairs[::2], frames.pairs[1::2], strict=True):
+        decoder.add(_one_channel(pattern), _one_channel(inverse), scale)
+    return decoder.finish(min_sigmas=MIN_MARGIN)
+
+
+def corners_on_projector(code: DecodedCode, corners: Corners) -> Floats:
+    """Column and row (px) of every corner on the projector, shape (corners, 2); NaN where too few decode."""
+    pitch = pitches_px(corners.points_px)
+    return np.array(
+        [
+            _corner_on_projector(code, point, WINDOW * step)
+            for point, step in zip(corners.points_px, pitch, strict=True)
+        ]
+    ).reshape(-1, 2)
+
+
+def _corner_on_projector(code: DecodedCode, point_px: Floats, radius_px: float) -> Floats:
+    import cv2
+
+    assert code.row is not None
+    reach = int(np.ceil(radius_px))
+    x, y = np.round(point_px).astype(int)
+    top, left = max(y - reach, 0), max(x - reach, 0)
+    window = (slice(top, y + reach + 1), slice(left, x + reach + 1))
+    rows, columns = np.nonzero(~code.undecided[window])
+    # Around the corner, so that the homography is well conditioned and its value there is its last column.
+    near = np.stack([columns + left, rows + top], 1) - point_px
+    inside = (near**2).sum(1) <= radius_px**2
+    near = near[inside]
+    if len(near) < MIN_PIXELS or not _surrounds(near):
+        return np.full(2, np.nan)
+    seen = np.stack([code.column[window], code.row[window]], -1)[rows[inside], columns[inside]].astype(float)
+    homography, used = cv2.findHomography(near, seen, cv2.RANSAC, INLIER_PX)
+    if homography is None or used.sum() < max(MIN_PIXELS, 0.5 * len(near)):
+        return np.full(2, np.nan)
+    return np.asarray(homography[:2, 2] / homography[2, 2], np.float64)
+
+
+def _surrounds(near: Floats) -> bool:
+    """Whether points lie on all sides of the origin, so that nothing is extrapolated."""
+    return bool((near.min(0) < 0).all() and (near.max(0) > 0).all())
+
+
+def _one_channel(picture: NDArray[Any]) -> NDArray[np.float32]:
+    values = np.asarray(picture, np.float32)
+    return np.asarray(values.mean(2)) if values.ndim == 3 else values
+
+
+def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, int]) -> str:
+    """Why a code cannot be read: another order of the pictures that can, or else how they are lit."""
+    bits = bit_counts(GrayCode(), projector_size_px)
+    for words, pairs in _other_orders(list(frames.pairs), bits[0]):
+        code = decode_pose(replace(frames, pairs=pairs), projector_size_px)
+        read = np.isfinite(corners_on_projector(code, corners)[:, 0]).mean()
+        if read > 0.8:
+            return f"It can be read if {words}: the order of the patterns is wrong. Correct it."
+    return (
+        "Check that the projector lights the whole board, that its pictures are neither too dark nor"
+        " over-exposed, and the order of the patterns (columns first, most significant bit first, each"
+        " followed by its inverse)."
+    )
+
+
+def _other_orders(frames: list[NDArray[Any]], column_bits: int) -> list[tuple[str, list[NDArray[Any]]]]:
+    """Orders that are easily mistaken for the right one, in words and as pictures put right."""
+    pairs = list(zip(frames[::2], frames[1::2], strict=True))
+    half, rows = len(pairs), len(pairs) - column_bits
+    orders = {
+        "every inverse comes before its pattern": [(b, a) for a, b in pairs],
+        "rows come before columns": pairs[rows:] + pairs[:rows],
+        "the least significant bit comes first": pairs[:column_bits][::-1] + pairs[column_bits:][::-1],
+        "all patterns come before all inverses": list(zip(frames[:half], frames[half:], strict=True)),
+    }
+    return [(words, [picture for pair in order for picture in pair]) for words, order in orders.items()]

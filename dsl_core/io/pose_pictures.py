@@ -1,0 +1,95 @@
+"""Folders of calibration pictures: one folder a board pose, pictures numbered in the order of the code."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.pose_frames import PoseFrames
+from dsl_core.model.rig import BayerPattern
+
+SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
+
+
+def pose_folders(folder: Path) -> list[Path]:
+    """The folders of poses below a folder, by number; raises `CalibrationError` when there is none."""
+    if not folder.is_dir():
+        raise CalibrationError(f"{folder} is not a folder. Give the folder that holds one folder a pose.")
+    found = sorted((path for path in folder.iterdir() if path.is_dir() and _pictures(path)), key=_natural)
+    if not found:
+        raise CalibrationError(
+            f"{folder} holds no folders with pictures. One folder a pose is wanted, like capture_0 with"
+            " graycode_00.png and so on."
+        )
+    return found
+
+
+def read_pose(folder: Path, bits: tuple[int, int], bayer: BayerPattern | None = None) -> PoseFrames:
+    """Pictures of one pose: ``bits`` column and row bits as pattern and inverse each, then white, then black.
+
+    Raises `CalibrationError` that names the picture that is missing, surplus, unreadable or of another size.
+    """
+    pictures, wanted = _pictures(folder), 2 * sum(bits) + 2
+    _check_numbers(folder, pictures, wanted)
+    frames = [_read(path) for path in pictures]
+    for path, frame in zip(pictures, frames, strict=True):
+        if frame.shape != frames[0].shape:
+            raise CalibrationError(
+                f"{path} is {_size(frame)} px, the first picture of its pose {_size(frames[0])} px."
+                " Take all pictures with one setting of the camera."
+            )
+    return PoseFrames(folder.name, frames[:-2], frames[-2], frames[-1], bayer)
+
+
+def require_one_size(sizes: Mapping[str, tuple[int, int]]) -> None:
+    """Raise `CalibrationError` when the pictures of poses, by name, are not all of one size."""
+    first, wanted = next(iter(sizes.items()))
+    for name, size in sizes.items():
+        if size != wanted:
+            raise CalibrationError(
+                f"The pictures of {name} are {size[0]} x {size[1]} px, those of {first}"
+                f" {wanted[0]} x {wanted[1]}. All poses must be taken with one rig at one binning and crop."
+            )
+
+
+def _pictures(folder: Path) -> list[Path]:
+    return sorted((path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES), key=_natural)
+
+
+def _check_numbers(folder: Path, pictures: list[Path], wanted: int) -> None:
+    if len(pictures) == wanted:
+        return
+    numbers = [int(found[-1]) for path in pictures if (found := re.findall(r"\d+", path.stem))]
+    absent = sorted(set(range(wanted)) - set(numbers))
+    lacks = f" Number {', '.join(map(str, absent[:5]))} is missing." if absent and numbers else ""
+    raise CalibrationError(
+        f"{folder} holds {len(pictures)} pictures, {wanted} are wanted: pattern and inverse of every bit of"
+        f" the projector's columns and rows, white, black.{lacks} Correct the projector's size or add the"
+        " pictures."
+    )
+
+
+def _read(path: Path) -> NDArray[Any]:
+    import cv2
+
+    # Through memory, because OpenCV cannot open every path on Windows.
+    data = np.frombuffer(path.read_bytes(), np.uint8)
+    picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    if picture is None:
+        raise CalibrationError(f"{path} cannot be read as a picture. Copy it again, or leave its pose out.")
+    return np.asarray(picture[..., :3] if picture.ndim == 3 else picture)
+
+
+def _size(frame: NDArray[Any]) -> str:
+    return f"{frame.shape[1]} x {frame.shape[0]}"
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sorts ``capture_10`` after ``capture_9``."""
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name)]

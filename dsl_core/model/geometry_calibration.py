@@ -1,0 +1,95 @@
+"""What a geometric calibration found, and how far to trust it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from dsl_core.model.base import Record
+from dsl_core.model.board import Board
+from dsl_core.model.geometry import Lens, Pose
+
+Numbers3 = tuple[float, float, float]
+
+
+class LensDeviation(Record):
+    """Standard deviations of a lens's parameters."""
+
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    distortion: tuple[float, float, float, float, float]
+
+
+class PoseDeviation(Record):
+    """Standard deviations of the pose between camera and projector, about x, y, z and along them."""
+
+    rotation_deg: Numbers3
+    translation_mm: Numbers3
+
+
+class Flatness(Record):
+    """The corners of one pose, triangulated: sides of the squares, and distance from their best plane."""
+
+    square_mm: float
+    square_std_mm: float
+    plane_rms_mm: float
+
+
+class PoseQuality(Record):
+    """Errors of one board pose; ``left_out`` is measured with a calibration that never saw it.
+
+    Errors are rms lengths (two axes together) over the ``corners`` that were no ``outliers``. A pose that is
+    not ``used`` did not fit the others.
+    """
+
+    name: str
+    corners: int
+    outliers: int
+    used: bool
+    camera_rms_px: float
+    projector_rms_px: float
+    distance_mm: float
+    tilt_deg: float
+    measured: Flatness
+    left_out: Flatness | None = None
+
+
+class GeometryCalibration(Record):
+    """Lenses and pose of camera and projector from a printed board, film off.
+
+    ``rms_px`` is the rms over camera and projector errors together. ``camera_binning`` is how many sensor
+    pixels a camera pixel spans along a side: errors times it are errors at full resolution. Coverage is the
+    share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used poses.
+    """
+
+    schema_version: Literal[1] = 1
+    board: Board
+    camera: Lens
+    projector: Lens
+    pose: Pose
+    camera_deviation: LensDeviation
+    projector_deviation: LensDeviation
+    pose_deviation: PoseDeviation
+    camera_rms_px: float
+    projector_rms_px: float
+    rms_px: float
+    camera_binning: float = Field(default=1.0, gt=0)
+    camera_coverage: float
+    projector_coverage: float
+    squares: Flatness
+    poses: tuple[PoseQuality, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def full_resolution_rms_px(self) -> float:
+        """`rms_px` with camera errors in pixels of the unbinned sensor."""
+        camera = self.camera_rms_px * self.camera_binning
+        return float(((camera**2 + self.projector_rms_px**2) / 2) ** 0.5)
+
+    @property
+    def plane_rms_share(self) -> float:
+        """Largest distance rms from a plane over the distance of its pose, of the used poses."""
+        return max(pose.measured.plane_rms_mm / pose.distance_mm for pose in self.poses if pose.used)
