@@ -7,13 +7,11 @@ command line starts at once.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.errors import CalibrationError, DecodeError, DeviceError, StoreError
+from dsl_core.errors import CalibrationError, DeviceError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.rig import Rig
@@ -28,7 +26,6 @@ if TYPE_CHECKING:
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.evaluation.report import ReportContent
     from dsl_core.evaluation.summary import Evaluation, Truth
-    from dsl_core.io.published import FileRecord
     from dsl_core.model.board import Board
     from dsl_core.model.geometry_calibration import GeometryCalibration
     from dsl_core.model.rig import BayerPattern
@@ -72,20 +69,6 @@ def scan(
     require_possible(rig, plan)
     with SessionWriter.open(folder, plan, rig, notes) as sink:
         return Runner(rig, plan, sink, pattern_image, progress=progress).run()
-
-
-def reopen_rig(folder: Path) -> DeviceRig:
-    """The rig that a session was started with; raises `StoreError` when the session does not say which."""
-    from dsl_core.devices.registry import open_rig
-    from dsl_core.io.origin import rig_of_notes
-    from dsl_core.io.session_manifest import read_manifest
-
-    origin = rig_of_notes(read_manifest(folder).notes)
-    if origin is None:
-        raise StoreError(
-            f"{folder} does not say with which rig it was taken. Name it with --rig and --option."
-        )
-    return open_rig(*origin)
 
 
 def resume(
@@ -158,81 +141,6 @@ def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:
     return rig
 
 
-def reconstruct_session(
-    folder: Path,
-    calibration: Rig | None = None,
-    options: Options | None = None,
-    progress: Progress | None = None,
-    timer: StageTimer | None = None,
-) -> xr.Dataset:
-    """The result of a complete session, with its origin and the cost of each stage among its attributes."""
-    from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.io.session import SessionReader
-    from dsl_core.io.session_check import require_complete
-
-    reader, timer = SessionReader(folder), timer or StageTimer()
-    require_complete(reader)
-    result = reconstruct(reader, calibration_of(reader, calibration), options, progress, timer)
-    return result.assign_attrs(
-        {
-            **reader.manifest.notes,
-            "captured": reader.manifest.created,
-            "captured_with": reader.manifest.rig_name,
-            "capture_plan": reader.plan.model_dump_json(),
-            "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
-        }
-    )
-
-
-def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
-    """What the twin knows of its scene; None for a real rig."""
-    from dsl_core.evaluation.summary import Truth
-    from dsl_core.simulation.sim_devices import SimCamera
-
-    if not isinstance(rig.camera, SimCamera):
-        return None
-    truth = rig.camera.world.truth
-    materials = truth.materials
-    return Truth(
-        truth.depth_mm,
-        truth.lit,
-        truth.material,
-        materials.names,
-        materials.at(grid.centres_nm),
-        materials.targets,
-    )
-
-
-def truth_of(
-    result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
-) -> Truth:
-    """Truth from the rig that took the scan, or the one named; raises `DecodeError` if there is none."""
-    from dsl_core.devices.registry import open_rig
-    from dsl_core.io.origin import rig_of_notes
-
-    origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
-    if origin is None:
-        raise DecodeError(
-            "The result does not say with which rig it was taken, so that there is no truth to compare with."
-            " Name a twin of the scene with --truth-rig twin and --option."
-        )
-    with open_rig(*origin) as rig:
-        truth = twin_truth(rig, _grid_of(result))
-    if truth is None:
-        raise DecodeError(
-            f"The rig {origin[0]!r} knows no truth of its scene."
-            " Name a twin of it with --truth-rig twin and --option."
-        )
-    return truth
-
-
-def _grid_of(result: xr.Dataset) -> WavelengthGrid:
-    if "wavelength_nm" not in result.coords:
-        return WavelengthGrid()
-    nm = result["wavelength_nm"].values
-    return WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=nm[1] - nm[0])
-
-
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     """Figures of a result against what is known of the scene."""
     from dsl_core.evaluation import summary
@@ -249,47 +157,6 @@ def write_report(content: ReportContent, path: Path, overwrite: bool = False) ->
     with staged([path], overwrite=overwrite) as (draft,):
         draft.write_text(page, encoding="utf-8")
     return path
-
-
-def export_scan(
-    folder: Path, target: Path, overwrite: bool = False, progress: Progress | None = None
-) -> list[Path]:
-    """Write a complete session in the published dataset layout and return the files; raises `StoreError`."""
-    from dsl_core.io.published import export_dataset
-    from dsl_core.io.session import SessionReader
-    from dsl_core.io.session_check import require_complete
-
-    reader = SessionReader(folder)
-    require_complete(reader)
-    sensor = calibration_of(reader).sensor
-    return export_dataset(
-        reader, target, bayer=sensor.bayer, bit_depth=sensor.bit_depth, overwrite=overwrite, progress=progress
-    )
-
-
-def import_scan(
-    root: Path, target: Path | None, calibration: Rig, progress: Progress | None = None
-) -> Sequence[FileRecord]:
-    """Check a published dataset, make a session of it if a target is given; return the table of files.
-
-    Raises `StoreError` naming the first file that is needed and cannot be used; then nothing is written.
-    """
-    from dsl_core.devices.replay import replay_rig
-    from dsl_core.io.published import open_dataset
-
-    source = open_dataset(root, bayer=calibration.sensor.bayer, bit_depth=calibration.sensor.bit_depth)
-    if target is not None:
-        source.require_frames()
-        scan(replay_rig(source, calibration), source.plan, target, progress, {"imported_from": root.name})
-    return source.table
-
-
-def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int]) -> Rig:
-    """A rig from published lenses, pose and curves on the film, sensor and scales of ``base``."""
-    from dsl_core.io.published import load_calibration
-
-    size = (base.projector.width_px, base.projector.height_px)
-    return load_calibration(root, size, camera_size_px).rig(base)
 
 
 def calibrate_geometry(

@@ -93,7 +93,7 @@ def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str,
 
 def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
     from dsl_core.io.result_file import save_result
-    from dsl_core.pipeline import reconstruct_session
+    from dsl_core.sessions import reconstruct_session
 
     with output.progress() as progress:
         result = reconstruct_session(folder / SCAN, progress=progress, timer=timer)
@@ -104,13 +104,13 @@ def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
 
 def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Dataset) -> dict[str, float]:
     """Figures, exports and the report."""
-    from dsl_core import pipeline
+    from dsl_core import pipeline, sessions
     from dsl_core.cli.results import print_figures, report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export
 
     with timer.stage("evaluate"):
-        truth = pipeline.truth_of(result)
+        truth = sessions.truth_of(result)
         evaluation = pipeline.evaluate(result, truth)
     with timer.stage("export PLY, PNG, ENVI"):
         for form, name in (("ply", "points.ply"), ("png", "picture.png"), ("envi", "cube.hdr")):

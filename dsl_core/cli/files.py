@@ -38,7 +38,7 @@ def import_(
     json: Json = False,
 ) -> None:
     """Read the published dataset or calibration layout; say what is missing or misnamed."""
-    from dsl_core import pipeline
+    from dsl_core import exchange
     from dsl_core.io.published import check_calibration
     from dsl_core.io.published.calibration import STEREO_NAME, TABLE_FOLDER
     from dsl_core.io.rig_file import load_rig, save_rig
@@ -50,7 +50,7 @@ def import_(
     if (source / STEREO_NAME.parent).is_dir() or (source / TABLE_FOLDER).is_dir():
         _print_files(output, "calibration", check_calibration(source))
         if target is not None:
-            imported = pipeline.import_calibration(source, rig, parse_size("--camera-size", camera_size))
+            imported = exchange.import_calibration(source, rig, parse_size("--camera-size", camera_size))
             save_rig(imported, target, overwrite=force)
     else:
         _import_dataset(output, source, target, rig)
@@ -62,12 +62,12 @@ def import_(
 
 def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig) -> None:
     """The table comes first, so that it is there when the import is refused."""
-    from dsl_core import pipeline
+    from dsl_core import exchange
 
-    _print_files(output, "dataset", pipeline.import_scan(source, None, rig))
+    _print_files(output, "dataset", exchange.import_scan(source, None, rig))
     if target is not None:
         with output.progress() as progress:
-            pipeline.import_scan(source, target, rig, progress)
+            exchange.import_scan(source, target, rig, progress)
 
 
 def _print_files(output: Output, kind: str, records: Sequence[FileRecord]) -> None:

@@ -46,7 +46,8 @@ def reconstruct(
     from dsl_core.io.result_file import save_result
     from dsl_core.io.rig_file import load_rig
     from dsl_core.io.staging import check_targets
-    from dsl_core.pipeline import Options, reconstruct_session
+    from dsl_core.pipeline import Options
+    from dsl_core.sessions import reconstruct_session
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
     if model not in MODELS:
@@ -79,7 +80,7 @@ def evaluate(
     json: Json = False,
 ) -> None:
     """Compare a result with known truth, in figures and one self-contained HTML page."""
-    from dsl_core import pipeline
+    from dsl_core import pipeline, sessions
     from dsl_core.evaluation.verdict import figures
     from dsl_core.io.result_file import load_result
     from dsl_core.io.staging import check_targets
@@ -87,7 +88,7 @@ def evaluate(
     output, report = Output(json), report or path.with_suffix(".html")
     check_targets([report], overwrite=force)
     result = load_result(path)
-    truth = pipeline.truth_of(result, truth_rig, parse_options(option))
+    truth = sessions.truth_of(result, truth_rig, parse_options(option))
     evaluation = pipeline.evaluate(result, truth)
     pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
     print_figures(output, evaluation)
@@ -118,7 +119,7 @@ def export(
 def _export(
     output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
 ) -> list[Path]:
-    from dsl_core import pipeline
+    from dsl_core import exchange, pipeline
     from dsl_core.io.export import export as export_result
     from dsl_core.io.export import export_csv
     from dsl_core.io.published import export_calibration
@@ -130,7 +131,7 @@ def _export(
         raise PlanError(f"--pixel is for csv; {form} holds all pixels. Leave it out.")
     if form == "dataset":
         with output.progress() as progress:
-            return pipeline.export_scan(path, target, force, progress)
+            return exchange.export_scan(path, target, force, progress)
     if form == "calibration":
         rig = load_rig(path) if path.is_file() else pipeline.calibration_of(SessionReader(path))
         return export_calibration(rig, target, overwrite=force)

@@ -129,14 +129,14 @@ def resume(
     json: Json = False,
 ) -> None:
     """Go on with a scan that was stopped, or killed, at its next missing frame."""
-    from dsl_core import pipeline
+    from dsl_core import pipeline, sessions
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.session import SessionReader
 
     output = Output(json)
     missing = len(SessionReader(target).missing())
     output.say(f"{target} lacks {missing} frames.")
-    opened = open_rig(rig, parse_options(option)) if rig else pipeline.reopen_rig(target)
+    opened = open_rig(rig, parse_options(option)) if rig else sessions.reopen_rig(target)
     with opened as devices, output.progress() as progress, _resumable(target):
         status = pipeline.resume(devices, target, progress, drift)
     _done(output, target, status.done, status.elapsed_s)

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core import pipeline
+from dsl_core import pipeline, sessions
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.model.result import build_result
 from dsl_core.model.spectral import WavelengthGrid
@@ -38,7 +38,7 @@ def compare(scene: str, thin: int, steps: int) -> None:
     """Scan a scene, solve it twice, print errors and times."""
     grid = WavelengthGrid()
     devices, scan = twin_scan(size=SIZE, scene=scene)
-    rig, truth = devices.calibration, pipeline.twin_truth(devices, grid)
+    rig, truth = devices.calibration, sessions.twin_truth(devices, grid)
     assert rig is not None
     assert truth is not None
     stack, pixels = solver_input(rig, scan)

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dsl_core import pipeline
+from dsl_core import pipeline, sessions
 from dsl_core.devices.base import DeviceRig
 from dsl_core.evaluation.summary import Evaluation, Truth, interior
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, Calibration, calibration
@@ -92,7 +92,7 @@ def prepare(scene: str, size: str) -> Prepared:
 
 def calibration_and_truth(devices: DeviceRig) -> tuple[Rig, Truth]:
     """What the twin knows of itself and of its scene."""
-    truth = pipeline.twin_truth(devices, GRID)
+    truth = sessions.twin_truth(devices, GRID)
     assert devices.calibration is not None
     assert truth is not None
     return devices.calibration, truth

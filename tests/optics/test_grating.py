@@ -34,7 +34,7 @@ def point(x: float, y: float, z: float) -> Vectors:
 def test_flat_film_and_far_point_obey_the_grating_equation(order: int) -> None:
     frame = FilmFrame.of(Film(lines_per_mm=500.0))
     direction = incoming_direction(frame, point(0.0, 0.0, 1e9), order, NM)
-    # Leaving along the axis (a' = 0) through order m needs light that arrives with a = m * wavelength / period.
+    # Leaving along the axis (a' = 0) through order m takes light that arrives with m * wavelength / period.
     assert direction.x.numpy() == pytest.approx(order * NM.numpy() / 2000.0, abs=1e-6)
     assert direction.y.abs().max() < 1e-12
     length = direction.x**2 + direction.y**2 + direction.z**2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core import pipeline
+from dsl_core import pipeline, sessions
 from dsl_core.calibration.correspondence import fit_grid, sample_grating
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import PlanError
@@ -36,7 +36,7 @@ def grid_rig(rig: Rig) -> Rig:
 
 
 def evaluate(scanned: tuple[DeviceRig, MemoryScan], cube: NDArray[np.float32]) -> Evaluation:
-    truth = pipeline.twin_truth(scanned[0], GRID)
+    truth = sessions.twin_truth(scanned[0], GRID)
     assert truth is not None
     return pipeline.evaluate(build_result({"reflectance": cube}, GRID.centres_nm, {}), truth)
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from dsl_core import pipeline
+from dsl_core import pipeline, sessions
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.evaluation.uncertainty import calibration
 from dsl_core.model.frames import FrameSource
@@ -48,7 +48,7 @@ def scan(
     devices = cropped_twin(scene, corner_px, size_px)
     with one_torch_thread():
         frames = capture(devices, plan)
-    truth = pipeline.twin_truth(devices, GRID)
+    truth = sessions.twin_truth(devices, GRID)
     assert truth is not None
     assert devices.calibration is not None
     return Scanned(devices.calibration, frames, truth)
@@ -127,7 +127,7 @@ def test_noise_model_explains_what_the_spectra_leave(maps: SpectralMaps) -> None
 def test_half_as_many_bands(chart: Scanned) -> None:
     grid = WavelengthGrid(step_nm=10.0)
     devices = cropped_twin("color-checker", CHART)
-    truth = pipeline.twin_truth(devices, grid)
+    truth = sessions.twin_truth(devices, grid)
     assert truth is not None
     result = chart.reconstruct(grid)
     assert result.sizes["wavelength_nm"] == 24

@@ -1,0 +1,111 @@
+"""Scans and results that know where they come from: reopened, reconstructed and compared with their truth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.errors import DecodeError, StoreError
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.pipeline import Options, calibration_of, reconstruct
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.devices.base import DeviceRig
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.evaluation.summary import Truth
+
+
+def reopen_rig(folder: Path) -> DeviceRig:
+    """The rig that a session was started with; raises `StoreError` when the session does not say which."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.origin import rig_of_notes
+    from dsl_core.io.session_manifest import read_manifest
+
+    origin = rig_of_notes(read_manifest(folder).notes)
+    if origin is None:
+        raise StoreError(
+            f"{folder} does not say with which rig it was taken. Name it with --rig and --option."
+        )
+    return open_rig(*origin)
+
+
+def reconstruct_session(
+    folder: Path,
+    calibration: Rig | None = None,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    timer: StageTimer | None = None,
+) -> xr.Dataset:
+    """The result of a complete session, with its origin and the cost of each stage among its attributes."""
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.session import SessionReader
+    from dsl_core.io.session_check import require_complete
+
+    reader, timer = SessionReader(folder), timer or StageTimer()
+    require_complete(reader)
+    result = reconstruct(reader, calibration_of(reader, calibration), options, progress, timer)
+    return result.assign_attrs(
+        {
+            **reader.manifest.notes,
+            "captured": reader.manifest.created,
+            "captured_with": reader.manifest.rig_name,
+            "capture_plan": reader.plan.model_dump_json(),
+            "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
+        }
+    )
+
+
+def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
+    """What the twin knows of its scene; None for a real rig."""
+    from dsl_core.evaluation.summary import Truth
+    from dsl_core.simulation.sim_devices import SimCamera
+
+    if not isinstance(rig.camera, SimCamera):
+        return None
+    truth = rig.camera.world.truth
+    materials = truth.materials
+    return Truth(
+        truth.depth_mm,
+        truth.lit,
+        truth.material,
+        materials.names,
+        materials.at(grid.centres_nm),
+        materials.targets,
+    )
+
+
+def truth_of(
+    result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
+) -> Truth:
+    """Truth from the rig that took the scan, or the one named; raises `DecodeError` if there is none."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.origin import rig_of_notes
+
+    origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
+    if origin is None:
+        raise DecodeError(
+            "The result does not say with which rig it was taken, so that there is no truth to compare with."
+            " Name a twin of the scene with --truth-rig twin and --option."
+        )
+    with open_rig(*origin) as rig:
+        truth = twin_truth(rig, _grid_of(result))
+    if truth is None:
+        raise DecodeError(
+            f"The rig {origin[0]!r} knows no truth of its scene."
+            " Name a twin of it with --truth-rig twin and --option."
+        )
+    return truth
+
+
+def _grid_of(result: xr.Dataset) -> WavelengthGrid:
+    if "wavelength_nm" not in result.coords:
+        return WavelengthGrid()
+    nm = result["wavelength_nm"].values
+    return WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=nm[1] - nm[0])
