@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,8 @@ LENS = 9
 SHARED = 2 * LENS + 6
 #: Corners farther off than this many robust deviations do not lie on the plane of the board, or are misread.
 OUTLIER_SIGMAS, MAX_ROUNDS = 4.0, 12
+#: Before that, corners weigh less the farther off they are, from this many deviations on.
+CAUCHY_SIGMAS, ROBUST_ROUNDS = 2.0, 3
 CAMERA, PROJECTOR, STEREO = slice(0, LENS), slice(LENS, 2 * LENS), slice(2 * LENS, SHARED)
 
 
@@ -51,7 +52,6 @@ class Problem:
         self.camera_px = np.concatenate([pose.camera_px for pose in poses])
         self.projector_px = np.concatenate([pose.projector_px for pose in poses])
         self.pose_of = np.repeat(np.arange(len(poses)), [len(pose.ids) for pose in poses])
-        self.pose_count = len(poses)
 
     def evaluate(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Residuals (corners, 2) of camera and projector, and their derivatives (corners, 2, parameters)."""
@@ -120,53 +120,82 @@ def project(lens: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
 def adjust(
     poses: Sequence[PoseObservation], start: Floats, outlier_sigmas: float = OUTLIER_SIGMAS
 ) -> Adjustment:
-    """Minimise the weighted squares of all corners, first with a robust loss, then without the outliers.
+    """Minimise the weighted squares of all corners, first with robust weights, then without the outliers.
 
-    Camera and projector are weighted by their own noise, which the residuals of the robust fit tell. Raises
+    Camera and projector are weighted by their own noise, which the residuals tell. Raises
     `CalibrationError` when the fit does not converge.
     """
     problem = Problem(poses)
+    parameters = start
+    for _ in range(ROBUST_ROUNDS):
+        far = _farthest(problem, parameters, np.ones(len(problem.pose_of), bool))
+        parameters = _solve(problem, parameters, (1.0, 1.0), 1 / (1 + (far / CAUCHY_SIGMAS) ** 2))
     used = np.ones(len(problem.pose_of), bool)
-    parameters = _solve(problem, start, (1.0, 1.0), used, "soft_l1")
     for _ in range(MAX_ROUNDS):
-        camera, projector, _, _ = problem.evaluate(parameters)
-        sigmas = _noise(camera[used]), _noise(projector[used])
-        farthest = np.maximum(np.abs(camera).max(1) / sigmas[0], np.abs(projector).max(1) / sigmas[1])
-        before, used = used, farthest <= outlier_sigmas
+        sigmas = _noises(problem, parameters, used)
+        before, used = used, _farthest(problem, parameters, used) <= outlier_sigmas
         if 4 * used.sum() <= len(parameters):
             raise CalibrationError(
                 "Camera and projector do not fit one board: most corners are outliers. Check the number of"
                 " corners of the board, the projector's size, and that nothing moved during a pose."
             )
-        parameters = _solve(problem, parameters, sigmas, used, "linear")
+        parameters = _solve(problem, parameters, sigmas, used.astype(float))
         if np.array_equal(before, used):
             break
     return _summary(problem, parameters, used, sigmas)
 
 
-def _solve(
-    problem: Problem, start: Floats, sigmas: tuple[float, float], used: NDArray[np.bool_], loss: Any
-) -> Floats:
+def refit(poses: Sequence[PoseObservation], start: Floats) -> Floats:
+    """Parameters for other poses of the same rig, without their outliers, from a start that is close."""
+    problem = Problem(poses)
+    everything = np.ones(len(problem.pose_of), bool)
+    sigmas = _noises(problem, start, everything)
+    return _solve(
+        problem, start, sigmas, (_farthest(problem, start, everything) <= OUTLIER_SIGMAS).astype(float)
+    )
+
+
+def _solve(problem: Problem, start: Floats, sigmas: tuple[float, float], weights: Floats) -> Floats:
+    """Levenberg and Marquardt for weighted corners."""
     from scipy.optimize import least_squares
 
+    root = np.sqrt(weights)[:, None]
+
+    # MINPACK asks for the derivatives where it last asked for the residuals.
+    last: dict[bytes, tuple[Floats, Floats, Floats, Floats]] = {}
+
+    def evaluated(parameters: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        key = parameters.tobytes()
+        if key not in last:
+            last.clear()
+            last[key] = problem.evaluate(parameters)
+        return last[key]
+
     def residuals(parameters: Floats) -> Floats:
-        camera, projector, _, _ = problem.evaluate(parameters)
-        return np.concatenate([(camera[used] / sigmas[0]).ravel(), (projector[used] / sigmas[1]).ravel()])
+        camera, projector, _, _ = evaluated(parameters)
+        return np.concatenate([(camera * root / sigmas[0]).ravel(), (projector * root / sigmas[1]).ravel()])
 
     def jacobian(parameters: Floats) -> Floats:
-        _, _, camera, projector = problem.evaluate(parameters)
-        size = (-1, camera.shape[2])
-        camera_rows, projector_rows = camera[used].reshape(size), projector[used].reshape(size)
-        return np.concatenate([camera_rows / sigmas[0], projector_rows / sigmas[1]])
+        _, _, camera, projector = evaluated(parameters)
+        both = [camera * root[:, None] / sigmas[0], projector * root[:, None] / sigmas[1]]
+        return np.concatenate(both).reshape(-1, len(parameters))
 
-    # The robust fit only has to tell the outliers; MINPACK's is the quicker one for the rest.
-    how: dict[str, Any] = (
-        {"method": "lm"} if loss == "linear" else {"method": "trf", "loss": loss, "ftol": 1e-3}
-    )
-    fit = least_squares(residuals, start, jac=jacobian, x_scale="jac", max_nfev=200, **how)
+    fit = least_squares(residuals, start, jac=jacobian, method="lm", x_scale="jac", max_nfev=200)
     if not np.isfinite(fit.x).all():
         raise CalibrationError("The joint fit of camera and projector did not converge. Take more poses.")
     return np.asarray(fit.x, np.float64)
+
+
+def _noises(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> tuple[float, float]:
+    camera, projector, _, _ = problem.evaluate(parameters)
+    return _noise(camera[used]), _noise(projector[used])
+
+
+def _farthest(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> Floats:
+    """Largest of the four errors of every corner, in robust standard deviations of the used ones."""
+    camera, projector, _, _ = problem.evaluate(parameters)
+    errors = np.abs(camera).max(1) / _noise(camera[used]), np.abs(projector).max(1) / _noise(projector[used])
+    return np.asarray(np.maximum(*errors))
 
 
 def _summary(

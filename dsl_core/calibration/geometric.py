@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration import bundle
-from dsl_core.calibration.bundle import Adjustment, adjust, rotation_of, vector_of
+from dsl_core.calibration.bundle import Adjustment, adjust, refit, rotation_of, vector_of
 from dsl_core.calibration.geometry_diagnosis import check_poses, coverage, doubts
 from dsl_core.calibration.projector_corners import PoseObservation
 from dsl_core.calibration.triangulation import flatness, triangulate
@@ -149,8 +149,8 @@ def _qualities(
         left_out = None
         if kept[index] and len(kept_poses) >= MIN_POSES_TO_LEAVE_OUT:
             rest = [other for i, other in enumerate(kept_poses) if i != at]
-            unseen = adjust(rest, without(final.parameters, [at]))
-            left_out = _measured(unseen.parameters, pose.only(used), motion, board)
+            unseen = refit(rest, without(final.parameters, [at]))
+            left_out = _measured(unseen, pose.only(used), motion, board)
         found.append(
             PoseQuality(
                 name=pose.name,
@@ -210,6 +210,7 @@ def _record(
         camera_rms_px=camera,
         projector_rms_px=projector,
         rms_px=float(np.hypot(camera, projector) / np.sqrt(2)),
+        rms_with_outliers_px=float(np.sqrt(np.square(_rms_px(fit, slice(None), only_used=False)).mean())),
         camera_coverage=coverage(np.concatenate([pose.camera_px for pose in chosen]), camera_size_px),
         projector_coverage=coverage(
             np.concatenate([pose.projector_px for pose in chosen]), projector_size_px

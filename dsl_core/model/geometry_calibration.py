@@ -60,9 +60,10 @@ class PoseQuality(Record):
 class GeometryCalibration(Record):
     """Lenses and pose of camera and projector from a printed board, film off.
 
-    ``rms_px`` is the rms over camera and projector errors together. ``camera_binning`` is how many sensor
-    pixels a camera pixel spans along a side: errors times it are errors at full resolution. Coverage is the
-    share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used poses.
+    ``rms_px`` is the rms over camera and projector errors together, without outliers. ``camera_binning`` is
+    how many sensor pixels a camera pixel spans along a side: errors times it are errors at full resolution.
+    Coverage is the share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used
+    poses.
     """
 
     schema_version: Literal[1] = 1
@@ -76,6 +77,7 @@ class GeometryCalibration(Record):
     camera_rms_px: float
     projector_rms_px: float
     rms_px: float
+    rms_with_outliers_px: float
     camera_binning: float = Field(default=1.0, gt=0)
     camera_coverage: float
     projector_coverage: float
