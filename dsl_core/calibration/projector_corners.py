@@ -32,6 +32,8 @@ MIN_MARGIN = 0.05
 MIN_LIGHT = 0.03
 #: Share of the corners around which the code must be readable.
 MIN_READ = 0.4
+#: Share of readable pixels that may tell of places that the projector does not have.
+MAX_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,24 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
             f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be read"
             f" around {known.sum()} of them only. {explain(frames, corners, projector_size_px)}"
         )
+    _check_projector_size(code, frames.name, projector_size_px)
     seen = PoseObservation(
         frames.name, corners.ids, corner_positions_mm(board)[corners.ids], corners.points_px, projector_px
     )
     return seen.only(known)
+
+
+def _check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[int, int]) -> None:
+    """Bits that are clear never lead outside the projector, unless its size is wrong."""
+    assert code.margin_sigmas is not None
+    clear = code.margin_sigmas >= MIN_MARGIN
+    outside = float((code.undecided & clear).sum() / max(clear.sum(), 1))
+    if outside > MAX_OUTSIDE:
+        width, height = projector_size_px
+        raise CalibrationError(
+            f"{name}: {outside:.0%} of the pixels that can be read tell of places outside a projector of"
+            f" {width} x {height} px. Correct its size; width and height may be exchanged."
+        )
 
 
 def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:

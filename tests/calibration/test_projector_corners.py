@@ -114,6 +114,12 @@ def test_bad_pictures_name_the_pose(
         observe_pose(change(frames), SMALL_BOARD, SMALL_PROJECTOR_PX)
 
 
+@pytest.mark.parametrize("size_px", [(96, 128), (128, 65)])
+def test_a_wrong_size_of_the_projector_is_told(frames: PoseFrames, size_px: tuple[int, int]) -> None:
+    with pytest.raises(CalibrationError, match=r"pose_0: \d+% of the pixels .* outside a projector of"):
+        observe_pose(frames, SMALL_BOARD, size_px)
+
+
 def test_over_exposure_is_told(frames: PoseFrames) -> None:
     seen = observe_pose(frames, SMALL_BOARD, SMALL_PROJECTOR_PX)
     assert exposure_warning(frames, seen) is None
