@@ -54,9 +54,10 @@ class ProfileTable:
         index = (distance_px + self.support_px).mul_(SAMPLES).add_(0.5).clip_(0, len(self.values) - 1).int()
         return self.values.index_select(0, index.reshape(-1)).reshape(index.shape)
 
-    def overlaps(self, spacing_px: float) -> NDArray[np.float64]:
-        """Integrated products of profiles one, two, ... spacings apart, relative to none; ends at zero."""
+    def overlaps(self, spacing_px: float, slack_px: float) -> NDArray[np.float64]:
+        """Integrated products of profiles one, two, ... spacings less a slack apart, relative to none."""
         values = self.values.double().cpu().numpy()
-        step = round(spacing_px * SAMPLES)
-        shifts = range(step, len(values), step)
-        return np.asarray([values[s:] @ values[:-s] for s in shifts], np.float64) / float(values @ values)
+        lags = np.arange(spacing_px, len(values) / SAMPLES + slack_px, spacing_px) - slack_px
+        shifts = np.maximum((lags * SAMPLES).astype(int), 1)
+        products = [values[s:] @ values[:-s] for s in shifts]
+        return np.asarray(products, np.float64) / float(values @ values)

@@ -25,7 +25,7 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath
-from dsl_core.optics.line_profile import ProfileTable
+from dsl_core.optics.line_profile import SAMPLES, ProfileTable
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.reconstruction.line_set import LineSet
 
@@ -34,6 +34,10 @@ ORDERS = (1, -1)
 PAD_NM = 15.0
 #: Tables of line profiles are shared by pixels whose dispersion agrees to this, px per nm.
 SLOPE_STEP = 0.02
+#: How much closer than their mean spacing bands may lie, because the response moves their centroids.
+CENTROID_SLACK_PX = 0.5
+#: Bands of usable first orders are never closer; evanescent ones, far outside the frame, may coincide.
+MIN_SPACING_PX = 0.5
 #: Diagonals whose sum is below this share of the main one are left out.
 DROPPED = 2e-5
 #: Bands that share one window of lines while the normal equations are added up.
@@ -126,7 +130,10 @@ class BandedAccumulator:
         """
         half = band_halfwidth_px(columns, self.bands.step_nm, self.bands.centres_nm)
         table = profile_table(self.rig, self.lines.width_px, half, columns, blur_px)
-        tails = table.overlaps(half)[::-1].cumsum()[::-1]
+        # On the table's grid a band has the same profile in every group, and the matrix is a true square.
+        columns = (columns * SAMPLES).round() / SAMPLES
+        spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(min=MIN_SPACING_PX)
+        tails = table.overlaps(float(spacing), CENTROID_SLACK_PX)[::-1].cumsum()[::-1]
         bandwidth = max(min(int((tails > DROPPED).sum()), self.bands.count - 1), 1)
         # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels
         # would not be positive definite.
