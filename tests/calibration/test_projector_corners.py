@@ -136,3 +136,8 @@ def test_part_of_a_charuco_board_is_enough() -> None:
     assert 12 <= len(found.ids) < 35
     expected = np.stack([found.ids % 7 + 1, found.ids // 7 + 1], 1) * 80.0 + 39.5
     assert np.abs(found.points_px - expected).max() < 0.2
+
+
+def test_the_grey_of_an_even_mosaic_is_even() -> None:
+    mosaic = np.tile([[100.0, 200.0], [200.0, 40.0]], (6, 8))
+    np.testing.assert_allclose(grey_of(mosaic, "RGGB"), 0.25 * 100 + 0.5 * 200 + 0.25 * 40)
