@@ -41,7 +41,7 @@ class ProfileTable:
     def __init__(
         self, width_px: float, blur_px: float, band_px: float, device: torch.device, dtype: torch.dtype
     ) -> None:
-        self.support_px = math.ceil(2 * (width_px / 2 + band_px + 2.3 * blur_px)) / 2
+        self.support_px = math.ceil(2 * (width_px / 2 + band_px + 2.2 * blur_px)) / 2
         count = int(2 * self.support_px * SAMPLES) + 1
         grid = np.linspace(-self.support_px, self.support_px, count)
         values = band_profile(grid, width_px, blur_px, band_px)

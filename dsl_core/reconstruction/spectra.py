@@ -158,6 +158,7 @@ class SpectralReconstruction:
         depth = torch.as_tensor(self.pixels.depth_mm.ravel()[flat], device=self.device, dtype=self.dtype)
         return self.model.trace(index, depth, order, nm)
 
+    @torch.inference_mode()
     def _tile(self, rows: slice, columns: slice, out: SpectralMaps) -> None:
         valid = self.pixels.valid[rows, columns]
         if not valid.any():

@@ -53,29 +53,33 @@ class PatternTable:
 
     def at(self, led: int, column: Tensor, row: Tensor) -> Tensor:
         """Zero-order light at projector positions (px); linear across, nearest down."""
-        return _lookup(self.blurred[led], (column + 0.5) * self.oversample[0] - 0.5, self._row(row))
+        blurred = self.blurred[led]
+        return _lookup(blurred, (column + 0.5) * self.oversample[0] - 0.5, self._offset(row, blurred))
 
     def mean_between(self, led: int, start: Tensor, stop: Tensor, row: Tensor | None) -> Tensor:
         """Mean of the pattern between two columns (px), zero outside the frame."""
-        at_row = self._row(row)
         running = self.running[led]
-        above, below = (_lookup(running, column + 0.5, at_row) for column in (stop, start))
+        offset = self._offset(row, running)
+        above, below = (_lookup(running, column + 0.5, offset) for column in (stop, start))
         return (above - below) / (stop - start)
 
-    def _row(self, row: Tensor | None) -> Tensor | None:
+    def _offset(self, row: Tensor | None, table: Tensor) -> Tensor | None:
+        """Index of the first sample of the row nearest to positions (px); None for patterns without rows."""
         if row is None or not self.has_rows:
             return None
-        return ((row + 0.5) * self.oversample[1]).clip(0, self.blurred.shape[1] - 1).int()
+        nearest = ((row + 0.5) * self.oversample[1]).clip(0, table.shape[0] - 1).int()
+        return nearest.mul_(table.shape[1])
 
 
-def _lookup(table: Tensor, position: Tensor, row: Tensor | None) -> Tensor:
-    samples = table.shape[1]
-    p = position.clip(0, samples - 1.001)
-    whole = p.int()
-    index = whole if row is None else whole + row * samples
+def _lookup(table: Tensor, position: Tensor, offset: Tensor | None) -> Tensor:
+    """Linear interpolation in a table (rows, samples), the row given by the offset of its first sample."""
+    p = position.clip(0, table.shape[1] - 1.001)
+    index = p.int()
+    p -= index
+    if offset is not None:
+        index += offset
     flat = table.reshape(-1)
-    left = flat.index_select(0, index)
-    return left + (p - whole) * (flat.index_select(0, index + 1) - left)
+    return torch.lerp(flat.index_select(0, index), flat.index_select(0, index + 1), p)
 
 
 @lru_cache(maxsize=8)

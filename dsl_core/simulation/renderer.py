@@ -7,6 +7,7 @@ summed over spectral slices. Both use the same correspondence and response as th
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -31,9 +32,10 @@ from dsl_core.simulation.pattern_table import PatternTable
 from dsl_core.simulation.truth import SceneTruth
 
 ORDERS = (1, -1, 2, -2)
+THREADS = 2
 NM = np.arange(400.0, 701.0)
 #: Spectral slices of patterns that are not lines, nm; wider where the pattern also varies along rows.
-SLICE_NM, SLICE_ROWS_NM = 10, 20
+SLICE_NM, SLICE_ROWS_NM = 10, 25
 #: Patterns with more runs of lit columns than this are summed over slices.
 MAX_RUNS = 8
 #: Degree of the polynomial from column to wavelength; error below 0.01 nm over the film's range.
@@ -228,11 +230,17 @@ class Renderer:
     def _sliced(self, table: PatternTable) -> Tensor:
         leds = [slice(0, 3)] if table.leds == 1 else [slice(i, i + 1) for i in range(3)]
         signal = torch.zeros_like(self.column)
+        tasks = []
         for led, of_led in enumerate(leds):
             zero = self.zero_table[of_led].sum(0)[self.material_channel]
             signal += zero * table.at(led, self.column, self.row)
-            for tables in self.orders:
-                signal[tables.active] += self._sliced_order(tables, table, led, of_led)
+            tasks += [(tables, table, led, of_led) for tables in self.orders if len(tables.active)]
+        # Orders are independent, so each core takes its share of them.
+        with ThreadPoolExecutor(THREADS) as pool:
+            for (tables, *_), part in zip(
+                tasks, pool.map(lambda t: self._sliced_order(*t), tasks), strict=True
+            ):
+                signal[tables.active] += part
         return signal
 
     def _sliced_order(self, tables: OrderTables, table: PatternTable, led: int, of_led: slice) -> Tensor:
@@ -245,14 +253,18 @@ class Renderer:
         to_centres = like(interpolation_matrix(nodes, centres), self.column)
         material = self.material_channel[tables.active]
         total = torch.zeros(len(tables.active), device=self.device)
-        negligible = 1e-3 * float(weights.max())
-        for i, nm in enumerate(centres):
-            if float(weights[i].max()) < negligible:
-                continue
+        strongest = weights.amax(1)
+        used = torch.nonzero(strongest >= 1e-3 * strongest.max()).ravel().tolist()
+        low, high = float(tables.limits_nm[0].max()), float(tables.limits_nm[1].min())
+        stop, last = None, -2
+        for i in used:
+            start = stop if stop is not None and last == i - 1 else to_edges[i] @ tables.node_columns
+            stop, last = to_edges[i + 1] @ tables.node_columns, i
             row = to_centres[i] @ tables.node_rows if table.has_rows else None
-            start, stop = to_edges[i] @ tables.node_columns, to_edges[i + 1] @ tables.node_columns
             mean = table.mean_between(led, start, stop, row)
-            mean *= (tables.limits_nm[0] <= float(nm)) & (tables.limits_nm[1] >= float(nm))
+            nm = float(centres[i])
+            if not low <= nm <= high:
+                mean *= (tables.limits_nm[0] <= nm) & (tables.limits_nm[1] >= nm)
             total.addcmul_(mean, weights[i][material])
         return total
 
