@@ -207,31 +207,24 @@ def _bounded(
 ) -> tuple[Tensor, Tensor]:
     """Minimum inside the bounds by an active-set iteration where it is needed, and the active bands."""
     low, high = bounds
-    active = torch.zeros_like(mean, dtype=torch.bool)
+    x, pinned = mean.clone(), torch.zeros_like(mean, dtype=torch.bool)
+    slope = torch.zeros_like(mean)
     todo = torch.nonzero(((mean < low - TOLERANCE) | (mean > high + TOLERANCE)).any(0)).ravel()
-    if len(todo) == 0:
-        return mean.clip(low, high), active
-    x, b = mean[:, todo], right[:, todo]
-    sub_data, sub_rows = data[..., todo], None if rows is None else rows[..., todo]
-    sub_prior = prior[..., todo]
-    pinned = torch.zeros_like(x, dtype=torch.bool)
-    slope = torch.zeros_like(x)
-    matrix = free.matrix[..., todo]
-    scale = sub_data[0] + sub_prior[0]
     for _ in range(ACTIVE_SET_ROUNDS):
-        at = torch.where(x < 0.5 * (low + high), low, high)
-        release = pinned & torch.where(at == low, slope < 0, slope > 0)
-        outside = (x < low - TOLERANCE) | (x > high + TOLERANCE)
-        changed = (pinned & ~release) | outside
-        if bool((changed == pinned).all()):
+        here, held = x[:, todo], pinned[:, todo]
+        at = torch.where(here < 0.5 * (low + high), low, high)
+        release = held & torch.where(at == low, slope[:, todo] < 0, slope[:, todo] > 0)
+        wanted = (held & ~release) | (here < low - TOLERANCE) | (here > high + TOLERANCE)
+        # Pixels whose bands stay on their sides are done.
+        moved = (wanted != held).any(0)
+        if not bool(moved.any()):
             break
-        pinned = changed
-        held = torch.where(pinned, PENALTY * scale, 0.0)
-        stiff = sub_prior.clone()
-        stiff[0] += held
-        x = Posterior(sub_data, stiff, sub_rows).solve(b + held * torch.where(pinned, at, 0.0))
-        slope = gradient(matrix, sub_rows, x, b)
-    out = mean.clone()
-    out[:, todo] = x
-    active[:, todo] = pinned
-    return out.clip(low, high), active
+        todo, at, wanted = todo[moved], at[:, moved], wanted[:, moved]
+        sub_rows = None if rows is None else rows[..., todo]
+        weights, b = prior[..., todo], right[:, todo]
+        stiffness = torch.where(wanted, PENALTY * free.matrix[0][:, todo], 0.0)
+        weights[0] += stiffness
+        solved = Posterior(data[..., todo], weights, sub_rows).solve(b + stiffness * at)
+        slope[:, todo] = gradient(free.matrix[..., todo], sub_rows, solved, b)
+        x[:, todo], pinned[:, todo] = solved, wanted
+    return x.clip(low, high), pinned

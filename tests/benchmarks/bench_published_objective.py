@@ -74,7 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", default=["color-checker", "filters"])
     parser.add_argument("--thin", type=int, default=31)
-    parser.add_argument("--steps", type=int, default=1000)
+    parser.add_argument("--steps", type=int, default=2000)
     arguments = parser.parse_args()
     for scene in arguments.scenes:
         compare(scene, arguments.thin, arguments.steps)
