@@ -55,6 +55,13 @@ def roughness(bands: int, like: Tensor) -> Tensor:
     return torch.stack(rows).to(like)
 
 
+def _sum(data: Tensor, prior: Tensor) -> Tensor:
+    """Banded matrix of data and prior together."""
+    matrix = data.clone()
+    matrix[:3] += prior
+    return matrix
+
+
 class Posterior:
     """One factorisation of data and prior: banded plus a few broad-band rows, or full."""
 
@@ -63,10 +70,8 @@ class Posterior:
 
         ``rows`` (bands, n, pixels) are weighted broad-band equations.
         """
-        matrix = data.clone()
-        matrix[:3] += prior
-        self.matrix, self.rows = matrix, rows
-        self.factor = banded.factorise(matrix)
+        self.rows = rows
+        self.factor = banded.factorise(_sum(data, prior), overwrite=True)
         if rows is not None:
             self._spread = banded.solve(self.factor, rows)
             gram = torch.einsum("jap,jbp->pab", rows, self._spread)
@@ -130,7 +135,7 @@ def solve_spectra(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior
     weights = shape[..., None] * tau**-2 + ridge[..., None]
     posterior = Posterior(data, weights, rows)
     mean = posterior.solve(right)
-    mean, at_bound = _bounded(posterior, data, weights, rows, right, mean, prior.bounds)
+    mean, at_bound = _bounded(data, weights, rows, right, mean, prior.bounds)
     std = torch.hypot(posterior.band_mean_variance().clip(min=1e-12).sqrt(), within_band(mean))
     return Spectra(mean, band_mean(mean), std, data_share(data), tau, at_bound)
 
@@ -197,7 +202,6 @@ def parabola_peak(values: Tensor, positions: Tensor) -> Tensor:
 
 
 def _bounded(
-    free: Posterior,
     data: Tensor,
     prior: Tensor,
     rows: Tensor | None,
@@ -221,10 +225,11 @@ def _bounded(
             break
         todo, at, wanted = todo[moved], at[:, moved], wanted[:, moved]
         sub_rows = None if rows is None else rows[..., todo]
-        weights, b = prior[..., todo], right[:, todo]
-        stiffness = torch.where(wanted, PENALTY * free.matrix[0][:, todo], 0.0)
+        b, part, weights = right[:, todo], data[..., todo], prior[..., todo]
+        matrix = _sum(part, weights)
+        stiffness = torch.where(wanted, PENALTY * matrix[0], 0.0)
         weights[0] += stiffness
-        solved = Posterior(data[..., todo], weights, sub_rows).solve(b + stiffness * at)
-        slope[:, todo] = gradient(free.matrix[..., todo], sub_rows, solved, b)
+        solved = Posterior(part, weights, sub_rows).solve(b + stiffness * at)
+        slope[:, todo] = gradient(matrix, sub_rows, solved, b)
         x[:, todo], pinned[:, todo] = solved, wanted
     return x.clip(low, high), pinned

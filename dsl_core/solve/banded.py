@@ -25,10 +25,13 @@ class Factor:
         return torch.log(self.diagonal).sum(0)
 
 
-def factorise(matrix: Tensor) -> Factor:
-    """Factorise a batch; raises ``ValueError`` unless every system is positive definite."""
+def factorise(matrix: Tensor, overwrite: bool = False) -> Factor:
+    """Factorise a batch; raises ``ValueError`` unless every system is positive definite.
+
+    With ``overwrite`` the matrix is used up, which saves a copy.
+    """
     bandwidth, unknowns = matrix.shape[0] - 1, matrix.shape[1]
-    work = matrix.clone()
+    work = matrix if overwrite else matrix.clone()
     lower = torch.zeros_like(matrix[1:]) if bandwidth else matrix[:0]
     for j in range(unknowns):
         reach = min(bandwidth, unknowns - 1 - j)
