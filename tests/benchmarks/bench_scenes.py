@@ -6,20 +6,12 @@ import time
 
 import numpy as np
 
-from dsl_core.model.geometry import Lens
 from dsl_core.optics.colour import reflectance_to_srgb
+from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scenes import make_scene, scene_catalogue
 
-CAMERA = Lens(
-    width_px=890,
-    height_px=580,
-    fx_px=1761.23,
-    fy_px=1764.04,
-    cx_px=428.86,
-    cy_px=294.84,
-    distortion=(-0.23400, 0.10229, -0.00193, -0.00087, 1.05616),
-)
-CENTRE_MM = np.array([56.08, 17.15, -21.61])
+CAMERA = published_rig().camera
+CENTRE_MM = published_rig().pose.projector_centre_mm
 
 
 def main() -> None:

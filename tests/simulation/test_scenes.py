@@ -7,26 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
-from dsl_core.model.geometry import Lens, Pose
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.simulation.height_field import HeightField
+from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scenes import Scene, SceneTruth, make_scene, scene_catalogue
 from dsl_core.simulation.surfaces import Sphere
 
-FULL = Lens(
-    width_px=890,
-    height_px=580,
-    fx_px=1761.23,
-    fy_px=1764.04,
-    cx_px=428.86,
-    cy_px=294.84,
-    distortion=(-0.23400, 0.10229, -0.00193, -0.00087, 1.05616),
-)
+FULL = published_rig().camera
 CAMERA = FULL.resized(223, 145)
-CENTRE = Pose(
-    rotation=((0.99702, 0.03338, 0.06958), (-0.01862, 0.97903, -0.20287), (-0.07490, 0.20097, 0.97673)),
-    translation_mm=(-54.98, -20.13, 21.86),
-).projector_centre_mm
+CENTRE = published_rig().pose.projector_centre_mm
 NAMES = [entry.name for entry in scene_catalogue()]
 
 
