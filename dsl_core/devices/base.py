@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.frames import Frame
+from dsl_core.model.placement import Placement
 from dsl_core.model.rig import BayerPattern, Rig
 from dsl_core.model.spectral import SpectralCurve
 
@@ -141,7 +142,9 @@ class DeviceRig:
     """The devices of one rig, opened together and closed together.
 
     ``calibration`` is what is known of the rig (the twin knows itself); ``sleep`` is how its clock
-    waits, so that a simulated rig does not have to.
+    waits, so that a simulated rig does not have to. ``place`` puts a target before the camera where a rig can
+    do that itself, as the twin can; where it is None, a person does it. ``nominal`` is what data sheets say
+    of the rig, the start of a calibration.
     """
 
     name: str
@@ -151,6 +154,8 @@ class DeviceRig:
     spectroradiometer: Spectroradiometer | None = None
     calibration: Rig | None = None
     sleep: Callable[[float], None] | None = None
+    place: Callable[[Placement], None] | None = None
+    nominal: Rig | None = None
     notes: dict[str, str] = field(default_factory=dict)
 
     def close(self) -> None:

@@ -22,6 +22,18 @@ class GrayCode(Record):
     rows: bool = True
 
 
+class NoCode(Record):
+    """No binary code and no white frame: captures that need no depth, such as lines through a filter."""
+
+    kind: Literal["none"] = "none"
+
+
+class NoSpectral(Record):
+    """No spectral patterns: captures that need no spectrum, such as a board under the binary code."""
+
+    kind: Literal["none"] = "none"
+
+
 class ScanLines(Record):
     """One white vertical line per frame: line ``i`` covers columns ``[step*i, step*i + width)``."""
 
@@ -52,7 +64,8 @@ class Columns(Record):
     levels: tuple[tuple[tuple[float, float, float], ...], ...]
 
 
-SpectralSet = Annotated[ScanLines | LineComb | Columns, Field(discriminator="kind")]
+CodeSet = Annotated[GrayCode | NoCode, Field(discriminator="kind")]
+SpectralSet = Annotated[ScanLines | LineComb | Columns | NoSpectral, Field(discriminator="kind")]
 
 
 class Setting(Record):
@@ -93,7 +106,7 @@ class CapturePlan(Record):
     name: str = "reference"
     camera_size_px: tuple[int, int] = (890, 580)
     projector_size_px: tuple[int, int] = (640, 360)
-    code: GrayCode = GrayCode()
+    code: CodeSet = GrayCode()
     spectral: SpectralSet = ScanLines()
     settings: tuple[Setting, ...] = (
         Setting(exposure_ms=500.0 / 3.0, level=0.2),
@@ -113,7 +126,9 @@ class CapturePlan(Record):
 
     @property
     def code_bits(self) -> tuple[int, int]:
-        """Column bits and row bits (0 when rows are not coded)."""
+        """Column bits and row bits (0 where they are not coded)."""
+        if isinstance(self.code, NoCode):
+            return 0, 0
         width, height = self.projector_size_px
         return (width - 1).bit_length(), (height - 1).bit_length() if self.code.rows else 0
 
@@ -133,6 +148,8 @@ class CapturePlan(Record):
                 return -(-p // s)
             case Columns(levels=levels):
                 return len(levels)
+            case NoSpectral():
+                return 0
 
     def shots(self) -> Iterator[Shot]:
         """Every exposure, in the order it is taken."""
@@ -140,7 +157,7 @@ class CapturePlan(Record):
         for i, setting in enumerate(self.settings):
             # Black is taken at every setting: it is what every other frame of that setting is measured from.
             roles: list[tuple[Role, int]] = [("black", 1)]
-            if i in self.code_settings:
+            if i in self.code_settings and not isinstance(self.code, NoCode):
                 roles = [("code", self.code_count), ("white", 1), ("black", 1)]
             for role, count in [*roles, ("spectral", self.spectral_count)]:
                 for pattern in range(count):

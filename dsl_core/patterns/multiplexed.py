@@ -6,16 +6,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import Columns, LineComb, ScanLines
+from dsl_core.model.plan import Columns, NoSpectral, SpectralSet
 from dsl_core.patterns.scanlines import line_count, line_profile
 
 
-def profile_count(spec: ScanLines | LineComb | Columns, width_px: int) -> int:
+def profile_count(spec: SpectralSet, width_px: int) -> int:
     """Frames of a pattern set; raises `PlanError` when it does not fit ``width_px`` columns."""
-    return len(spec.levels) if isinstance(spec, Columns) else line_count(spec, width_px)
+    match spec:
+        case NoSpectral():
+            return 0
+        case Columns():
+            return len(spec.levels)
+    return line_count(spec, width_px)
 
 
-def profile(spec: ScanLines | LineComb | Columns, width_px: int, index: int) -> NDArray[np.float32]:
+def profile(spec: SpectralSet, width_px: int, index: int) -> NDArray[np.float32]:
     """Drive levels of frame ``index`` over the columns, shape (width, 3) = R, G, B, in 0..1.
 
     Raises `PlanError` for an index outside the set, or a set that does not fit the projector.
@@ -28,14 +33,16 @@ def profile(spec: ScanLines | LineComb | Columns, width_px: int, index: int) -> 
         )
     if isinstance(spec, Columns):
         return _own_profile(spec, width_px, index)
+    if isinstance(spec, NoSpectral):  # count is 0, so that this is never reached
+        raise PlanError("The plan has no spectral patterns.")
     return line_profile(spec, width_px, index)
 
 
-def profiles(spec: ScanLines | LineComb | Columns, width_px: int) -> NDArray[np.float32]:
+def profiles(spec: SpectralSet, width_px: int) -> NDArray[np.float32]:
     """All profiles of a pattern set, shape (frames, width, 3), 0..1; raises `PlanError`."""
     count = profile_count(spec, width_px)
     if count == 0:
-        raise PlanError("A set of column profiles is empty. Give at least one profile in 'levels'.")
+        raise PlanError("The plan has no spectral patterns. Plan lines, a comb, or profiles in 'levels'.")
     return np.stack([profile(spec, width_px, i) for i in range(count)])
 
 

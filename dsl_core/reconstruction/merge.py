@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.frames import FrameSource
-from dsl_core.model.plan import CapturePlan, Role, Shot
+from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder
 from dsl_core.progress import NoProgress, Progress
@@ -64,6 +64,10 @@ class LineStack:
 def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
     """Decode the binary code (seed Eqs. 4 to 8) and merge the white frame."""
     plan = scan.plan
+    if isinstance(plan.code, NoCode):
+        raise DecodeError(
+            f"The scan {plan.name!r} holds no binary code, so that depth is unknown. Capture one with a code."
+        )
     decoder = GrayDecoder(plan.code, plan.projector_size_px)
 
     def add(pair: tuple[MergedFrame, MergedFrame]) -> None:

@@ -99,14 +99,14 @@ def test_profile_index_outside() -> None:
 def test_plan_and_patterns_count_alike(spec: ScanLines | LineComb) -> None:
     plan = CapturePlan(spectral=spec)
     assert len(spectral_profiles(plan)) == plan.spectral_count
-    assert frame_count(plan.code, plan.projector_size_px) == plan.code_count + 2
+    assert frame_count(GrayCode(), plan.projector_size_px) == plan.code_count + 2
 
 
 def test_every_shot_has_its_drive_levels() -> None:
     size = (64, 36)
     grey = Columns(levels=(((0.1, 0.5, 1.0),) * 64,))
     plan = CapturePlan(projector_size_px=size, spectral=grey)
-    code = code_images(plan.code, size)
+    code = code_images(GrayCode(), size)
     for shot in plan.shots():
         image = pattern_image(plan, shot)
         assert image.shape == (36, 64, 3)

@@ -1,0 +1,1 @@
+"""Calibrations as guided steps: what a wizard and the command line both drive."""

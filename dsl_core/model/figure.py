@@ -1,0 +1,45 @@
+"""A measured figure beside its limits: what a check says."""
+
+from __future__ import annotations
+
+from dsl_core.model.base import Record
+
+
+class Figure(Record):
+    """A value with unit, uncertainty and limits; ``advice`` says what to do when it is outside them.
+
+    ``std`` is one standard deviation, None for what is counted. A limit of None does not exist. A figure
+    without limits only informs.
+    """
+
+    name: str
+    value: float
+    unit: str
+    std: float | None = None
+    low: float | None = None
+    high: float | None = None
+    advice: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the value lies within its limits."""
+        return (self.low is None or self.value >= self.low) and (self.high is None or self.value <= self.high)
+
+    def __str__(self) -> str:
+        """The figure as people write it, such as ``gamma 2.210 ± 0.004``."""
+        digits = _decimals(self.std if self.std else abs(self.value) / 100)
+        spread = "" if self.std is None else f" ± {self.std:.{digits}f}"
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"{self.name} {self.value:.{digits}f}{spread}{unit}"
+
+
+def _decimals(step: float) -> int:
+    """Decimals that show two digits of a step."""
+    import math
+
+    return 0 if step <= 0 else min(max(1 - math.floor(math.log10(step)), 0), 9)
+
+
+def failures(figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
+    """The figures outside their limits."""
+    return tuple(figure for figure in figures if not figure.passed)
