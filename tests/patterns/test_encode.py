@@ -82,7 +82,7 @@ def test_own_columns_pass_through() -> None:
         (LineComb(period_px=65), "at most one line"),
         (Columns(levels=(((0.0, 0.5, 1.0),) * 63,)), "63 columns"),
         (Columns(levels=(((0.0, 0.5, 1.5),) * 64,)), "between 0 and 1"),
-        (Columns(levels=()), "empty"),
+        (Columns(levels=()), "no spectral patterns"),
     ],
 )
 def test_sets_that_make_no_sense_say_why(spec: ScanLines | LineComb | Columns, why: str) -> None:
