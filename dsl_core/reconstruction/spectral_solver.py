@@ -63,36 +63,63 @@ def _sum(data: Tensor, prior: Tensor) -> Tensor:
 
 
 class Posterior:
-    """One factorisation of data and prior: banded plus a few broad-band rows, or full."""
+    """One factorisation of data and prior: banded, plus a few broad-band rows by Woodbury's identity.
+
+    With ``A = L D L'`` banded and rows ``R``, all that the rows need is ``Y = L^-1 R`` and the few-by-few
+    matrix ``S = I + Y' D^-1 Y``, which is banded too, with the full bandwidth.
+    """
 
     def __init__(self, data: Tensor, prior: Tensor, rows: Tensor | None) -> None:
         """Factorise: ``data`` (bandwidth + 1, bands, pixels) and ``prior`` (3, bands, 1 or pixels).
 
         ``rows`` (bands, n, pixels) are weighted broad-band equations.
         """
-        self.rows = rows
         self.factor = banded.factorise(_sum(data, prior), overwrite=True)
+        self._rows: Tensor | None = None
         if rows is not None:
-            self._spread = banded.solve(self.factor, rows)
-            gram = torch.einsum("jap,jbp->pab", rows, self._spread)
-            self._small = torch.linalg.cholesky(gram + torch.eye(rows.shape[1]).to(gram))
+            self._rows = banded.solve_lower(self.factor, rows)
+            self._scaled = self._rows / self.factor.diagonal[:, None]
+            self._small = banded.factorise(self._gram(), overwrite=True)
+
+    def _gram(self) -> Tensor:
+        """``S`` in banded storage, (rows, rows, pixels)."""
+        assert self._rows is not None
+        count = self._rows.shape[1]
+        gram = torch.zeros((count, count, self._rows.shape[2])).to(self._rows)
+        gram[0] += 1
+        for offset in range(count):
+            gram[offset, : count - offset] += (
+                self._rows[:, : count - offset] * self._scaled[:, offset:]
+            ).sum(0)
+        return gram
 
     @property
     def log_determinant(self) -> Tensor:
         """Logarithm of the determinant, (pixels,)."""
         value = self.factor.log_determinant
-        if self.rows is not None:
-            value = value + 2 * torch.log(torch.diagonal(self._small, dim1=-2, dim2=-1)).sum(-1)
-        return value
+        return value if self._rows is None else value + self._small.log_determinant
 
     def solve(self, right: Tensor) -> Tensor:
-        """Solution for a right side (bands, pixels); by the Woodbury identity with broad-band rows."""
-        x = banded.solve(self.factor, right)
-        if self.rows is not None:
-            seen = torch.einsum("jap,jp->pa", self.rows, x)
-            inner = torch.cholesky_solve(seen[..., None], self._small)[..., 0]
-            x = x - torch.einsum("jap,pa->jp", self._spread, inner)
-        return x
+        """Solution for a right side (bands, pixels)."""
+        z = banded.solve_lower(self.factor, right)
+        if self._rows is not None:
+            inner = banded.solve(self._small, self._seen(z))
+            for a in range(len(inner)):
+                z.addcmul_(self._rows[:, a], inner[a], value=-1)
+        return banded.solve_upper(self.factor, z)
+
+    def _seen(self, z: Tensor) -> Tensor:
+        """What the rows see of a half-solved right side: ``Y' D^-1 z``, (rows, pixels)."""
+        return (self._scaled * z[:, None]).sum(0)
+
+    def quadratic_form(self, right: Tensor) -> Tensor:
+        """``right' (posterior covariance) right``, (pixels,), at half the cost of a solution."""
+        z = banded.solve_lower(self.factor, right)
+        value = (z * z / self.factor.diagonal).sum(0)
+        if self._rows is not None:
+            inner = banded.solve_lower(self._small, self._seen(z))
+            value = value - (inner * inner / self._small.diagonal).sum(0)
+        return value
 
     def band_mean_variance(self) -> Tensor:
         """Variance of the band means, (bands, pixels); the outermost repeat their neighbours."""
@@ -104,9 +131,11 @@ class Posterior:
             + 8 * (first[:-2] + first[1:-1])
             + 2 * second[:-2]
         ) / 36
-        if self.rows is not None:
-            half = torch.linalg.solve_triangular(self._small, self._spread.permute(2, 1, 0), upper=False)
-            inner = inner - (((half[..., :-2] + 4 * half[..., 1:-1] + half[..., 2:]) / 6) ** 2).sum(1).T
+        if self._rows is not None:
+            spread = banded.solve_upper(self.factor, self._rows)
+            means = ((spread[:-2] + 4 * spread[1:-1] + spread[2:]) / 6).transpose(0, 1).contiguous()
+            half = banded.solve_lower(self._small, means)
+            inner = inner - (half * half / self._small.diagonal[:, None]).sum(0)
         return torch.cat([inner[:1], inner, inner[-1:]])
 
 
@@ -184,9 +213,8 @@ def _most_probable_tau(
     for tau in prior.taus:
         weights = shape * tau**-2 + ridge
         posterior = Posterior(data, weights[..., None], rows)
-        x = posterior.solve(right)
         volume = banded.factorise(weights[..., None].double()).log_determinant.to(right)
-        evidence.append(volume - posterior.log_determinant + (right * x).sum(0))
+        evidence.append(volume - posterior.log_determinant + posterior.quadratic_form(right))
     return parabola_peak(torch.stack(evidence), torch.as_tensor(prior.taus).to(right).log()).exp()
 
 

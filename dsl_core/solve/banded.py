@@ -48,20 +48,37 @@ def factorise(matrix: Tensor, overwrite: bool = False) -> Factor:
 
 def solve(factor: Factor, right: Tensor) -> Tensor:
     """Solutions of a batch; ``right`` is (unknowns, systems) or (unknowns, columns, systems)."""
-    x = right.clone()
+    return solve_upper(factor, solve_lower(factor, right))
+
+
+def solve_lower(factor: Factor, right: Tensor) -> Tensor:
+    """Solutions ``z`` of ``L z = right``, the first half of `solve`; shapes as there.
+
+    The quadratic form of the inverse is ``sum(z**2 / D)``, without the second half.
+    """
+    z = right.clone()
     bandwidth, unknowns = factor.lower.shape[0], factor.diagonal.shape[0]
-    extra = (1,) * (right.ndim - 2)
-    lower = factor.lower.reshape(bandwidth, unknowns, *extra, -1)
-    for j in range(unknowns):
+    lower = _for_columns(factor.lower, right)
+    for j in range(unknowns - 1):
         reach = min(bandwidth, unknowns - 1 - j)
-        if reach:
-            x[j + 1 : j + 1 + reach].addcmul_(lower[:reach, j], x[j], value=-1)
-    x /= factor.diagonal.reshape(unknowns, *extra, -1)
+        z[j + 1 : j + 1 + reach].addcmul_(lower[:reach, j], z[j], value=-1)
+    return z
+
+
+def solve_upper(factor: Factor, right: Tensor) -> Tensor:
+    """Solutions ``x`` of ``D L' x = right``, the second half of `solve`; shapes as there."""
+    bandwidth, unknowns = factor.lower.shape[0], factor.diagonal.shape[0]
+    lower = _for_columns(factor.lower, right)
+    x = right / _for_columns(factor.diagonal, right)
     for j in range(unknowns - 2, -1, -1):
         reach = min(bandwidth, unknowns - 1 - j)
-        if reach:
-            x[j] -= (lower[:reach, j] * x[j + 1 : j + 1 + reach]).sum(0)
+        x[j] -= (lower[:reach, j] * x[j + 1 : j + 1 + reach]).sum(0)
     return x
+
+
+def _for_columns(values: Tensor, right: Tensor) -> Tensor:
+    """Values (..., systems) with an axis for the columns of a right side that has one."""
+    return values if right.ndim == 2 else values.unsqueeze(-2)
 
 
 def inverse_band(factor: Factor) -> Tensor:
