@@ -42,7 +42,10 @@ class Device(ABC):
 
 @dataclass(frozen=True)
 class CameraInfo:
-    """What a camera is and delivers: the raw mosaic, ``bit_depth`` bits in uint16, right-aligned."""
+    """What a camera is and delivers: the raw mosaic, ``bit_depth`` bits in uint16, right-aligned.
+
+    ``region_px`` is x, y, width, height of the part of the sensor that is read, None for all of it.
+    """
 
     model: str
     serial: str
@@ -51,6 +54,9 @@ class CameraInfo:
     bayer: BayerPattern
     bit_depth: int
     exposure_range_ms: tuple[float, float]
+    region_px: tuple[int, int, int, int] | None = None
+    binning: int = 1
+    gain_db: float = 0.0
 
 
 class Camera(Device):
@@ -84,7 +90,10 @@ class Camera(Device):
 
 @dataclass(frozen=True)
 class ProjectorInfo:
-    """What a projector is: logical size, and how long a pattern takes to become light."""
+    """What a projector is: logical size, and how long a pattern takes to become light.
+
+    ``mode`` names the settings that change its light, such as colour temperature and brightness.
+    """
 
     model: str
     serial: str
@@ -92,6 +101,7 @@ class ProjectorInfo:
     height_px: int
     latency_ms: float
     frame_period_ms: float
+    mode: str = ""
 
 
 class Projector(Device):

@@ -19,7 +19,7 @@ from functools import partial
 
 import numpy as np
 
-from dsl_core.devices.base import Camera, DeviceRig, Projector, Spectroradiometer, Stage
+from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, Spectroradiometer, Stage
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 
@@ -42,6 +42,10 @@ class CameraConformance:
             _require(8 <= info.bit_depth <= 16, f"{info.bit_depth} bits are not between 8 and 16")
             low, high = info.exposure_range_ms
             _require(0 < low <= high < math.inf, f"the exposure range {low} to {high} ms is not a range")
+            _require(info.binning >= 1, f"a binning of {info.binning} is impossible; 1 is none")
+            _require(math.isfinite(info.gain_db), f"a gain of {info.gain_db} dB is impossible")
+            if info.region_px is not None:
+                self._check_region(info)
             self._snap(camera)
             _require(camera.info == info, "the info changed while the camera was open")
 
@@ -104,6 +108,17 @@ class CameraConformance:
         camera = self.open_camera()
         camera.close()
         camera.close()
+
+    def _check_region(self, info: CameraInfo) -> None:
+        """A region lies on the sensor and makes the image size."""
+        x, y, width, height = info.region_px or (0, 0, 0, 0)
+        size = (width // info.binning, height // info.binning)
+        _require(x >= 0 and y >= 0, f"the region {info.region_px} starts outside the sensor")
+        _require(
+            size == (info.width_px, info.height_px),
+            f"the region {info.region_px} with binning {info.binning} makes {size[0]} x {size[1]} pixels,"
+            f" the images have {info.width_px} x {info.height_px}",
+        )
 
     def _exposure_ms(self, camera: Camera) -> float:
         low, high = camera.info.exposure_range_ms

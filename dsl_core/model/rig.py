@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from dsl_core.model.accepted import CalibrationNote
 from dsl_core.model.base import Record
+from dsl_core.model.conditions import BayerPattern as BayerPattern
+from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.spectral import SpectralCurve
 
-BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
 
 
@@ -110,7 +112,8 @@ class Rig(Record):
         white_scale * s * sum_lambda response_c H sum_m efficiency_m sum_c' emission_c' P_c' d_lambda
 
     with the shading ``s = cos(incidence) * (reference_distance_mm / distance)**2`` and the efficiency
-    of order zero equal to one by definition.
+    of order zero equal to one by definition. ``conditions`` are the settings under which all this holds, None
+    where nobody noted them; ``calibrations`` say when each part was found and how well.
     """
 
     schema_version: Literal[1] = 1
@@ -132,3 +135,5 @@ class Rig(Record):
     column_std_px: float = Field(default=0.02, ge=0)
     correspondence: CorrespondenceGrid | None = None
     provenance: Provenance = Provenance()
+    conditions: CaptureConditions | None = None
+    calibrations: tuple[CalibrationNote, ...] = ()

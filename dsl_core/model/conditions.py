@@ -1,0 +1,85 @@
+"""Under which settings of camera and projector something was captured, and how two such settings differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from dsl_core.model.base import Record
+
+BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+Region = tuple[int, int, int, int]
+
+#: Frame periods of one mode are measured; a mode of another rate differs by far more than this share.
+_SAME_PERIOD = 0.01
+
+
+class CameraConditions(Record):
+    """A camera and how it is read out; ``region_px`` is x, y, width, height on the sensor, None for all."""
+
+    model: str
+    serial: str
+    size_px: tuple[int, int]
+    region_px: Region | None = None
+    binning: int = 1
+    gain_db: float = 0.0
+    bayer: BayerPattern
+    bit_depth: int
+
+
+class ProjectorConditions(Record):
+    """A projector and how it is driven; ``mode`` is its maker's name of the setting, such as ``6500 K``."""
+
+    model: str
+    serial: str
+    size_px: tuple[int, int]
+    mode: str = ""
+    frame_period_ms: float
+
+
+class CaptureConditions(Record):
+    """All on which a calibration depends and which must be the same in the scans that use it."""
+
+    camera: CameraConditions
+    projector: ProjectorConditions
+
+
+_WORDS = {
+    "model": "model",
+    "serial": "serial number",
+    "size_px": "image size",
+    "region_px": "sensor region",
+    "binning": "binning",
+    "gain_db": "gain (dB)",
+    "bayer": "mosaic",
+    "bit_depth": "bit depth",
+    "mode": "mode",
+    "frame_period_ms": "frame period (ms)",
+}
+
+
+def differences(known: CaptureConditions, now: CaptureConditions) -> tuple[str, ...]:
+    """Each setting that differs, as a clause such as ``the camera's binning was 1 and is 2``."""
+    return (
+        *_differences("camera", known.camera, now.camera),
+        *_differences("projector", known.projector, now.projector),
+    )
+
+
+def _differences(device: str, known: Record, now: Record) -> Iterator[str]:
+    for name in type(known).model_fields:
+        old, new = getattr(known, name), getattr(now, name)
+        if name == "frame_period_ms" and abs(new - old) <= _SAME_PERIOD * old:
+            continue
+        if old != new:
+            yield f"the {device}'s {_WORDS[name]} was {_text(old)} and is {_text(new)}"
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return "the whole sensor"
+    if isinstance(value, float):
+        return f"{value:.5g}"
+    if isinstance(value, tuple):
+        return " x ".join(map(str, value)) if len(value) == 2 else ", ".join(map(str, value))
+    return str(value) or "not named"
