@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Options:
-    """How to reconstruct: bands, correspondence model (auto, grating, grid), refinement, torch device."""
+    """How to reconstruct: bands, correspondence (auto, grating, hybrid, grid), refinement, torch device."""
 
     grid: WavelengthGrid = field(default_factory=WavelengthGrid)
     correspondence: str = "auto"

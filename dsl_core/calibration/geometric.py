@@ -207,6 +207,7 @@ def _record(
         camera_deviation=_lens_deviation(deviations[bundle.CAMERA]),
         projector_deviation=_lens_deviation(deviations[bundle.PROJECTOR]),
         pose_deviation=_pose_deviation(deviations[bundle.STEREO]),
+        covariance=tuple(fit.covariance[: bundle.SHARED, : bundle.SHARED].ravel().tolist()),
         camera_rms_px=camera,
         projector_rms_px=projector,
         rms_px=float(np.hypot(camera, projector) / np.sqrt(2)),

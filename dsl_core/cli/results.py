@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from dsl_core.evaluation.summary import Evaluation, Truth
     from dsl_core.evaluation.verdict import Goal
 
-MODELS = ("auto", "grating", "grid")
+MODELS = ("auto", "grating", "hybrid", "grid")
 DEVICES = ("cpu", "cuda", "auto")
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
@@ -34,7 +34,7 @@ def reconstruct(
         Path | None, typer.Option(help="A rig's JSON file instead of the scan's own.")
     ] = None,
     bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
-    model: Annotated[str, typer.Option(help="Correspondence: auto, grating or grid.")] = "auto",
+    model: Annotated[str, typer.Option(help="Correspondence: auto, grating, hybrid or grid.")] = "auto",
     refine: Annotated[bool, typer.Option("--refine/--no-refine", help="Columns below one pixel.")] = True,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="No spectra.")] = False,
     device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda where there is one.")] = "cpu",

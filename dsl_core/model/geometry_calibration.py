@@ -63,7 +63,9 @@ class GeometryCalibration(Record):
     ``rms_px`` is the rms over camera and projector errors together, without outliers. ``camera_binning`` is
     how many sensor pixels a camera pixel spans along a side: errors times it are errors at full resolution.
     Coverage is the share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used
-    poses.
+    poses. ``covariance``, row by row, is that of 24 parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3 of the
+    camera and of the projector, then rotation vector (rad) and translation (mm) of the pose; None where it is
+    not known.
     """
 
     schema_version: Literal[1] = 1
@@ -74,6 +76,7 @@ class GeometryCalibration(Record):
     camera_deviation: LensDeviation
     projector_deviation: LensDeviation
     pose_deviation: PoseDeviation
+    covariance: tuple[float, ...] | None = None
     camera_rms_px: float
     projector_rms_px: float
     rms_px: float

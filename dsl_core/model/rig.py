@@ -10,6 +10,7 @@ from pydantic import Field
 
 from dsl_core.model.accepted import CalibrationNote
 from dsl_core.model.base import Record
+from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.geometry import Lens, Pose
@@ -114,6 +115,8 @@ class Rig(Record):
     with the shading ``s = cos(incidence) * (reference_distance_mm / distance)**2`` and the efficiency
     of order zero equal to one by definition. ``conditions`` are the settings under which all this holds, None
     where nobody noted them; ``calibrations`` say when each part was found and how well.
+    ``residual`` corrects the columns of the grating equation; ``correspondence`` is the data-driven model.
+    ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
     """
 
     schema_version: Literal[1] = 1
@@ -134,6 +137,8 @@ class Rig(Record):
     depth_range_mm: tuple[float, float] = (500.0, 1000.0)
     column_std_px: float = Field(default=0.02, ge=0)
     correspondence: CorrespondenceGrid | None = None
+    residual: ColumnResidual | None = None
+    geometry_covariance: tuple[float, ...] | None = None
     provenance: Provenance = Provenance()
     conditions: CaptureConditions | None = None
     calibrations: tuple[CalibrationNote, ...] = ()

@@ -1,8 +1,8 @@
 """Which projector column lights a camera pixel, through which order, at which wavelength.
 
-Two models answer through the same call: the grating equation with the film's pose, and the data-driven
-fit of seed section 4, ``q = alpha * z**beta + gamma``. Both are smooth in wavelength, so they are
-evaluated at a few Chebyshev nodes and interpolated by a polynomial.
+Three models answer through the same call: the grating equation with the film's pose; the same with a small
+smooth correction; and the data-driven fit of seed section 4, ``q = alpha * z**beta + gamma``. The first two
+are smooth in wavelength, so they are evaluated at a few Chebyshev nodes and interpolated by a polynomial.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from torch import Tensor
 
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
+from dsl_core.optics.column_residual import residual_columns
 from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import pixel_rays, project
 
@@ -143,6 +144,34 @@ class GratingModel:
         return Footprint(*(matrix @ q for q in self.exact(pixels, depth_mm, order, nodes)))
 
 
+class HybridModel(GratingModel):
+    """The grating equation plus the rig's smooth residual; rows stay those of the grating."""
+
+    def __init__(self, rig: Rig) -> None:
+        super().__init__(rig)
+        if rig.residual is None:
+            raise CalibrationError(
+                f"Rig {rig.name!r} holds no residual of the grating equation; run the depth-stage calibration"
+                " or use the analytic model."
+            )
+        self.residual = rig.residual
+
+    def exact(
+        self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
+    ) -> Footprint:
+        """Projector pixels at every wavelength, residual included."""
+        seen = super().exact(pixels, depth_mm, order, wavelengths_nm)
+        width = self.rig.camera.width_px
+        nm = like(wavelengths_nm, depth_mm)
+        for i in range(0, len(pixels), CHUNK):
+            part = slice(i, i + CHUNK)
+            camera_px = (pixels[part] % width).to(depth_mm), (pixels[part] // width).to(depth_mm)
+            more = residual_columns(self.residual, camera_px, depth_mm[part], order, nm)
+            if more is not None:
+                seen.columns[:, part] += more
+        return seen
+
+
 class GridModel:
     """The data-driven model of seed section 4: power law in depth, linear in wavelength, cubic in pixel."""
 
@@ -207,10 +236,20 @@ def _linear_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> 
 
 
 def correspondence(rig: Rig, model: str = "auto") -> Correspondence:
-    """The model asked for: ``grating``, ``grid``, or ``auto`` (grid where the rig holds one)."""
+    """The model asked for: ``grating``, ``hybrid``, ``grid``, or ``auto``.
+
+    ``auto`` is hybrid where the rig holds a residual, else grid where it holds one, else grating.
+    """
     if model == "auto":
         model = "grid" if rig.correspondence is not None else "grating"
-    models: dict[str, type[GratingModel] | type[GridModel]] = {"grating": GratingModel, "grid": GridModel}
+        model = "hybrid" if rig.residual is not None else model
+    models: dict[str, type[GratingModel] | type[GridModel]] = {
+        "grating": GratingModel,
+        "hybrid": HybridModel,
+        "grid": GridModel,
+    }
     if model not in models:
-        raise CalibrationError(f"There is no correspondence model {model!r}; choose auto, grating or grid.")
+        raise CalibrationError(
+            f"There is no correspondence model {model!r}; choose auto, grating, hybrid or grid."
+        )
     return models[model](rig)

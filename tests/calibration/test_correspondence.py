@@ -123,5 +123,5 @@ def test_missing_grid_order_and_unknown_model_are_told(samples: GridSamples) -> 
         GridModel(rig).trace(pixels, depth, 2, BANDS_NM)
     with pytest.raises(CalibrationError, match="no data-driven correspondence"):
         correspondence(published_rig(), "grid")
-    with pytest.raises(CalibrationError, match="choose auto, grating or grid"):
+    with pytest.raises(CalibrationError, match="choose auto, grating, hybrid or grid"):
         correspondence(rig, "spline")

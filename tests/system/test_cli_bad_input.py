@@ -208,7 +208,7 @@ def test_frames_that_show_nothing(
         ("reconstruct folder", "is not a session"),
         ("reconstruct absent.dsl --bands 430-660", "--bands must be START:STOP:STEP"),
         ("reconstruct absent.dsl --bands 430:660:7", "does not end on a band"),
-        ("reconstruct absent.dsl --model magic", "--model must be one of auto, grating, grid"),
+        ("reconstruct absent.dsl --model magic", "--model must be one of auto, grating, hybrid, grid"),
         ("reconstruct absent.dsl --device tpu", "--device must be one of"),
         ("reconstruct absent.dsl -o folder", "exists already"),
         ("reconstruct absent.dsl --calibration absent.json", "absent.json cannot be read"),
