@@ -143,7 +143,7 @@ def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> T
     """Gradient of the quadratic with a banded matrix and broad-band rows at x, (bands, pixels)."""
     g = banded.multiply(matrix, x) - right
     if rows is not None:
-        g = g + torch.einsum("jap,ap->jp", rows, torch.einsum("jap,jp->ap", rows, x))
+        g += (rows * (rows * x[:, None]).sum(0)).sum(1)
     return g
 
 
