@@ -1,0 +1,143 @@
+"""From accepted calibrations to a calibrated rig."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+
+from pydantic import ValidationError
+
+from dsl_core.campaign.recipe import Recipe
+from dsl_core.campaign.recipes import load_recipe, recipe_names
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.base import Record
+from dsl_core.model.conditions import differences
+from dsl_core.model.rig import Provenance, Rig
+
+Accepted = Mapping[str, AcceptedCalibration]
+
+
+def all_recipes() -> tuple[Recipe, ...]:
+    """Every calibration of this installation with its default settings, in order."""
+    return tuple(load_recipe(name) for name in recipe_names())
+
+
+def accepted_calibrations(campaign: CampaignFolder, recipes: Sequence[Recipe]) -> Accepted:
+    """What a campaign has accepted, by name and in order; raises `StoreError` for a damaged file."""
+    found = {recipe.name: campaign.accepted(recipe.name) for recipe in recipes}
+    return {name: each for name, each in found.items() if each is not None}
+
+
+def nominal_rig(devices: DeviceRig) -> Rig:
+    """What is known of a rig before anything was measured; raises `CalibrationError` when nothing is.
+
+    The size, mosaic and frame period that the devices state replace those of the data sheet.
+    """
+    start = devices.nominal or devices.calibration
+    if start is None:
+        raise CalibrationError(
+            f"The rig {devices.name!r} says nothing of its lenses, film and colours to start from."
+            " Its package has to set DeviceRig.nominal to the values of the data sheets."
+        )
+    camera, projector = devices.camera.info, devices.projector.info
+    sensor = start.sensor.model_copy(update={"bayer": camera.bayer, "bit_depth": camera.bit_depth})
+    return start.model_copy(
+        update={
+            "camera": start.camera.resized(camera.width_px, camera.height_px),
+            "projector": start.projector.resized(projector.width_px, projector.height_px),
+            "sensor": sensor,
+            "frame_period_ms": projector.frame_period_ms,
+            "calibrations": (),
+            "conditions": None,
+        }
+    )
+
+
+def apply_records(accepted: Accepted, nominal: Rig, recipes: Sequence[Recipe]) -> Rig:
+    """The rig after all accepted calibrations, in the order of the recipes.
+
+    Raises `CalibrationError` when one lacks what it needs, is of another version, or when two were captured
+    with different devices or settings.
+    """
+    _refuse_mixture(accepted)
+    rig = nominal
+    for recipe in recipes:
+        if recipe.name not in accepted:
+            continue
+        require_needs(recipe, accepted)
+        rig = recipe.apply(record_of(recipe, accepted[recipe.name]), rig)
+    return rig
+
+
+def assemble(
+    accepted: Accepted,
+    nominal: Rig,
+    recipes: Sequence[Recipe] | None = None,
+    name: str = "",
+) -> Rig:
+    """The calibrated rig: what was found, under which conditions, when, and how well.
+
+    Raises `CalibrationError` as `apply_records` does, and when nothing was accepted at all.
+    """
+    recipes = all_recipes() if recipes is None else recipes
+    if not accepted:
+        raise CalibrationError("No calibration was accepted yet, so there is no rig to assemble. Calibrate.")
+    rig = apply_records(accepted, nominal, recipes)
+    ordered = [accepted[recipe.name] for recipe in recipes if recipe.name in accepted]
+    conditions = next((each.conditions for each in reversed(ordered) if each.conditions), None)
+    lacking = [recipe.name for recipe in recipes if recipe.name not in accepted]
+    provenance = Provenance(
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        source="campaign",
+        camera_serial=conditions.camera.serial if conditions else "",
+        projector_serial=conditions.projector.serial if conditions else "",
+        notes=f"Not calibrated, as nominal: {', '.join(lacking)}." if lacking else "",
+    )
+    return rig.model_copy(
+        update={
+            "name": name or rig.name,
+            "provenance": provenance,
+            "conditions": conditions,
+            "calibrations": tuple(each.note for each in ordered),
+        }
+    )
+
+
+def require_needs(recipe: Recipe, accepted: Accepted) -> None:
+    """Raise `CalibrationError` when a calibration that this one needs was not accepted."""
+    lacking = [name for name in recipe.needs if name not in accepted]
+    if lacking:
+        raise CalibrationError(
+            f"The calibration {recipe.name} needs {' and '.join(lacking)}, which no one accepted yet."
+            f" Calibrate {lacking[0]} first."
+        )
+
+
+def record_of(recipe: Recipe, accepted: AcceptedCalibration) -> Record:
+    """The recipe's own record; raises `CalibrationError` when it is of another version."""
+    try:
+        return recipe.record_type.model_validate_json(json.dumps(accepted.record))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise CalibrationError(
+            f"The accepted calibration {recipe.name} of {accepted.accepted[:10]} is damaged or of another"
+            f" version ({'.'.join(map(str, first['loc'])) or 'record'}: {first['msg']})."
+            " Fit it again; its captures are kept."
+        ) from error
+
+
+def _refuse_mixture(accepted: Accepted) -> None:
+    known = [each for each in accepted.values() if each.conditions is not None]
+    for other in known[1:]:
+        assert known[0].conditions is not None
+        assert other.conditions is not None
+        found = differences(known[0].conditions, other.conditions)
+        if found:
+            raise CalibrationError(
+                f"The calibrations {known[0].name} and {other.name} were captured with different devices or"
+                f" settings: {'; '.join(found)}. Calibrate {other.name} again with those of {known[0].name}."
+            )

@@ -1,0 +1,128 @@
+"""The folder of a step: under which conditions it was captured, and how it is replaced without loss."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import TypeAdapter
+
+from dsl_core.devices.base import CameraInfo, ProjectorInfo
+from dsl_core.devices.conditions import conditions_of
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import store_error, write_atomic
+from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.model.base import Record
+from dsl_core.model.conditions import CaptureConditions, differences
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+NOTE_NAME = "capture.json"
+_ASIDE = ".replaced"
+
+
+class CaptureNote(Record):
+    """What a session writes beside the captures of a step; ``refused`` is the reason, empty for none."""
+
+    conditions: CaptureConditions
+    started: str
+    finished: str = ""
+    refused: str = ""
+
+
+def read_note(folder: Path) -> CaptureNote | None:
+    """The note of a step, None where nothing was begun; raises `StoreError` when it is damaged."""
+    path = folder / NOTE_NAME
+    return read_record(path, CaptureNote) if path.exists() else None
+
+
+def write_note(folder: Path, note: CaptureNote) -> None:
+    """Write the note of a step; raises `StoreError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise store_error(folder, error) from error
+    write_atomic(folder / NOTE_NAME, (note.model_dump_json(indent=1) + "\n").encode())
+
+
+def other_conditions(folder: Path, now: CaptureConditions) -> tuple[str, ...]:
+    """Clauses in which the captures of a step, each scan of it included, differ from the conditions now."""
+    note = read_note(folder)
+    known = [] if note is None else [note.conditions]
+    for manifest in sorted(folder.rglob(MANIFEST_NAME)):
+        found = _scanned_under(manifest, manifest.stat().st_mtime_ns)
+        known += [found] if found is not None else []
+    clauses = [clause for each in known for clause in differences(each, now)]
+    return tuple(dict.fromkeys(clauses))
+
+
+def scan_settings(folder: Path) -> tuple[str, ...]:
+    """Exposures and drive levels of the scans under a folder, each once, such as ``333.3 ms at 0.8``."""
+    seen: dict[str, None] = {}
+    for manifest in sorted(folder.rglob(MANIFEST_NAME)):
+        for setting in _content(manifest)["plan"]["settings"]:
+            seen[f"{setting['exposure_ms']:.4g} ms at {setting['level']:g}"] = None
+    return tuple(seen)
+
+
+@contextmanager
+def replacing(folder: Path) -> Iterator[None]:
+    """Move the captures of a step aside, and put them back unless the block makes complete new ones."""
+    aside = _aside(folder)
+    if folder.exists():
+        aside.parent.mkdir(exist_ok=True)
+        os.replace(folder, aside)
+    try:
+        yield
+    except BaseException:
+        _put_back(folder)
+        raise
+    shutil.rmtree(aside, ignore_errors=True)
+
+
+def recover(folder: Path) -> None:
+    """Finish a replacement that a crash interrupted: complete new captures stay, others give way."""
+    if not _aside(folder).exists():
+        return
+    note = read_note(folder)
+    if note is not None and note.finished:
+        shutil.rmtree(_aside(folder), ignore_errors=True)
+    else:
+        _put_back(folder)
+
+
+def _aside(folder: Path) -> Path:
+    return folder.parent / _ASIDE / folder.name
+
+
+def _put_back(folder: Path) -> None:
+    if _aside(folder).exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        os.replace(_aside(folder), folder)
+
+
+@lru_cache(maxsize=1024)
+def _scanned_under(manifest: Path, changed_ns: int) -> CaptureConditions | None:
+    """Conditions of a stored scan; of its manifest only the devices are looked at, which is fast."""
+    content = _content(manifest)
+    if not (content.get("camera") and content.get("projector")):
+        return None
+    camera = TypeAdapter(CameraInfo).validate_python(content["camera"])
+    return conditions_of(camera, TypeAdapter(ProjectorInfo).validate_python(content["projector"]))
+
+
+def _content(manifest: Path) -> dict[str, dict[str, list[dict[str, float]]]]:
+    try:
+        content: dict[str, dict[str, list[dict[str, float]]]] = json.loads(manifest.read_bytes())
+    except (OSError, ValueError) as error:
+        raise StoreError(
+            f"{manifest} is damaged ({error}). Capture the step {manifest.parent.parent.name} again."
+        ) from error
+    return content

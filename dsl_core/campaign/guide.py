@@ -1,0 +1,121 @@
+"""Running whole calibrations, with someone beside who places targets and judges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from dsl_core.campaign.assembly import accepted_calibrations, all_recipes, assemble, nominal_rig
+from dsl_core.campaign.recipe import Recipe, Step
+from dsl_core.campaign.session import CalibrationSession
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.figure import Figure, failures
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+
+class Guide(Protocol):
+    """Who is asked and told while a calibration runs; may raise `Cancelled` to stop."""
+
+    def begins(self, session: CalibrationSession, missing: int) -> None:
+        """A calibration begins; ``missing`` of its steps have no captures yet."""
+
+    def place(self, step: Step) -> None:
+        """Return when a person has placed the target of a step; called where the rig cannot itself."""
+
+    def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
+        """Whether to go on after a look; False for another look."""
+
+    def judge(self, fitted: AcceptedCalibration) -> bool:
+        """Whether to accept a fit; False ends with its figures named."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Progress of one step, told under its name."""
+
+    progress: Progress
+    name: str
+
+    def report(self, stage: str, done: int, total: int) -> None:
+        """Pass the report on."""
+        self.progress.report(f"{self.name}: {stage}", done, total)
+
+
+def run_calibration(
+    session: CalibrationSession, guide: Guide, progress: Progress, redo: Sequence[str] = ()
+) -> AcceptedCalibration:
+    """Capture every missing or refused step, fit, and accept what the guide accepts.
+
+    ``redo`` names steps that are captured anew. What is captured already is kept, and a calibration that is
+    complete and up to date is returned as it is. Raises `CalibrationError` when a look, a capture or a
+    figure is not good enough; everything captured so far stays.
+    """
+    unknown = [key for key in redo if key not in [step.key for step in session.steps]]
+    if unknown:
+        known = ", ".join(step.key for step in session.steps)
+        raise CalibrationError(f"{session.recipe.name} has no step {', '.join(unknown)}; it has {known}.")
+    statuses = session.statuses()
+    todo = [each.step for each in statuses if each.state != "captured" or each.step.key in redo]
+    done = session.accepted()
+    if done is not None and not todo:
+        return done
+    guide.begins(session, len(todo))
+    for step in todo:
+        _take(session, step, guide, Named(progress, step.title), step.key in redo)
+    fitted = session.fit(Named(progress, session.recipe.title))
+    if not guide.judge(fitted):
+        raise CalibrationError(_verdict(fitted))
+    return session.accept()
+
+
+def calibrate_all(
+    campaign: CampaignFolder,
+    devices: DeviceRig,
+    guide: Guide,
+    progress: Progress,
+    name: str = "",
+    recipe_of: Callable[[str], Recipe] | None = None,
+    recipes: Sequence[Recipe] | None = None,
+) -> Rig:
+    """Run every calibration in order and assemble the rig; goes on where it was interrupted.
+
+    ``recipe_of`` makes the recipe of a name with the campaign's settings, ``recipes`` are all of them.
+    """
+    recipes = all_recipes() if recipes is None else recipes
+    for recipe in recipes:
+        chosen = recipe if recipe_of is None else recipe_of(recipe.name)
+        run_calibration(CalibrationSession(chosen, devices, campaign, recipes), guide, progress)
+    return calibrated_rig(campaign, devices, name, recipes)
+
+
+def calibrated_rig(
+    campaign: CampaignFolder, devices: DeviceRig, name: str = "", recipes: Sequence[Recipe] | None = None
+) -> Rig:
+    """The rig as far as a campaign has calibrated it; raises `CalibrationError` when nothing is accepted."""
+    recipes = all_recipes() if recipes is None else recipes
+    accepted = accepted_calibrations(campaign, recipes)
+    return assemble(accepted, nominal_rig(devices), recipes, name or campaign.path.name)
+
+
+def _take(session: CalibrationSession, step: Step, guide: Guide, progress: Progress, anew: bool) -> None:
+    if not session.place(step):
+        guide.place(step)
+    while not guide.looked(step, session.look(step)):
+        continue
+    if anew:
+        session.redo(step, progress)
+    else:
+        session.capture(step, progress)
+
+
+def _verdict(fitted: AcceptedCalibration) -> str:
+    clauses = "; ".join(f"{figure}. {figure.advice}".rstrip(". ") for figure in failures(fitted.figures))
+    return (
+        f"{fitted.title} was not accepted: {clauses or 'you decided so'}."
+        " The captures are kept; capture a step anew with --redo STEP, or accept with --accept-failed."
+    )

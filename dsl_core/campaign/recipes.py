@@ -1,0 +1,80 @@
+"""All calibrations in their order, loaded when they are asked for."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from dsl_core.campaign.recipe import Recipe
+from dsl_core.errors import CalibrationError
+
+#: Film off first, so that the film is mounted once.
+_CLASSES = {
+    "selftest": "SelfTestRecipe",
+    "geometry": "GeometryRecipe",
+    "spectralon": "SpectralonRecipe",
+    "color-checker": "ColorCheckerRecipe",
+    "bandpass": "BandpassRecipe",
+    "depth-stage": "DepthStageRecipe",
+}
+
+
+def recipe_names() -> tuple[str, ...]:
+    """The calibrations of this installation, in the order in which they build on each other."""
+    return tuple(name for name in _CLASSES if importlib.util.find_spec(_module(name)) is not None)
+
+
+def load_recipe(name: str, settings: Mapping[str, str] | None = None) -> Recipe:
+    """The calibration of a name with its settings; raises `CalibrationError` for either that is unknown."""
+    if name not in recipe_names():
+        raise CalibrationError(f"There is no calibration {name!r}; choose {', '.join(recipe_names())}.")
+    kind = getattr(importlib.import_module(_module(name)), _CLASSES[name])
+    recipe: Recipe = _build(kind, name, settings or {})
+    return recipe
+
+
+def setting_names(name: str) -> tuple[str, ...]:
+    """The settings of a calibration."""
+    kind = getattr(importlib.import_module(_module(name)), _CLASSES[name])
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
+
+
+def _module(name: str) -> str:
+    return f"dsl_core.campaign.{name.replace('-', '_')}"
+
+
+def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
+    """A recipe from texts: JSON values, comma lists for tuples, plain words."""
+    from pydantic import TypeAdapter, ValidationError
+
+    known = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
+    unknown = [key for key in settings if key not in known]
+    if unknown:
+        raise CalibrationError(
+            f"{name} has no setting {', '.join(unknown)}; it has {', '.join(sorted(known)) or 'none'}."
+        )
+    if not settings:
+        return kind()
+    try:
+        return TypeAdapter(kind).validate_python({key: _value(text) for key, text in settings.items()})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise CalibrationError(f"The setting {where} of {name} is wrong: {first['msg']}.") from error
+
+
+def _value(text: str) -> Any:
+    """JSON where it is JSON, a list where there are commas, else the text itself.
+
+    >>> _value("430,450"), _value("0.99"), _value("center")
+    ([430, 450], 0.99, 'center')
+    """
+    import json
+
+    try:
+        return json.loads(text)
+    except ValueError:
+        return [_value(part) for part in text.split(",")] if "," in text else text

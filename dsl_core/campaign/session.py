@@ -1,0 +1,214 @@
+"""One calibration, step by step: what a wizard and the command line both drive.
+
+The object holds nothing that is not on disk: captures lie in the folders of their steps, a fit waits as a
+candidate, accepted calibrations are files of the campaign. So a session can be dropped at any moment, and a
+new one goes on where it stood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from dsl_core.campaign.assembly import (
+    accepted_calibrations,
+    all_recipes,
+    apply_records,
+    nominal_rig,
+    record_of,
+    require_needs,
+)
+from dsl_core.campaign.captures import (
+    CaptureNote,
+    other_conditions,
+    read_note,
+    recover,
+    replacing,
+    scan_settings,
+    write_note,
+)
+from dsl_core.campaign.recipe import Bench, Recipe, Step
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.conditions import current_conditions
+from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.io.campaign_folder import CampaignFolder, now
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.base import Record
+from dsl_core.model.figure import Figure
+from dsl_core.progress import NoProgress, Progress
+
+State = Literal["missing", "captured", "refused"]
+
+
+@dataclass(frozen=True)
+class StepStatus:
+    """Where a step stands; ``reason`` says why its captures are refused."""
+
+    step: Step
+    state: State
+    reason: str = ""
+
+
+class CalibrationSession:
+    """Drives one recipe on open devices in a campaign's folder."""
+
+    def __init__(
+        self,
+        recipe: Recipe,
+        devices: DeviceRig,
+        campaign: CampaignFolder,
+        recipes: Sequence[Recipe] | None = None,
+    ) -> None:
+        """``recipes`` are all calibrations in order, those of this installation if not given.
+
+        Raises `CalibrationError` when a calibration that this one needs is missing from the campaign, or
+        when nothing is known of the rig to start from.
+        """
+        self.recipe, self.devices, self.campaign = recipe, devices, campaign
+        recipes = all_recipes() if recipes is None else recipes
+        names = [each.name for each in recipes]
+        before = recipes[: names.index(recipe.name)] if recipe.name in names else recipes
+        accepted = accepted_calibrations(campaign, before)
+        require_needs(recipe, accepted)
+        self.based_on = {name: each.accepted for name, each in accepted.items()}
+        rig = apply_records(accepted, nominal_rig(devices), before)
+        self.bench = Bench(devices, campaign.home(recipe.name), rig)
+        for step in self.steps:
+            recover(self._folder(step))
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps in their order."""
+        return self.recipe.steps(self.bench)
+
+    def statuses(self) -> tuple[StepStatus, ...]:
+        """Where every step stands, read from disk."""
+        return tuple(self.status(step) for step in self.steps)
+
+    def status(self, step: Step) -> StepStatus:
+        """Where a step stands, read from disk; damaged files are a reason to refuse it."""
+        folder = self._folder(step)
+        try:
+            note = read_note(folder)
+            if note is not None and note.refused:
+                return StepStatus(step, "refused", note.refused)
+            found = other_conditions(folder, current_conditions(self.devices))
+            if found:
+                reason = f"it was captured with other devices or settings: {'; '.join(found)}"
+                return StepStatus(step, "refused", reason)
+            return StepStatus(step, "captured" if self.recipe.is_captured(self.bench, step) else "missing")
+        except StoreError as error:
+            return StepStatus(step, "refused", str(error))
+
+    def next_step(self) -> Step | None:
+        """The first step without accepted captures, None when all are there."""
+        return next((each.step for each in self.statuses() if each.state != "captured"), None)
+
+    def place(self, step: Step) -> bool:
+        """Let the rig place the target of a step; False when a person has to."""
+        if self.devices.place is None:
+            return False
+        self.devices.place(step.placement)
+        return True
+
+    def look(self, step: Step) -> tuple[Figure, ...]:
+        """Check with a few frames whether the target is right; nothing is kept."""
+        return self.recipe.look(self.bench, step)
+
+    def capture(self, step: Step, progress: Progress | None = None) -> None:
+        """Capture a step, or go on with it; refused captures are replaced.
+
+        Raises `CalibrationError` when the captures show that something is wrong: then the step is refused and
+        says why, and all other steps are as they were. A fit that waits is forgotten.
+        """
+        if self.status(step).state == "refused":
+            self.redo(step, progress)
+            return
+        self._capture(step, progress or NoProgress())
+
+    def redo(self, step: Step, progress: Progress | None = None) -> None:
+        """Capture a step anew; the old captures go only when the new ones are complete."""
+        with replacing(self._folder(step)):
+            self._capture(step, progress or NoProgress())
+
+    def _capture(self, step: Step, progress: Progress) -> None:
+        folder = self._folder(step)
+        note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
+        write_note(folder, note)
+        self.campaign.discard(self.recipe.name)
+        try:
+            self.recipe.capture(self.bench, step, progress)
+        except CalibrationError as error:
+            write_note(folder, note.model_copy(update={"refused": str(error)}))
+            raise
+        if not self.recipe.is_captured(self.bench, step):
+            raise CalibrationError(f"The step {step.title!r} is not complete yet. Capture it again to go on.")
+        write_note(folder, note.model_copy(update={"finished": now(), "refused": ""}))
+
+    def fit(self, progress: Progress | None = None) -> AcceptedCalibration:
+        """Calibrate from the captures of all steps; the outcome waits on disk to be accepted.
+
+        Raises `CalibrationError` naming every step that is missing or refused, or what the recipe says.
+        """
+        self._require_captures()
+        record = self.recipe.fit(self.bench, progress or NoProgress())
+        notes = [note for step in self.steps if (note := read_note(self._folder(step)))]
+        fitted = AcceptedCalibration(
+            name=self.recipe.name,
+            title=self.recipe.title,
+            captured=max((note.finished for note in notes), default=""),
+            conditions=current_conditions(self.devices),
+            settings=self._settings(),
+            based_on=self.based_on,
+            figures=self.recipe.figures(record),
+            record=record.model_dump(mode="json"),
+        )
+        self.campaign.propose(fitted)
+        return fitted
+
+    def candidate(self) -> AcceptedCalibration | None:
+        """The fit that waits to be accepted; None without one."""
+        return self.campaign.candidate(self.recipe.name)
+
+    def record(self, of: AcceptedCalibration) -> Record:
+        """The recipe's own record of a fit."""
+        return record_of(self.recipe, of)
+
+    def accept(self) -> AcceptedCalibration:
+        """Let the fit that waits be the campaign's calibration; raises `StoreError` without one."""
+        return self.campaign.accept(self.recipe.name)
+
+    def discard(self) -> None:
+        """Forget the fit that waits; captures and the accepted calibration stay."""
+        self.campaign.discard(self.recipe.name)
+
+    def accepted(self) -> AcceptedCalibration | None:
+        """The accepted calibration while it is good: complete, and fitted on the calibrations before it."""
+        found = self.campaign.accepted(self.recipe.name)
+        return found if found is not None and found.based_on == self.based_on else None
+
+    def _folder(self, step: Step) -> Path:
+        return self.bench.step_folder(step)
+
+    def _require_captures(self) -> None:
+        lacking = [each for each in self.statuses() if each.state != "captured"]
+        if lacking:
+            clauses = "; ".join(
+                f"the step {each.step.title!r} "
+                + (f"is refused ({each.reason})" if each.state == "refused" else "is not captured")
+                for each in lacking
+            )
+            raise CalibrationError(
+                f"{self.recipe.title} cannot be fitted yet: {clauses}. Capture them first."
+            )
+
+    def _settings(self) -> dict[str, str]:
+        """Rig, its options, the recipe's settings and the exposures: what a repetition needs."""
+        info = self.campaign.info
+        found = {"rig": " ".join([info.rig, *(f"{key}={value}" for key, value in info.options.items())])}
+        found |= info.settings.get(self.recipe.name, {})
+        exposures = scan_settings(self.bench.folder)
+        return found | ({"exposures": ", ".join(exposures)} if exposures else {})

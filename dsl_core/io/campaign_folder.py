@@ -1,0 +1,183 @@
+"""A calibration campaign on disk: which rig, which captures, what was accepted and what came before.
+
+``campaign.json``
+    rig, its options and those of the calibrations; written when the campaign is begun.
+``NAME/``
+    the captures of one calibration, a folder a step; the recipe's own.
+``candidates/NAME.json``
+    a fit that nobody accepted yet.
+``NAME.json``
+    the accepted calibration; ``history/NAME/`` keeps the ones it replaced.
+
+Every file is written whole or not at all, so that a campaign can be left and taken up at any moment.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal, Self, TypeVar
+
+from pydantic import Field, ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.base import Record
+
+CAMPAIGN_NAME = "campaign.json"
+R = TypeVar("R", bound=Record)
+
+
+class CampaignInfo(Record):
+    """With which rig and options a campaign was begun; ``settings`` are those of each calibration."""
+
+    schema_version: Literal[1] = 1
+    created: str
+    rig: str
+    options: dict[str, str] = Field(default_factory=dict)
+    settings: dict[str, dict[str, str]] = Field(default_factory=dict)
+
+
+class CampaignFolder:
+    """The files of a campaign by what they mean."""
+
+    def __init__(self, path: Path, info: CampaignInfo) -> None:
+        """Used by `begin` and `open`."""
+        self.path, self.info = path, info
+
+    @classmethod
+    def open(cls, path: Path) -> Self:
+        """A campaign that was begun before; raises `StoreError`."""
+        if not (path / CAMPAIGN_NAME).is_file():
+            raise StoreError(f"{path} is no campaign: it has no {CAMPAIGN_NAME}. Give a campaign's folder.")
+        return cls(path, read_record(path / CAMPAIGN_NAME, CampaignInfo))
+
+    @classmethod
+    def begin(
+        cls,
+        path: Path,
+        rig: str | None,
+        options: Mapping[str, str],
+        settings: Mapping[str, Mapping[str, str]] | None = None,
+    ) -> Self:
+        """Begin a campaign or go on with it.
+
+        ``rig`` None means the rig the campaign was begun with, for a new one the twin. ``settings`` add to
+        those the campaign has. Raises `StoreError` when the campaign was begun with another rig or options,
+        or when the folder holds something else.
+        """
+        if not (path / CAMPAIGN_NAME).exists():
+            if path.is_dir() and any(path.iterdir()):
+                raise StoreError(f"{path} is neither empty nor a campaign. Choose a new folder.")
+            info = CampaignInfo(created=now(), rig=rig or "twin", options=dict(options))
+        else:
+            info = cls.open(path).info
+            _refuse_other_rig(path, info, rig, options)
+        campaign = cls(path, info)
+        campaign._remember(settings or {})
+        return campaign
+
+    def _remember(self, settings: Mapping[str, Mapping[str, str]]) -> None:
+        merged = {name: dict(values) for name, values in self.info.settings.items()}
+        for name, values in settings.items():
+            merged[name] = {**merged.get(name, {}), **values}
+        self.info = self.info.model_copy(update={"settings": merged})
+        _make(self.path)
+        _write(self.path / CAMPAIGN_NAME, self.info)
+
+    def home(self, name: str) -> Path:
+        """Where the captures of a calibration lie."""
+        return self.path / name
+
+    def accepted(self, name: str) -> AcceptedCalibration | None:
+        """The accepted calibration of a name; raises `StoreError` when its file is damaged."""
+        return self._calibration(self.path / f"{name}.json")
+
+    def candidate(self, name: str) -> AcceptedCalibration | None:
+        """A fit that waits for a verdict; raises `StoreError` when its file is damaged."""
+        return self._calibration(self._candidate_path(name))
+
+    def history(self, name: str) -> tuple[AcceptedCalibration, ...]:
+        """The accepted calibrations that were replaced, oldest first."""
+        paths = sorted((self.path / "history" / name).glob("*.json"))
+        return tuple(read_record(path, AcceptedCalibration) for path in paths)
+
+    def propose(self, fitted: AcceptedCalibration) -> None:
+        """Keep a fit until it is accepted or discarded."""
+        path = self._candidate_path(fitted.name)
+        _make(path.parent)
+        _write(path, fitted)
+
+    def accept(self, name: str) -> AcceptedCalibration:
+        """Let the candidate be the calibration from now on; the one it replaces goes into the history.
+
+        Raises `StoreError` when there is none.
+        """
+        candidate = self.candidate(name)
+        if candidate is None:
+            raise StoreError(f"No fit of {name} in {self.path} waits to be accepted. Fit it first.")
+        old = self.accepted(name)
+        if old is not None:
+            folder = self.path / "history" / name
+            _make(folder)
+            _write(folder / f"{old.accepted.replace(':', '')}.json", old)
+        fresh = candidate.model_copy(update={"accepted": now()})
+        _write(self.path / f"{name}.json", fresh)
+        self.discard(name)
+        return fresh
+
+    def discard(self, name: str) -> None:
+        """Forget the candidate; the accepted calibration stays. Nothing happens when there is none."""
+        self._candidate_path(name).unlink(missing_ok=True)
+
+    def _candidate_path(self, name: str) -> Path:
+        return self.path / "candidates" / f"{name}.json"
+
+    def _calibration(self, path: Path) -> AcceptedCalibration | None:
+        return read_record(path, AcceptedCalibration) if path.exists() else None
+
+
+def now() -> str:
+    """The time as it is written into files: UTC, to the microsecond, so that two never agree."""
+    return datetime.now(UTC).isoformat(timespec="microseconds")
+
+
+def read_record(path: Path, kind: type[R]) -> R:
+    """A record from its JSON file; raises `StoreError` that names the first field that is wrong."""
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise StoreError(
+            f"{path} is damaged or from another version: {where}: {first['msg']}."
+            " Restore it from a copy, or delete it and calibrate again."
+        ) from error
+
+
+def _refuse_other_rig(path: Path, info: CampaignInfo, rig: str | None, options: Mapping[str, str]) -> None:
+    same_options = not options or dict(options) == info.options
+    if (rig in (None, info.rig)) and same_options:
+        return
+    known = " ".join([info.rig, *(f"{key}={value}" for key, value in sorted(info.options.items()))])
+    raise StoreError(
+        f"The campaign {path} was begun with the rig {known}. Leave out --rig and --option, or begin a new"
+        " campaign for another rig."
+    )
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(
+            f"The folder {folder} cannot be made ({error.strerror}). Check its parent folder's permissions."
+        ) from error
+
+
+def _write(path: Path, record: Record) -> None:
+    write_atomic(path, (record.model_dump_json(indent=1) + "\n").encode())

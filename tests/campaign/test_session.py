@@ -1,0 +1,305 @@
+"""Sessions go on from disk, never lose a good capture, and refuse what does not belong together."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from dsl_core.campaign.assembly import accepted_calibrations, assemble, nominal_rig
+from dsl_core.campaign.guide import calibrate_all, run_calibration
+from dsl_core.campaign.recipe import Recipe, Step
+from dsl_core.campaign.session import CalibrationSession
+from dsl_core.devices.base import CameraInfo, DeviceRig
+from dsl_core.devices.registry import open_rig
+from dsl_core.errors import CalibrationError, Cancelled, StoreError
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.rig_file import load_rig, save_rig
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.figure import Figure
+from dsl_core.progress import NoProgress
+from tests.cases.fake_recipe import FakeRecipe
+
+
+@pytest.fixture
+def devices() -> Iterator[DeviceRig]:
+    with open_rig("twin", {"size": "32x24", "scene": "plane"}) as rig:
+        rig.place = None
+        yield rig
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> CampaignFolder:
+    return CampaignFolder.begin(tmp_path / "campaign", "twin", {"size": "32x24", "scene": "plane"})
+
+
+class Willing:
+    """Places, looks and accepts whatever comes, and remembers."""
+
+    def __init__(self, accepts: bool = True) -> None:
+        self.placed: list[str] = []
+        self.accepts = accepts
+
+    def begins(self, session: CalibrationSession, missing: int) -> None:
+        self.missing = missing
+
+    def place(self, step: Step) -> None:
+        self.placed.append(step.key)
+
+    def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
+        return bool(figures)
+
+    def judge(self, fitted: AcceptedCalibration) -> bool:
+        return self.accepts
+
+
+def another_camera(devices: DeviceRig, **changes: object) -> None:
+    """Let the camera say something else of itself."""
+    from dataclasses import replace
+
+    info: CameraInfo = replace(devices.camera.info, **changes)  # type: ignore[arg-type]
+    devices.camera._info = info  # type: ignore[attr-defined]
+
+
+def session(devices: DeviceRig, campaign: CampaignFolder, recipe: FakeRecipe) -> CalibrationSession:
+    recipes: Sequence[Recipe] = (recipe,)
+    return CalibrationSession(recipe, devices, campaign, recipes)
+
+
+def test_steps_fit_and_acceptance_go_on_from_disk(devices: DeviceRig, campaign: CampaignFolder) -> None:
+    first = session(devices, campaign, FakeRecipe())
+    assert [each.state for each in first.statuses()] == ["missing", "missing"]
+    assert not first.place(first.steps[0])
+    first.capture(first.steps[0])
+    second = session(devices, CampaignFolder.open(campaign.path), FakeRecipe())
+    assert [each.state for each in second.statuses()] == ["captured", "missing"]
+    assert second.next_step() == second.steps[1]
+    with pytest.raises(CalibrationError, match="the step 'bright picture' is not captured"):
+        second.fit()
+    second.capture(second.steps[1])
+    assert second.next_step() is None
+    fitted = second.fit()
+    assert second.accepted() is None
+    third = session(devices, campaign, FakeRecipe())
+    assert third.candidate() == fitted
+    accepted = third.accept()
+    assert third.candidate() is None
+    assert third.accepted() == accepted
+    assert accepted.record["means_dn"][1] > accepted.record["means_dn"][0]
+    assert accepted.settings["rig"] == "twin size=32x24 scene=plane"
+    assert accepted.settings["exposures"] == "5 ms at 1"
+    assert accepted.conditions is not None
+    assert accepted.conditions.camera.serial == devices.camera.info.serial
+    assert accepted.captured
+
+
+def test_the_accepted_one_before_is_history(devices: DeviceRig, campaign: CampaignFolder) -> None:
+    one = session(devices, campaign, FakeRecipe())
+    old = run_calibration(one, Willing(), NoProgress())
+    assert run_calibration(one, Willing(), NoProgress()) == old  # complete: nothing is done again
+    guide = Willing()
+    new = run_calibration(one, guide, NoProgress(), redo=["dim"])
+    assert guide.placed == ["dim"]
+    assert campaign.history("fake") == (old,)
+    assert campaign.accepted("fake") == new != old
+    with pytest.raises(CalibrationError, match="has no step night; it has dim, bright"):
+        run_calibration(one, guide, NoProgress(), redo=["night"])
+
+
+def test_a_fit_may_be_discarded_and_one_that_is_refused_waits(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    one = session(devices, campaign, FakeRecipe(largest_dn=1.0))
+    with pytest.raises(CalibrationError, match=r"brightest .* DN\. Open the aperture\."):
+        run_calibration(one, Willing(accepts=False), NoProgress())
+    assert one.candidate() is not None
+    one.discard()
+    assert one.candidate() is None
+    with pytest.raises(StoreError, match="No fit of fake"):
+        one.accept()
+
+
+def test_a_failing_step_is_refused_and_leaves_the_others(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    recipe = FakeRecipe(bad_steps={"bright"})
+    one = session(devices, campaign, recipe)
+    one.capture(one.steps[0])
+    with pytest.raises(CalibrationError, match="shows the wrong target"):
+        one.capture(one.steps[1])
+    assert [each.state for each in one.statuses()] == ["captured", "refused"]
+    assert "wrong target" in one.statuses()[1].reason
+    with pytest.raises(CalibrationError, match="'bright picture' is refused"):
+        one.fit()
+    recipe.bad_steps.clear()
+    one.capture(one.steps[1])
+    assert [each.state for each in one.statuses()] == ["captured", "captured"]
+
+
+def test_redo_keeps_the_old_capture_until_the_new_one_is_complete(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    recipe = FakeRecipe()
+    one = session(devices, campaign, recipe)
+    one.capture(one.steps[0])
+    folder = one.bench.step_folder(one.steps[0])
+    before = (folder / "scan.dsl" / "manifest.json").read_bytes()
+
+    class Stop:
+        def report(self, stage: str, done: int, total: int) -> None:
+            raise Cancelled("enough")
+
+    with pytest.raises(Cancelled):
+        one.redo(one.steps[0], Stop())
+    assert (folder / "scan.dsl" / "manifest.json").read_bytes() == before
+    assert one.statuses()[0].state == "captured"
+    # A killed process leaves the old captures aside and the new ones begun.
+    aside = folder.parent / ".replaced" / folder.name
+    aside.parent.mkdir(exist_ok=True)
+    shutil.copytree(folder, aside)
+    shutil.rmtree(folder / "scan.dsl" / "frames")
+    (folder / "capture.json").unlink()
+    assert session(devices, campaign, recipe).statuses()[0].state == "captured"
+    assert not aside.exists()
+    # Killed a moment later, the new captures are complete, and stay.
+    shutil.copytree(folder, aside)
+    (folder / "new").touch()
+    session(devices, campaign, recipe)
+    assert (folder / "new").exists()
+    assert not aside.exists()
+
+
+def test_damaged_captures_are_refused_and_taken_anew(devices: DeviceRig, campaign: CampaignFolder) -> None:
+    one = session(devices, campaign, FakeRecipe())
+    one.capture(one.steps[0])
+    shutil.rmtree(one.bench.step_folder(one.steps[0]) / "scan.dsl" / "frames")
+    assert one.statuses()[0].state == "refused"
+    assert "zarr.json is missing" in one.statuses()[0].reason
+    one.capture(one.steps[0])
+    assert one.statuses()[0].state == "captured"
+
+
+@pytest.mark.parametrize(
+    ("change", "clause"),
+    [
+        ({"serial": "OTHER"}, "the camera's serial number was TWIN-C and is OTHER"),
+        ({"binning": 2}, "the camera's binning was 1 and is 2"),
+        ({"gain_db": 6.0}, r"the camera's gain \(dB\) was 0 and is 6"),
+        ({"region_px": (0, 0, 32, 24)}, "sensor region was the whole sensor and is 0, 0, 32, 24"),
+    ],
+)
+def test_captures_of_two_rigs_do_not_mix(
+    devices: DeviceRig, campaign: CampaignFolder, change: dict[str, object], clause: str
+) -> None:
+    one = session(devices, campaign, FakeRecipe())
+    one.capture(one.steps[0])
+    another_camera(devices, **change)
+    one.capture(one.steps[1])
+    assert [each.state for each in one.statuses()] == ["refused", "captured"]
+    with pytest.raises(CalibrationError, match=f"'dim picture' is refused .*{clause}"):
+        one.fit()
+
+
+def test_a_scan_copied_from_another_rig_is_found(
+    devices: DeviceRig, campaign: CampaignFolder, tmp_path: Path
+) -> None:
+    one = session(devices, campaign, FakeRecipe())
+    for step in one.steps:
+        one.capture(step)
+    manifest = one.bench.step_folder(one.steps[1]) / "scan.dsl" / "manifest.json"
+    content = json.loads(manifest.read_text())
+    content["projector"]["serial"] = "another"
+    manifest.write_text(json.dumps(content))
+    assert one.statuses()[0].state == "captured"
+    assert "the projector's serial number was another" in one.statuses()[1].reason
+
+
+def chain() -> tuple[FakeRecipe, FakeRecipe]:
+    return FakeRecipe("first", keys=("only",)), FakeRecipe("second", ("first",), keys=("only",), scale=3.0)
+
+
+def test_all_calibrations_make_a_rig_that_says_where_it_comes_from(
+    devices: DeviceRig, campaign: CampaignFolder, tmp_path: Path
+) -> None:
+    recipes = chain()
+    with pytest.raises(CalibrationError, match="second needs first"):
+        CalibrationSession(recipes[1], devices, campaign, recipes)
+    rig = calibrate_all(campaign, devices, Willing(), NoProgress(), "lab 3", recipes=recipes)
+    nominal = nominal_rig(devices)
+    assert rig.white_scale == pytest.approx(6 * nominal.white_scale)
+    assert rig.name == "lab 3"
+    assert [note.name for note in rig.calibrations] == ["first", "second"]
+    assert rig.calibrations[0].figures[0].std == 0.5
+    assert rig.conditions is not None
+    assert rig.provenance.camera_serial == "TWIN-C"
+    assert load_rig(save_rig(rig, tmp_path / "rig.json")) == rig
+    # Nothing is captured or fitted a second time.
+    captured = [list(recipe.captured) for recipe in recipes]
+    calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)
+    assert [recipe.captured for recipe in recipes] == captured
+
+
+def test_what_was_fitted_on_a_superseded_calibration_is_fitted_again(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    recipes = chain()
+    calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)
+    old = campaign.accepted("second")
+    first = CalibrationSession(recipes[0], devices, campaign, recipes)
+    run_calibration(first, Willing(), NoProgress(), redo=["only"])
+    assert CalibrationSession(recipes[1], devices, campaign, recipes).accepted() is None
+    guide = Willing()
+    calibrate_all(campaign, devices, guide, NoProgress(), recipes=recipes)
+    assert guide.placed == []
+    new = campaign.accepted("second")
+    assert old is not None
+    assert new is not None
+    assert new.based_on != old.based_on
+    assert new.record == old.record
+
+
+def test_accepted_calibrations_of_two_rigs_are_not_assembled(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    recipes = chain()
+    calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)
+    accepted = dict(accepted_calibrations(campaign, recipes))
+    assert accepted["second"].conditions is not None
+    lens = accepted["second"].conditions.camera.model_copy(update={"gain_db": 3.0})
+    other = accepted["second"].conditions.model_copy(update={"camera": lens})
+    accepted["second"] = accepted["second"].model_copy(update={"conditions": other})
+    with pytest.raises(CalibrationError, match="first and second were captured with different"):
+        assemble(accepted, nominal_rig(devices), recipes)
+    partial = assemble({"first": accepted["first"]}, nominal_rig(devices), recipes)
+    assert partial.provenance.notes == "Not calibrated, as nominal: second."
+    with pytest.raises(CalibrationError, match="needs first"):
+        assemble({"second": accepted["second"]}, nominal_rig(devices), recipes)
+    with pytest.raises(CalibrationError, match="No calibration was accepted"):
+        assemble({}, nominal_rig(devices), recipes)
+
+
+def test_a_damaged_record_and_a_foreign_folder_are_named(
+    devices: DeviceRig, campaign: CampaignFolder, tmp_path: Path
+) -> None:
+    recipes = chain()
+    calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)
+    path = campaign.path / "first.json"
+    content = json.loads(path.read_text())
+    content["record"] = {"means_dn": "many"}
+    path.write_text(json.dumps(content))
+    with pytest.raises(CalibrationError, match=r"first of .* another version \(means_dn"):
+        CalibrationSession(recipes[1], devices, campaign, recipes)
+    path.write_text(path.read_text()[:50])
+    with pytest.raises(StoreError, match=r"first\.json is damaged"):
+        CalibrationSession(recipes[1], devices, campaign, recipes)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thing").touch()
+    with pytest.raises(StoreError, match="neither empty nor a campaign"):
+        CampaignFolder.begin(tmp_path / "full", None, {})
+    with pytest.raises(StoreError, match="begun with the rig twin scene=plane size=32x24"):
+        CampaignFolder.begin(campaign.path, None, {"size": "64x48"})
+    kept = CampaignFolder.begin(campaign.path, None, {}, {"first": {"keys": "a,b"}})
+    assert kept.info.settings == {"first": {"keys": "a,b"}}

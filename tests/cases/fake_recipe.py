@@ -1,0 +1,106 @@
+"""A calibration of nothing much: steps that scan a few uniform colours, and a fit that means them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from dsl_core import pipeline
+from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.errors import CalibrationError
+from dsl_core.io.session import SessionReader
+from dsl_core.model.base import Record
+from dsl_core.model.figure import Figure
+from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan, Columns, NoCode, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+
+class Brightness(Record):
+    """Mean of each step, DN."""
+
+    means_dn: tuple[float, ...]
+
+
+@dataclass
+class FakeRecipe:
+    """Satisfies `Recipe`; the fields make it fail or differ where a test wants that."""
+
+    name: str = "fake"
+    needs: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ("dim", "bright")
+    scale: float = 2.0
+    largest_dn: float = 4000.0
+    bad_steps: set[str] = field(default_factory=set)
+    looks: list[str] = field(default_factory=list)
+    captured: list[str] = field(default_factory=list)
+    title: ClassVar[str] = "Brightness"
+    record_type: ClassVar[type[Record]] = Brightness
+
+    def steps(self, bench: Bench) -> tuple[Step, ...]:
+        """One a key."""
+        return tuple(
+            Step(key, f"{key} picture", f"Place the {key} target.", Placement(target="as it is"))
+            for key in self.keys
+        )
+
+    def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
+        """Count the looks."""
+        self.looks.append(step.key)
+        return (Figure(name="looks", value=len(self.looks), unit=""),)
+
+    def is_captured(self, bench: Bench, step: Step) -> bool:
+        """Whether the scan is there and whole."""
+        folder = bench.step_folder(step) / "scan.dsl"
+        return folder.exists() and not SessionReader(folder).missing()
+
+    def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Scan one colour, brighter from step to step."""
+        level = (self.keys.index(step.key) + 1) / len(self.keys)
+        width = bench.devices.projector.info.width_px
+        plan = CapturePlan(
+            name=step.key,
+            code=NoCode(),
+            spectral=Columns(levels=(((level,) * 3,) * width,)),
+            settings=(Setting(exposure_ms=5.0, level=1.0),),
+            code_settings=(0,),
+        )
+        pipeline.scan(
+            bench.devices,
+            pipeline.fit_plan(plan, bench.devices),
+            bench.step_folder(step) / "scan.dsl",
+            progress,
+        )
+        self.captured.append(step.key)
+        if step.key in self.bad_steps:
+            raise CalibrationError(f"The {step.key} picture shows the wrong target. Place the right one.")
+
+    def fit(self, bench: Bench, progress: Progress) -> Brightness:
+        """Read the frames of all steps."""
+        means = []
+        for step in self.steps(bench):
+            reader = SessionReader(bench.step_folder(step) / "scan.dsl")
+            shot = next(shot for shot in reader.plan.shots() if shot.role == "spectral")
+            means.append(float(reader.read(shot).mean()))
+        progress.report("fit", 1, 1)
+        return Brightness(means_dn=tuple(means))
+
+    def figures(self, record: Record) -> tuple[Figure, ...]:
+        """The brightest mean against its limit."""
+        assert isinstance(record, Brightness)
+        advice = "Open the aperture."
+        return (
+            Figure(
+                name="brightest",
+                value=max(record.means_dn),
+                unit="DN",
+                std=0.5,
+                high=self.largest_dn,
+                advice=advice,
+            ),
+        )
+
+    def apply(self, record: Record, rig: Rig) -> Rig:
+        """Change the white scale by a known factor."""
+        return rig.model_copy(update={"white_scale": rig.white_scale * self.scale})
