@@ -41,6 +41,8 @@ class PublishedCalibration:
                 "emission": self.tables.emission,
                 "efficiency": self.tables.efficiency,
                 "correspondence": None,
+                "conditions": None,
+                "calibrations": (),
                 "provenance": Provenance(
                     source="published calibration layout",
                     notes=f"film, sensor and scales from {base.name!r}",
