@@ -117,6 +117,8 @@ class Rig(Record):
     where nobody noted them; ``calibrations`` say when each part was found and how well.
     ``residual`` corrects the columns of the grating equation; ``correspondence`` is the data-driven model.
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
+    ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that the
+    calibration leaves in every reflectance.
     """
 
     schema_version: Literal[1] = 1
@@ -132,6 +134,7 @@ class Rig(Record):
     projector_response: ProjectorResponse = ProjectorResponse()
     white_scale: float = Field(gt=0)
     white_scale_rel_std: float = Field(default=0.0, ge=0)
+    chain_rel_std: SpectralCurve | None = None
     reference_distance_mm: float = Field(default=700.0, gt=0)
     frame_period_ms: float = Field(default=1000.0 / 60.0, gt=0)
     depth_range_mm: tuple[float, float] = (500.0, 1000.0)
