@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.optics.colour import colour_library, observer_weights
+from dsl_core.optics.charts import chart_reflectance
+from dsl_core.optics.colour import observer_weights
 from dsl_core.simulation.truth import FINE_NM
 
 Spectrum = NDArray[np.float64]
@@ -25,18 +26,8 @@ def flat(reflectance: float) -> Spectrum:
 
 @cache
 def chart_spectra(name: str = "BabelColor Average") -> dict[str, Spectrum]:
-    """The 24 patches of a classic chart, in reading order, by the name of their colour-science data set.
-
-    "BabelColor Average" (30 charts, 10 nm) and "ISO 17321-1" (5 nm) cover 400 to 700 nm; between samples
-    the monotone cubic of Fritsch and Carlson adds no overshoot.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    patches = colour_library().SDS_COLOURCHECKERS[name]
-    return {
-        patch: np.clip(PchipInterpolator(sd.wavelengths, sd.values)(FINE_NM), 0.0, 1.0)
-        for patch, sd in patches.items()
-    }
+    """The 24 patches of a classic chart on the fine grid, by name, in reading order."""
+    return chart_reflectance(FINE_NM, name)
 
 
 def bandpass(centre_nm: float, fwhm_nm: float = 10.0, peak: float = 0.8, cavities: int = 3) -> Spectrum:
