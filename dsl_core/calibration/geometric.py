@@ -201,9 +201,9 @@ def _record(
     spread = [side.square_std_mm**2 + (side.square_mm - mean) ** 2 for side in sides]
     return GeometryCalibration(
         board=board,
-        camera=_lens(values[bundle.CAMERA], camera_size_px),
-        projector=_lens(values[bundle.PROJECTOR], projector_size_px),
-        pose=_pose(values[bundle.STEREO]),
+        camera=lens_of(values[bundle.CAMERA], camera_size_px),
+        projector=lens_of(values[bundle.PROJECTOR], projector_size_px),
+        pose=pose_of(values[bundle.STEREO]),
         camera_deviation=_lens_deviation(deviations[bundle.CAMERA]),
         projector_deviation=_lens_deviation(deviations[bundle.PROJECTOR]),
         pose_deviation=_pose_deviation(deviations[bundle.STEREO]),
@@ -225,7 +225,8 @@ def _record(
     )
 
 
-def _lens(values: Floats, size_px: Size) -> Lens:
+def lens_of(values: Floats, size_px: Size) -> Lens:
+    """The lens of nine fitted numbers; raises `CalibrationError` when they are none of a lens."""
     fx, fy, cx, cy, k1, k2, p1, p2, k3 = (float(value) for value in values)
     if min(fx, fy) <= 0:
         raise CalibrationError("The joint fit ended with a negative focal length. Add poses with more tilt.")
@@ -240,7 +241,8 @@ def _lens_deviation(values: Floats) -> LensDeviation:
     return LensDeviation(fx_px=fx, fy_px=fy, cx_px=cx, cy_px=cy, distortion=(k1, k2, p1, p2, k3))
 
 
-def _pose(motion: Floats) -> Pose:
+def pose_of(motion: Floats) -> Pose:
+    """The pose of a rotation vector and a translation (mm)."""
     rotation = tuple(map(tuple, rotation_of(motion[:3]).tolist()))
     return Pose(rotation=rotation, translation_mm=tuple(motion[3:].tolist()))  # type: ignore[arg-type]
 
