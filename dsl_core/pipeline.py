@@ -74,12 +74,16 @@ def scan(
 def resume(
     rig: DeviceRig, folder: Path, progress: Progress | None = None, check_drift: bool = True
 ) -> Status:
-    """Go on with a session after a look at whether anything moved; raises `DeviceError` if it did."""
+    """Go on with a session after a look at whether anything moved; raises `DeviceError` if it did.
+
+    The session's own calibration counts, whatever the rig says of itself now.
+    """
     from dsl_core.capture import drift
     from dsl_core.io.session import SessionReader
     from dsl_core.patterns.images import pattern_image
 
     reader = SessionReader(folder)
+    rig.calibration = reader.calibration or rig.calibration
     missing = {shot.index for shot in reader.missing()}
     done = [shot for shot in reader.plan.shots() if shot.index not in missing]
     if check_drift and done and missing:

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.errors import DecodeError, StoreError
+from dsl_core.errors import CalibrationError, DecodeError, StoreError
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.pipeline import Options, calibration_of, reconstruct
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.evaluation.summary import Truth
+    from dsl_core.io.session_manifest import Manifest
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
@@ -42,14 +43,21 @@ def reconstruct_session(
     options: Options | None = None,
     progress: Progress | None = None,
     timer: StageTimer | None = None,
+    override_calibration: bool = False,
 ) -> xr.Dataset:
-    """The result of a complete session, with its origin and the cost of each stage among its attributes."""
+    """The result of a complete session, with its origin and the cost of each stage among its attributes.
+
+    Raises `CalibrationError` when the scan was taken with other settings than the calibration given, unless
+    that is overridden.
+    """
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.session import SessionReader
     from dsl_core.io.session_check import require_complete
 
     reader, timer = SessionReader(folder), timer or StageTimer()
     require_complete(reader)
+    if calibration is not None and not override_calibration:
+        _require_conditions(folder, reader.manifest, calibration)
     result = reconstruct(reader, calibration_of(reader, calibration), options, progress, timer)
     return result.assign_attrs(
         {
@@ -60,6 +68,20 @@ def reconstruct_session(
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
+    from dsl_core.devices.conditions import conditions_of
+    from dsl_core.model.conditions import differences
+
+    if rig.conditions is None or manifest.camera is None or manifest.projector is None:
+        return
+    found = differences(rig.conditions, conditions_of(manifest.camera, manifest.projector))
+    if found:
+        raise CalibrationError(
+            f"The calibration {rig.name!r} is not for the scan {folder}: {'; '.join(found)} in the scan."
+            " Name the calibration of its rig, or use this one all the same with --override-calibration."
+        )
 
 
 def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:

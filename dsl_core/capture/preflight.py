@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
 
@@ -67,3 +68,5 @@ def _calibration(rig: DeviceRig) -> Iterator[str]:
             f" the camera delivers {camera.bayer} of {camera.bit_depth} bits"
             " (set the camera, or calibrate again)"
         )
+    for clause in check_conditions(known, rig):
+        yield f"since the calibration, {clause} (set it back, or calibrate again)"

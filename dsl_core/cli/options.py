@@ -23,6 +23,13 @@ RigName = Annotated[str, typer.Option("--rig", help="Name of a rig; 'dsl-scan ri
 RigOptions = Annotated[
     list[str], typer.Option("--option", "-o", help="Option of the rig as key=value; may be repeated.")
 ]
+CalibrationName = Annotated[
+    str | None,
+    typer.Option("--calibration", help="A calibration: its name in the library, NAME@DATE, or a rig's file."),
+]
+OverrideCalibration = Annotated[
+    bool, typer.Option("--override-calibration", help="Use it although camera or projector settings differ.")
+]
 PlanFile = Annotated[Path | None, typer.Option("--plan", help="A plan written by 'dsl-scan plan'.")]
 Code = Annotated[
     str | None, typer.Option("--code", help="Binary code: 'full' (columns and rows) or 'columns'.")

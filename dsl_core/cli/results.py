@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import Force, Json, RigOptions, parse_bands, parse_options, parse_pixels
+from dsl_core.cli.options import (
+    CalibrationName,
+    Force,
+    Json,
+    OverrideCalibration,
+    RigOptions,
+    parse_bands,
+    parse_options,
+    parse_pixels,
+)
 from dsl_core.cli.output import Output
 from dsl_core.errors import DecodeError, PlanError
 
@@ -30,9 +39,8 @@ def reconstruct(
     target: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder to write; SCAN.zarr if not given.")
     ] = None,
-    calibration: Annotated[
-        Path | None, typer.Option(help="A rig's JSON file instead of the scan's own.")
-    ] = None,
+    calibration: CalibrationName = None,
+    override: OverrideCalibration = False,
     bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
     model: Annotated[str, typer.Option(help="Correspondence: auto, grating, hybrid or grid.")] = "auto",
     refine: Annotated[bool, typer.Option("--refine/--no-refine", help="Columns below one pixel.")] = True,
@@ -43,8 +51,8 @@ def reconstruct(
 ) -> None:
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
     from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.result_file import save_result
-    from dsl_core.io.rig_file import load_rig
     from dsl_core.io.staging import check_targets
     from dsl_core.pipeline import Options
     from dsl_core.sessions import reconstruct_session
@@ -54,10 +62,10 @@ def reconstruct(
         raise PlanError(f"--model must be one of {', '.join(MODELS)}, not {model!r}.")
     grid = parse_bands(bands)
     check_targets([target], overwrite=force)
-    rig = load_rig(calibration) if calibration else None
+    rig = load_calibration(calibration) if calibration else None
     options = Options(grid, model, refine, not depth_only, _torch_device(device))
     with output.progress() as progress:
-        result = reconstruct_session(session, rig, options, progress, timer)
+        result = reconstruct_session(session, rig, options, progress, timer, override)
         with timer.stage("save the result"):
             save_result(result, target, overwrite=force)
     output.costs(timer.stages)
@@ -98,7 +106,13 @@ def evaluate(
 
 
 def export(
-    path: Annotated[Path, typer.Argument(metavar="SOURCE", help="A result; a scan for 'dataset'.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A result; a scan for 'dataset'; a rig's file, scan or name for 'calibration'.",
+        ),
+    ],
     form: Annotated[
         str, typer.Argument(metavar="FORMAT", help="ply, envi, exr, csv, png, dataset or calibration.")
     ],
@@ -120,11 +134,11 @@ def _export(
     output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
 ) -> list[Path]:
     from dsl_core import exchange, pipeline
+    from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.export import export as export_result
     from dsl_core.io.export import export_csv
     from dsl_core.io.published import export_calibration
     from dsl_core.io.result_file import load_result
-    from dsl_core.io.rig_file import load_rig
     from dsl_core.io.session import SessionReader
 
     if pixels and form != "csv":
@@ -133,7 +147,8 @@ def _export(
         with output.progress() as progress:
             return exchange.export_scan(path, target, force, progress)
     if form == "calibration":
-        rig = load_rig(path) if path.is_file() else pipeline.calibration_of(SessionReader(path))
+        is_scan = path.is_dir()
+        rig = pipeline.calibration_of(SessionReader(path)) if is_scan else load_calibration(str(path))
         return export_calibration(rig, target, overwrite=force)
     if form == "csv":
         return export_csv(load_result(path), target, overwrite=force, pixels=pixels)

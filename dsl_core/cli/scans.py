@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dsl_core.cli.options import (
+    CalibrationName,
     Code,
     Comb,
     Force,
     Json,
     Lines,
+    OverrideCalibration,
     PlanChoice,
     PlanFile,
     RigName,
@@ -95,6 +97,8 @@ def scan(
     lines: Lines = None,
     comb: Comb = None,
     setting: Settings = [],  # noqa: B006
+    calibration: CalibrationName = None,
+    override: OverrideCalibration = False,
     json: Json = False,
 ) -> None:
     """Capture a plan; every frame is safe on disk before the next is taken."""
@@ -111,11 +115,12 @@ def scan(
             f" Go on with it by 'dsl-scan resume {target}', or choose a new name."
         )
     with open_rig(rig, options) as devices:
+        notes = rig_notes(rig, options) | _calibrate(output, devices, calibration, override)
         fitted = choice if plan else pipeline.fit_plan(choice, devices)
         _require_patterns(fitted)
         _state(output, fitted, target, devices)
         with output.progress() as progress, _resumable(target):
-            status = pipeline.scan(devices, fitted, target, progress, rig_notes(rig, options))
+            status = pipeline.scan(devices, fitted, target, progress, notes)
     _done(output, target, status.done, status.elapsed_s)
 
 
@@ -140,6 +145,19 @@ def resume(
     with opened as devices, output.progress() as progress, _resumable(target):
         status = pipeline.resume(devices, target, progress, drift)
     _done(output, target, status.done, status.elapsed_s)
+
+
+def _calibrate(output: Output, devices: DeviceRig, name: str | None, override: bool) -> dict[str, str]:
+    """Let the devices scan with the calibration named, if any; what was overridden, as notes of the scan."""
+    from dsl_core.devices.conditions import use_calibration
+    from dsl_core.io.calibration_library import load_calibration
+
+    if name is None:
+        return {}
+    overridden = use_calibration(devices, load_calibration(name), override)
+    for clause in overridden:
+        output.say(f"Overridden: {clause}.")
+    return {"calibration_overridden": "; ".join(overridden)} if overridden else {}
 
 
 def _require_patterns(plan: CapturePlan) -> None:

@@ -12,9 +12,11 @@ from pydantic import Field, ValidationError
 
 import dsl_core
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
+from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.model.base import Record
+from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 
@@ -86,6 +88,9 @@ def refuse_other_scan(folder: Path, stored: Manifest, given: Manifest) -> None:
             differences.append(
                 f"{name} is {old.model} {old.serial} in the session and {new.model} {new.serial} now"
             )
+    if not differences and stored.camera and stored.projector and given.camera and given.projector:
+        known = conditions_of(stored.camera, stored.projector)
+        differences += setting_differences(known, conditions_of(given.camera, given.projector))
     if differences:
         raise StoreError(
             f"{folder} belongs to another scan: {'; '.join(differences)}."

@@ -1,0 +1,77 @@
+"""A scan takes the calibration it is told to, and refuses one that was made with other settings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dsl_core.devices.conditions import current_conditions
+from dsl_core.devices.registry import open_rig
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.rig_file import save_rig
+from dsl_core.io.session import SessionReader
+from dsl_core.model.rig import Rig
+
+from .conftest import SMALL_RIG, Give
+
+QUICK = ["--code", "columns", "--lines", "64x64", "--setting", "50@0.8"]
+
+
+@pytest.fixture
+def calibrated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Rig:
+    """The twin's own calibration with its conditions, as ``lab`` in an empty library."""
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
+    with open_rig("twin", {"size": "112x72"}) as devices:
+        assert devices.calibration is not None
+        update = {"conditions": current_conditions(devices), "name": "lab", "white_scale": 33.0}
+        rig = devices.calibration.model_copy(update=update)
+    CalibrationLibrary().store("lab", rig)
+    return rig
+
+
+def with_gain(rig: Rig, gain_db: float) -> Rig:
+    assert rig.conditions is not None
+    camera = rig.conditions.camera.model_copy(update={"gain_db": gain_db})
+    return rig.model_copy(update={"conditions": rig.conditions.model_copy(update={"camera": camera})})
+
+
+def test_a_scan_stores_the_calibration_it_is_told(give: Give, tmp_path: Path, calibrated: Rig) -> None:
+    scan = tmp_path / "scan.dsl"
+    assert give("scan", scan, *SMALL_RIG, *QUICK, "--calibration", "lab").code == 0
+    assert SessionReader(scan).calibration == calibrated
+    (scan / "frames" / "c.7.0.0").unlink()
+    assert give("resume", scan).code == 0
+    assert "no calibration 'lob'; it has: lab" in give(
+        "scan", tmp_path / "b.dsl", *SMALL_RIG, *QUICK, "--calibration", "lob"
+    ).sentence  # fmt: skip
+
+
+def test_other_settings_are_refused_unless_overridden(give: Give, tmp_path: Path, calibrated: Rig) -> None:
+    file = save_rig(with_gain(calibrated, 12.0), tmp_path / "other.json")
+    command = ["scan", tmp_path / "scan.dsl", *SMALL_RIG, *QUICK, "--calibration", file]
+    ending = give(*command)
+    assert ending.code == 2
+    assert "the camera's gain (dB) was 12 and is 0" in ending.sentence
+    assert not (tmp_path / "scan.dsl").exists()
+    assert give(*command, "--override-calibration").code == 0
+    reader = SessionReader(tmp_path / "scan.dsl")
+    assert reader.manifest.notes["calibration_overridden"] == "the camera's gain (dB) was 12 and is 0"
+    assert reader.calibration is not None
+    assert reader.calibration.white_scale == 33.0
+
+
+def test_a_reconstruction_refuses_it_as_well(
+    give: Give, tmp_path: Path, scan_copy: Path, calibrated: Rig
+) -> None:
+    file = save_rig(with_gain(calibrated, 12.0), tmp_path / "other.json")
+    command = ["reconstruct", scan_copy, "-o", tmp_path / "a.zarr", "--depth-only", "--calibration"]
+    assert "the camera's gain (dB) was 12 and is 0 in the scan" in give(*command, file).sentence
+    assert give(*command, file, "--override-calibration").code == 0
+    assert give(*command, "lab", "--force").code == 0
+
+
+def test_a_name_of_the_library_is_exported(give: Give, tmp_path: Path, calibrated: Rig) -> None:
+    assert calibrated.name == "lab"
+    assert give("export", "lab", "calibration", tmp_path / "published").code == 0
+    assert (tmp_path / "published" / "calibration" / "calibration_propcam.xml").is_file()
