@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 ORDERS = (1, -1)
 #: Bands of the forward model.
-STEP_NM = 5.0
+STEP_NM = 2.0
 BANDS_NM = np.arange(400.0, 701.0, STEP_NM)
 #: Relative error of the linear model in each value (correspondence, profile), added to its variance.
 MODEL_ERROR = 0.01
@@ -31,6 +31,8 @@ ZERO_ORDER_ERROR = 5e-4
 #: Pixels whose zero order stands this far (robust deviations) from the others' are left out.
 OUTLIER_SIGMAS = 6.0
 CHUNK = 256
+#: Blur and width of a band beyond a line's edge.
+REACH_PX = 6.0
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class LineScan:
 
     ``pixels`` are flat indices into the camera image (P,); ``depth_mm``, ``shading``, ``column_px``,
     ``amplitude`` (zero order in the pixel's own colour, DN per ms) and ``offset`` (dark signal, DN per ms)
-    are (P,); ``radiance`` and its deviation ``std`` (infinite: saturated) are (frames, P), DN per ms.
+    are (P,); ``radiance`` and its deviation ``std`` (infinite: saturated) are (frames, P), DN per ms, of
+    the frames from ``first_line`` on.
     """
 
     lines: ScanLines
@@ -51,6 +54,25 @@ class LineScan:
     offset: Floats
     radiance: NDArray[np.floating]
     std: NDArray[np.floating]
+    first_line: int = 0
+
+    @property
+    def centres_px(self) -> Floats:
+        """Columns of the lines' centres, (frames,)."""
+        lines = self.first_line + np.arange(len(self.radiance))
+        return np.asarray((self.lines.width_px - 1) / 2 + self.lines.step_px * lines, np.float64)
+
+    def between(self, low_px: float, high_px: float) -> LineScan:
+        """The frames whose lines touch the columns between two limits."""
+        reach = self.lines.width_px / 2 + REACH_PX
+        near = np.flatnonzero((self.centres_px > low_px - reach) & (self.centres_px < high_px + reach))
+        part = slice(near[0], near[-1] + 1) if len(near) else slice(0)
+        return replace(
+            self,
+            radiance=self.radiance[part],
+            std=self.std[part],
+            first_line=self.first_line + (part.start or 0),
+        )
 
     def at(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> LineScan:
         """The same scan at some of its pixels, given by position."""
@@ -158,14 +180,15 @@ def first_order_equations(
         moments, centroids = hat_moments(rig, order, BANDS_NM, STEP_NM)
         white = moments.sum(1) * reflectance.at(centroids)
         hats = unknowns.hats(centroids)
-        for colour, which in _chunks(colours):
+        for colour, which in _chunks(colours, scan.column_px):
             part = scan.at(which)
             footprint = _trace(model, part, order, centroids)
             usable = _usable(footprint, rig)
             if not usable.any():
                 continue
-            part = part.at(usable)
-            light = _light(rig, part, footprint.columns[:, torch.as_tensor(usable)])
+            columns = footprint.columns[:, torch.as_tensor(usable)]
+            part = part.at(usable).between(float(columns.min()), float(columns.max()))
+            light = _light(rig, part, columns)
             scale = part.amplitude / expected[colour]
             total = total + _of_colour(
                 rig, part, light * scale[:, None], white[colour], hats, unknowns, order, colour
@@ -173,9 +196,11 @@ def first_order_equations(
     return total
 
 
-def _chunks(colours: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+def _chunks(colours: NDArray[np.int64], column_px: Floats) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """Pixels of one colour with neighbouring columns, so that few frames light them."""
     for colour in range(3):
         which = np.flatnonzero(colours == colour)
+        which = which[np.argsort(column_px[which])]
         for start in range(0, len(which), CHUNK):
             yield colour, which[start : start + CHUNK]
 
@@ -197,8 +222,8 @@ def _light(rig: Rig, scan: LineScan, columns: torch.Tensor) -> Floats:
     slope = float((columns[-1] - columns[0]).abs().median()) / float(BANDS_NM[-1] - BANDS_NM[0])
     blur = rig.projector_response.blur_px
     table = ProfileTable(scan.lines.width_px, blur, slope * STEP_NM, columns.device, columns.dtype)
-    centres = (scan.lines.width_px - 1) / 2 + scan.lines.step_px * torch.arange(len(scan.radiance))
-    return table.at(columns.T - centres[:, None, None].to(columns.dtype)).numpy()
+    centres = torch.as_tensor(scan.centres_px)[:, None, None].to(columns.dtype)
+    return table.at(columns.T - centres).numpy()
 
 
 def _of_colour(
@@ -227,8 +252,7 @@ def _of_colour(
 
 def _halo(rig: Rig, scan: LineScan) -> Floats:
     """Halo of each line at each pixel relative to the zero order, (frames, P)."""
-    centres = (scan.lines.width_px - 1) / 2 + scan.lines.step_px * np.arange(len(scan.radiance))
     response = rig.projector_response
-    distance = np.abs(scan.column_px - centres[:, None])
+    distance = np.abs(scan.column_px - scan.centres_px[:, None])
     peak = response.halo_peak_per_px * scan.lines.width_px
     return np.asarray(peak * np.exp(-distance / response.halo_decay_px))
