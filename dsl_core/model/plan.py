@@ -35,11 +35,16 @@ class NoSpectral(Record):
 
 
 class ScanLines(Record):
-    """One white vertical line per frame: line ``i`` covers columns ``[step*i, step*i + width)``."""
+    """One white vertical line per frame: line ``i`` covers columns ``[step*i, step*i + width)``.
+
+    ``sparse`` lines may leave columns dark between them: enough for what is smooth over the image, such as
+    the film, but not for spectra.
+    """
 
     kind: Literal["lines"] = "lines"
     width_px: int = Field(default=5, ge=1)
     step_px: int = Field(default=2, ge=1)
+    sparse: bool = False
 
 
 class LineComb(Record):

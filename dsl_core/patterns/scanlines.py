@@ -10,12 +10,13 @@ from dsl_core.model.plan import LineComb, ScanLines
 
 
 def check_lines(spec: ScanLines | LineComb, width_px: int) -> None:
-    """Raise `PlanError` when lines leave columns dark or do not fit a projector of ``width_px``.
+    """Raise `PlanError` when lines leave columns dark unasked or do not fit a projector of ``width_px``.
 
     Fewer than ``step_px`` columns at the right edge may stay dark: the published 318 lines leave
     the last of 640 columns so.
     """
-    if spec.step_px > spec.width_px:
+    sparse = isinstance(spec, ScanLines) and spec.sparse
+    if spec.step_px > spec.width_px and not sparse:
         raise PlanError(
             f"Lines {spec.width_px} px wide every {spec.step_px} px leave columns between them dark."
             f" Choose a step of at most {spec.width_px} px or wider lines."

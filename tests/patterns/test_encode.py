@@ -77,6 +77,7 @@ def test_own_columns_pass_through() -> None:
     ("spec", "why"),
     [
         (ScanLines(width_px=2, step_px=3), "leave columns"),
+        (ScanLines(width_px=700, step_px=800, sparse=True), "do not fit"),
         (ScanLines(width_px=65), "do not fit"),
         (LineComb(width_px=3, step_px=4, period_px=20), "leave columns"),
         (LineComb(period_px=65), "at most one line"),
