@@ -1,0 +1,96 @@
+"""Everything a person can do by menu or key, as one table. No Qt here.
+
+A record says what an action is called and where it stands; the main window makes menus, tool bars and the
+shortcut sheet from the table and connects each to the method of the same name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Menu = Literal["File", "View", "Rig", "Calibrate", "Scan", "Results", "Help"]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One action: ``key`` names the method ``do_<key>`` of the window, ``shortcut`` is Qt's portable text.
+
+    ``page`` limits a shortcut to a page ("" everywhere); ``checkable`` actions have a state.
+    """
+
+    key: str
+    text: str
+    menu: Menu
+    shortcut: str = ""
+    tip: str = ""
+    page: str = ""
+    checkable: bool = False
+    separator: bool = False
+
+
+@dataclass(frozen=True)
+class Page:
+    """One activity of the rail."""
+
+    key: str
+    title: str
+    icon: str
+    tip: str
+    help: str
+
+
+PAGES: tuple[Page, ...] = (
+    Page("rig", "Rig", "rig", "Devices, live camera, projector, self-test", "help/rig.md"),
+    Page(
+        "calibrate", "Calibrate", "calibrate", "Guided calibrations and their library", "help/calibrating.md"
+    ),
+    Page("scan", "Scan", "scan", "Plan, run and watch a scan", "help/scanning.md"),
+    Page(
+        "results", "Results", "results", "Spectra, depth, quality and the 3D cloud", "help/how-it-measures.md"
+    ),
+    Page("compare", "Compare", "compare", "Two scans, or a scan against truth", "help/comparing.md"),
+)
+
+ACTIONS: tuple[Action, ...] = (
+    Action("open", "&Open…", "File", "Ctrl+O", "Open a scan, a result, a reference or a calibration"),
+    Action(
+        "export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs", "results"
+    ),
+    Action(
+        "show_command",
+        "Show &command line",
+        "File",
+        "Ctrl+Shift+C",
+        "The command that does what this page does",
+    ),
+    Action("quit", "&Quit", "File", "Ctrl+Q", "Leave; a running scan asks first", separator=True),
+    Action("undo", "&Undo", "View", "Ctrl+Z", "Take the last change of pins, regions or settings back"),
+    Action("redo", "&Redo", "View", "Ctrl+Shift+Z", "Do again what was taken back"),
+    *(
+        Action(f"page_{page.key}", page.title, "View", f"Ctrl+{i}", page.tip, separator=i == 1)
+        for i, page in enumerate(PAGES, 1)
+    ),
+    Action("theme_system", "Theme of the &system", "View", checkable=True, separator=True),
+    Action("theme_light", "&Light theme", "View", checkable=True),
+    Action("theme_dark", "&Dark theme", "View", checkable=True),
+    Action(
+        "show_log", "Show lo&g", "View", "Ctrl+L", "Messages of the program, with a filter", separator=True
+    ),
+    Action(
+        "cancel_jobs",
+        "&Cancel all work",
+        "Scan",
+        "Ctrl+.",
+        "Stop everything that runs, at the next safe point",
+    ),
+    Action("help_page", "&Help on this page", "Help", "F1", "What this page does and what its numbers mean"),
+    Action("shortcuts", "&Keyboard shortcuts", "Help", "Ctrl+/", "Every action and its keys"),
+    Action("report_bundle", "Save a &report bundle…", "Help", "", "Log, settings and versions in one file"),
+    Action("about", "&About", "Help", separator=True),
+)
+
+
+def find_action(key: str) -> Action:
+    """The action of a key; raises `KeyError`."""
+    return {action.key: action for action in ACTIONS}[key]

@@ -1,0 +1,135 @@
+"""The application: Qt, theme, log, the one exception hook, and the window."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+
+from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtGui import QColor, QIcon, QPalette
+from PySide6.QtWidgets import QApplication
+
+from app.jobs.qt_runner import QtRunner
+from app.main_window import MainWindow, PageMaker, Parts
+from app.panels.log import LogRecords
+from app.settings import load_settings, settings_folder
+from app.state.undo import UndoStack
+from app.theme import DARK, LIGHT, Theme, style_sheet
+from app.views import Notifier
+from app.widgets.icons import icon
+
+_log = logging.getLogger(__name__)
+_SCHEMES = {
+    "system": Qt.ColorScheme.Unknown,
+    "light": Qt.ColorScheme.Light,
+    "dark": Qt.ColorScheme.Dark,
+}
+
+
+def make_application(arguments: Sequence[str]) -> QApplication:
+    """The one Qt application, in a style that looks alike on all systems."""
+    application = QApplication.instance()
+    if not isinstance(application, QApplication):
+        application = QApplication(list(arguments))
+    application.setApplicationName("dsl-scan")
+    application.setDesktopFileName("dsl-scan")
+    application.setStyle("Fusion")
+    return application
+
+
+def set_theme(name: str) -> Theme:
+    """Give the whole application the theme of a name; returns its colours."""
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    hints = application.styleHints()
+    hints.setColorScheme(_SCHEMES[name])
+    dark = name == "dark" or (name == "system" and hints.colorScheme() == Qt.ColorScheme.Dark)
+    theme = DARK if dark else LIGHT
+    application.setPalette(_palette(theme))
+    application.setStyleSheet(style_sheet(theme))
+    return theme
+
+
+def make_window(pages: dict[str, PageMaker], folder: Path | None = None) -> MainWindow:
+    """The window with its settings of a folder (default: the system's); told troubles become toasts."""
+    path = (folder or settings_folder()) / "settings.json"
+    settings, trouble = load_settings(path)
+    records = LogRecords()
+    logging.getLogger().addHandler(records)
+    logging.getLogger("dsl_core").setLevel(logging.INFO)
+    parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme)
+    window = MainWindow(parts, pages)
+    records.setParent(window)
+    parts.runner.setParent(window)
+    window.setWindowIcon(app_icon(window.theme))
+    window.open_page(settings.page if settings.page in pages else next(iter(pages)))
+    if trouble:
+        window.toasts.tell("warning", trouble)
+    return window
+
+
+class ExceptionHook(QObject):
+    """Turns what nobody caught, in any thread, into a toast and a log entry; the window stays usable."""
+
+    #: Crosses from the thread of the error to that of the window.
+    caught = Signal(str)
+
+    def __init__(self, notifier: Notifier) -> None:
+        super().__init__()
+        self.caught.connect(lambda text: notifier.tell("error", text))
+
+    def install(self) -> None:
+        """Take the place of Python's hooks."""
+        sys.excepthook = self.handle
+        threading.excepthook = lambda args: self.handle(
+            args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback
+        )
+
+    def handle(
+        self, kind: type[BaseException], error: BaseException, traceback: TracebackType | None
+    ) -> None:
+        """Log an exception and tell of it."""
+        if issubclass(kind, KeyboardInterrupt):
+            application = QApplication.instance()
+            if application is not None:
+                application.quit()
+            return
+        _log.error("Unexpected error: %s", error, exc_info=(kind, error, traceback))
+        self.caught.emit(
+            f"Something unexpected happened ({kind.__name__}: {error}). Your data are safe; the log has the"
+            " details (Help, Save a report bundle).",
+        )
+
+
+def _palette(theme: Theme) -> QPalette:
+    palette = QPalette()
+    roles = QPalette.ColorRole
+    for role, colour in (
+        (roles.Window, theme.window),
+        (roles.WindowText, theme.text),
+        (roles.Base, theme.base),
+        (roles.AlternateBase, theme.window),
+        (roles.Text, theme.text),
+        (roles.PlaceholderText, theme.muted),
+        (roles.Button, theme.raised),
+        (roles.ButtonText, theme.text),
+        (roles.ToolTipBase, theme.raised),
+        (roles.ToolTipText, theme.text),
+        (roles.Highlight, theme.accent),
+        (roles.HighlightedText, theme.on_accent),
+        (roles.Link, theme.accent),
+        (roles.Accent, theme.accent),
+    ):
+        palette.setColor(role, QColor(colour))
+    for role in (roles.WindowText, roles.Text, roles.ButtonText):
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.muted))
+    return palette
+
+
+def app_icon(theme: Theme) -> QIcon:
+    """The application's own icon."""
+    return icon("results", theme.accent)

@@ -1,0 +1,140 @@
+"""Jobs: a piece of work, where it stands, and who runs it. No Qt here."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Generic, Protocol, TypeVar
+
+from dsl_core.errors import Cancelled
+from dsl_core.progress import CallbackProgress, CancelToken, Progress
+
+T = TypeVar("T")
+_log = logging.getLogger(__name__)
+_numbers = itertools.count(1)
+
+
+class JobState(Enum):
+    """Where a job stands; the last three are final."""
+
+    WAITING = "waiting"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+    @property
+    def is_final(self) -> bool:
+        """Whether nothing more will happen."""
+        return self in (JobState.DONE, JobState.FAILED, JobState.CANCELLED)
+
+
+@dataclass(frozen=True)
+class JobProgress:
+    """The latest report of a job; ``total`` 0 means that the end is not known."""
+
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+
+
+@dataclass
+class Job(Generic[T]):
+    """A piece of work and what becomes of it.
+
+    ``work`` runs in a worker thread and reports to the `Progress` it is given; the callbacks run in the
+    window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
+    """
+
+    title: str
+    work: Callable[[Progress], T]
+    on_done: Callable[[T], object] | None = None
+    on_failed: Callable[[Exception], object] | None = None
+    on_cancelled: Callable[[], object] | None = None
+    exclusive: str = ""
+    number: int = field(default_factory=lambda: next(_numbers))
+    state: JobState = JobState.WAITING
+    progress: JobProgress = JobProgress()
+    error: Exception | None = None
+    started_s: float | None = None
+    token: CancelToken = field(default_factory=CancelToken)
+
+    def cancel(self) -> None:
+        """Ask the work to stop at its next report."""
+        self.token.cancel()
+
+    @property
+    def remaining_s(self) -> float | None:
+        """Seconds left at the pace so far; None while that cannot be said."""
+        if self.started_s is None or self.progress.total <= 0 or self.progress.done <= 0:
+            return None
+        spent = time.monotonic() - self.started_s
+        return spent * (self.progress.total - self.progress.done) / self.progress.done
+
+    def run(self) -> Callable[[], None]:
+        """Do the work in this thread; the returned function finishes the job in the window's thread."""
+        self.state, self.started_s = JobState.RUNNING, time.monotonic()
+        try:
+            if self.token.is_cancelled:
+                raise Cancelled(f"{self.title} was stopped before it began.")
+            result = self.work(CallbackProgress(self._report, self.token))
+        except Cancelled:
+            return self._finish_cancelled
+        except Exception as error:  # told to the person at the window, never lost in a thread
+            _log.warning("%s failed: %s", self.title, error, exc_info=error)
+            failure = error
+            return lambda: self._finish_failed(failure)
+        return lambda: self._finish_done(result)
+
+    def _report(self, stage: str, done: int, total: int) -> None:
+        if stage != self.progress.stage:
+            self.started_s = time.monotonic()
+        self.progress = JobProgress(stage, done, total)
+
+    def _finish_done(self, result: T) -> None:
+        self.state = JobState.DONE
+        if self.on_done is not None:
+            self.on_done(result)
+
+    def _finish_failed(self, error: Exception) -> None:
+        self.state, self.error = JobState.FAILED, error
+        if self.on_failed is not None:
+            self.on_failed(error)
+
+    def _finish_cancelled(self) -> None:
+        self.state = JobState.CANCELLED
+        if self.on_cancelled is not None:
+            self.on_cancelled()
+
+
+class JobRunner(Protocol):
+    """Runs jobs somewhere and remembers those that are not over."""
+
+    @property
+    def active(self) -> tuple[Job[Any], ...]:
+        """Jobs that wait or run."""
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        """Start a job; raises `DeviceError` when another one uses what it needs alone."""
+
+
+class InlineRunner:
+    """Runs every job at once in the caller's thread: for tests and scripts."""
+
+    def __init__(self) -> None:
+        self.finished: list[Job[Any]] = []
+
+    @property
+    def active(self) -> tuple[Job[Any], ...]:
+        """Nothing is ever left running."""
+        return ()
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        """Run the job to its end."""
+        job.run()()
+        self.finished.append(job)
+        return job

@@ -1,0 +1,290 @@
+"""The main window: puts rail, pages, docks, menus and toasts together. Pages are made when first opened."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QByteArray, QSize, Qt
+from PySide6.QtGui import QAction, QCloseEvent, QKeySequence
+from PySide6.QtWidgets import (
+    QDockWidget,
+    QFileDialog,
+    QHBoxLayout,
+    QMainWindow,
+    QMessageBox,
+    QStackedWidget,
+    QWidget,
+)
+
+from app.actions import ACTIONS, PAGES, Action
+from app.jobs.qt_runner import QtRunner
+from app.panels.log import LogPanel, LogRecords
+from app.report_bundle import write_report_bundle
+from app.settings import Settings, save_settings
+from app.state.undo import UndoStack
+from app.theme import DARK, Theme
+from app.widgets import text_windows
+from app.widgets.job_strip import JobStrip
+from app.widgets.page import PageWidget
+from app.widgets.rail import Rail
+from app.widgets.toasts import Toasts
+from dsl_core.errors import DslError
+
+_log = logging.getLogger(__name__)
+SMALLEST = QSize(1024, 700)
+#: Rises when docks change, so that a layout of an older version is not restored.
+LAYOUT_VERSION = 1
+
+
+@dataclass
+class Parts:
+    """What the window is made of and hands to its pages."""
+
+    settings: Settings
+    settings_path: Path
+    records: LogRecords
+    runner: QtRunner
+    undo: UndoStack
+    set_theme: Callable[[str], Theme]
+
+
+PageMaker = Callable[["MainWindow"], PageWidget]
+
+
+class MainWindow(QMainWindow):
+    """The application's window; ``pages`` makes the widget of each page of the rail."""
+
+    def __init__(self, parts: Parts, pages: dict[str, PageMaker]) -> None:
+        super().__init__()
+        self.parts = parts
+        self.theme: Theme = DARK
+        self.setWindowTitle("dsl-scan")
+        self.setMinimumSize(SMALLEST)
+        self.resize(1280, 800)
+        self._makers = pages
+        self._made: dict[str, PageWidget] = {}
+        self.toasts = Toasts(self)
+        self.rail = Rail(PAGES)
+        self.rail.chosen.connect(self.open_page)
+        self.stack = QStackedWidget()
+        self._lay_out()
+        self.actions_by_key: dict[str, QAction] = {}
+        self._make_menus()
+        self._log_dock = self._make_log_dock()
+        self.strip = JobStrip(parts.runner)
+        self.statusBar().addPermanentWidget(self.strip)
+        parts.undo.changed.connect(lambda _: self._show_undo())
+        self._show_undo()
+        self.apply_theme(parts.settings.theme)
+        self._restore()
+
+    def _lay_out(self) -> None:
+        centre = QWidget()
+        row = QHBoxLayout(centre)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.rail)
+        row.addWidget(self.stack, 1)
+        self.setCentralWidget(centre)
+
+    def _make_menus(self) -> None:
+        menus = {}
+        for action in ACTIONS:
+            if action.menu not in menus:
+                menus[action.menu] = self.menuBar().addMenu(f"&{action.menu}")
+            if action.separator:
+                menus[action.menu].addSeparator()
+            menus[action.menu].addAction(self._make_action(action))
+
+    def _make_action(self, action: Action) -> QAction:
+        made = QAction(action.text, self)
+        if action.shortcut:
+            made.setShortcut(QKeySequence(action.shortcut))
+        made.setStatusTip(action.tip)
+        made.setCheckable(action.checkable)
+        made.triggered.connect(lambda _checked=False, key=action.key: self.do(key))
+        self.actions_by_key[action.key] = made
+        return made
+
+    def _make_log_dock(self) -> QDockWidget:
+        dock = QDockWidget("Log", self)
+        dock.setObjectName("log-dock")
+        dock.setWidget(LogPanel(self.parts.records))
+        self.addDockWidget(Qt.DockWidgetArea.BottomDockWidgetArea, dock)
+        dock.hide()
+        return dock
+
+    # Pages -----------------------------------------------------------------------------------------
+
+    @property
+    def page(self) -> str:
+        """Key of the page that is open."""
+        return self.parts.settings.page
+
+    def open_page(self, key: str) -> PageWidget:
+        """Show a page, making it when it is opened for the first time."""
+        if key not in self._made:
+            self._made[key] = self._makers[key](self)
+            self.stack.addWidget(self._made[key])
+        self.stack.setCurrentWidget(self._made[key])
+        self.rail.mark(key)
+        self.parts.settings.page = key
+        title = next(page.title for page in PAGES if page.key == key)
+        self.setWindowTitle(f"{title} – dsl-scan")
+        return self._made[key]
+
+    # Actions ---------------------------------------------------------------------------------------
+
+    def do(self, key: str) -> None:
+        """Do the action of a key: of the open page where it offers it, else of the window."""
+        if key.startswith("page_"):
+            self.open_page(key.removeprefix("page_"))
+        elif key.startswith("theme_"):
+            self.apply_theme(key.removeprefix("theme_"))
+        else:
+            method = self._made[self.page].page_actions().get(key) or getattr(self, f"do_{key}")
+            method()
+
+    def do_open(self) -> None:
+        """Choose a file to open."""
+        name, _ = QFileDialog.getOpenFileName(self, "Open", self.parts.settings.output_folder)
+        if name:
+            self.open_path(Path(name))
+
+    def open_path(self, path: Path) -> None:
+        """Open a file or folder on the page that knows it."""
+        order = [self.page, *(page.key for page in PAGES if page.key != self.page)]
+        for key in order:
+            if key not in self._made:
+                self._made[key] = self._makers[key](self)
+                self.stack.addWidget(self._made[key])
+            if self._made[key].open_path(path):
+                self.parts.settings.remember(path)
+                self.open_page(key)
+                return
+        self.toasts.tell(
+            "warning",
+            f"{path.name} is no scan, result, reference spectrum or calibration that this program knows."
+            " Choose another file.",
+        )
+
+    def do_export(self) -> None:
+        """Exporting needs a result."""
+        self.toasts.tell("info", "There is nothing to export on this page. Open a result first.")
+
+    def do_show_command(self) -> None:
+        """Show the command line of the open page."""
+        command = self._made[self.page].command_line()
+        if command:
+            text_windows.command_window(command, self).open()
+        else:
+            self.toasts.tell("info", "This page does nothing now that a command could do.")
+
+    def do_help_page(self) -> None:
+        """Show the help of the open page."""
+        page = next(page for page in PAGES if page.key == self.page)
+        text_windows.help_window(page.help, page.title, self).open()
+
+    def do_shortcuts(self) -> None:
+        """Show all keys."""
+        text_windows.shortcuts_window(ACTIONS, self).open()
+
+    def do_about(self) -> None:
+        """Say what this is."""
+        text_windows.about_window(self).open()
+
+    def do_report_bundle(self) -> None:
+        """Save what a bug report needs."""
+        name, _ = QFileDialog.getSaveFileName(
+            self, "Save a report bundle", "dsl-scan-report.zip", "Zip (*.zip)"
+        )
+        if not name:
+            return
+        try:
+            lines = [text for _, text in self.parts.records.lines]
+            write_report_bundle(Path(name), lines, self.parts.settings)
+        except DslError as error:
+            self.toasts.tell("error", str(error))
+        else:
+            self.toasts.tell("info", f"Saved as {name}.")
+
+    def do_quit(self) -> None:
+        """Leave."""
+        self.close()
+
+    def do_undo(self) -> None:
+        """Take the last change back."""
+        self.parts.undo.undo()
+
+    def do_redo(self) -> None:
+        """Do again what was taken back."""
+        self.parts.undo.redo()
+
+    def do_show_log(self) -> None:
+        """Show or hide the log."""
+        self._log_dock.setVisible(not self._log_dock.isVisible())
+
+    def do_cancel_jobs(self) -> None:
+        """Stop everything that runs."""
+        self.parts.runner.cancel_all()
+
+    def _show_undo(self) -> None:
+        for key, word, text in (
+            ("undo", "&Undo", self.parts.undo.undo_text),
+            ("redo", "&Redo", self.parts.undo.redo_text),
+        ):
+            self.actions_by_key[key].setEnabled(bool(text))
+            self.actions_by_key[key].setText(f"{word} {text}".strip())
+
+    # Theme, memory, end ----------------------------------------------------------------------------
+
+    def apply_theme(self, name: str) -> None:
+        """Show a theme by name: system, light or dark."""
+        self.theme = self.parts.set_theme(name)
+        self.parts.settings.theme = name  # type: ignore[assignment]
+        self.rail.paint_icons(self.theme)
+        for key in ("system", "light", "dark"):
+            self.actions_by_key[f"theme_{key}"].setChecked(key == name)
+        for page in self._made.values():
+            page.apply_theme(self.theme)
+
+    def _restore(self) -> None:
+        settings = self.parts.settings
+        for text, restore in (
+            (settings.window_geometry, self.restoreGeometry),
+            (settings.window_state, lambda state: self.restoreState(state, LAYOUT_VERSION)),
+        ):
+            # Qt leaves the layout at hand when it cannot make sense of this one.
+            restore(QByteArray.fromBase64(text.encode()))
+
+    def remember(self) -> None:
+        """Write the settings, the layout among them."""
+        settings = self.parts.settings
+        settings.window_geometry = bytes(self.saveGeometry().toBase64().data()).decode()
+        settings.window_state = bytes(self.saveState(LAYOUT_VERSION).toBase64().data()).decode()
+        trouble = save_settings(settings, self.parts.settings_path)
+        if trouble:
+            _log.warning("%s", trouble)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask before work is stopped; end all threads and remember the layout."""
+        if self.parts.runner.active and not self._may_stop():
+            event.ignore()
+            return
+        for page in self._made.values():
+            page.release()
+        self.parts.runner.shut_down()
+        self.remember()
+        event.accept()
+
+    def _may_stop(self) -> bool:
+        titles = ", ".join(job.title for job in self.parts.runner.active)
+        answer = QMessageBox.question(
+            self,
+            "Work is running",
+            f"{titles} is still running. Stop it and leave? What is captured is kept and can be resumed.",
+        )
+        return answer == QMessageBox.StandardButton.Yes

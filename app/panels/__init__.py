@@ -1,0 +1,1 @@
+"""One page or dock a file."""

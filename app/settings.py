@@ -1,0 +1,102 @@
+"""What the application remembers: read tolerantly, written atomically. No Qt here."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_atomic
+
+_log = logging.getLogger(__name__)
+RECENT_COUNT = 12
+#: Names another folder for settings, for tests and for portable installations.
+HOME_VARIABLE = "DSL_SCAN_HOME"
+
+
+class Settings(BaseModel):
+    """Everything that is remembered between two starts; every field has a default."""
+
+    model_config = ConfigDict(extra="ignore", validate_assignment=True)
+
+    theme: Literal["system", "light", "dark"] = "system"
+    page: str = "rig"
+    rig: str = "twin"
+    rig_options: dict[str, str] = Field(default_factory=dict)
+    recent: list[str] = Field(default_factory=list)
+    output_folder: str = ""
+    projector_screen: str = ""
+    #: Geometry and docks of the main window, as Qt wrote them, base64.
+    window_geometry: str = ""
+    window_state: str = ""
+    tour_seen: bool = False
+
+    def remember(self, path: Path) -> None:
+        """Put a file first among the recent ones."""
+        name = str(path.absolute())
+        self.recent = [name, *(other for other in self.recent if other != name)][:RECENT_COUNT]
+
+
+def settings_folder() -> Path:
+    """Where settings lie on this system."""
+    given = os.environ.get(HOME_VARIABLE)
+    if given:
+        return Path(given)
+    from platformdirs import user_config_path
+
+    return user_config_path("dsl-scan", appauthor=False)
+
+
+def load_settings(path: Path) -> tuple[Settings, str]:
+    """Settings and a sentence on what was wrong with the file (empty: nothing).
+
+    A field that makes no sense is left at its default; a file that cannot be read is set aside. Settings
+    never keep the application from starting.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return Settings(), ""
+    except (OSError, ValueError) as error:
+        aside = _set_aside(path)
+        return Settings(), f"The settings {path} could not be read ({error}); they start anew.{aside}"
+    if not isinstance(content, dict):
+        return Settings(), f"The settings {path} hold no settings; they start anew.{_set_aside(path)}"
+    return _tolerant(content, path)
+
+
+def save_settings(settings: Settings, path: Path) -> str:
+    """Write the settings; returns a sentence on what went wrong (empty: nothing), never raises."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, settings.model_dump_json(indent=1).encode())
+    except (OSError, StoreError) as error:
+        return f"The settings could not be saved: {error}"
+    return ""
+
+
+def _tolerant(content: dict[str, Any], path: Path) -> tuple[Settings, str]:
+    try:
+        return Settings.model_validate(content), ""
+    except ValidationError as error:
+        wrong = {str(item["loc"][0]) for item in error.errors()}
+        rest = {key: value for key, value in content.items() if key not in wrong}
+        return Settings.model_validate(rest), (
+            f"In the settings {path} these made no sense and are at their defaults:"
+            f" {', '.join(sorted(wrong))}."
+        )
+
+
+def _set_aside(path: Path) -> str:
+    """Keep a file that cannot be read, and say where."""
+    aside = path.with_suffix(".damaged.json")
+    try:
+        os.replace(path, aside)
+    except OSError:
+        return ""
+    return f" The old file is kept as {aside}."

@@ -1,0 +1,1 @@
+"""What the application knows, without Qt: values that tell when they change."""

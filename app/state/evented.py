@@ -1,0 +1,61 @@
+"""Values that tell listeners when they change; plain Python, so that controllers need no window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class Event(Generic[T]):
+    """Calls every listener with what happened, in the order they came."""
+
+    def __init__(self) -> None:
+        self._listeners: list[Callable[[T], object]] = []
+
+    def connect(self, listener: Callable[[T], object]) -> Callable[[], None]:
+        """Listen from now on; the returned function stops it, and may be called twice."""
+        self._listeners.append(listener)
+
+        def disconnect() -> None:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+
+        return disconnect
+
+    def emit(self, value: T) -> None:
+        """Tell all who listen at this moment; one that stops listening meanwhile is still told."""
+        for listener in tuple(self._listeners):
+            listener(value)
+
+
+class Value(Generic[T]):
+    """A value with an event; setting an equal value tells nobody."""
+
+    def __init__(self, value: T) -> None:
+        self._value = value
+        self.changed: Event[T] = Event()
+
+    @property
+    def value(self) -> T:
+        """The value now."""
+        return self._value
+
+    def set(self, value: T) -> None:
+        """Change the value and tell who listens."""
+        if value is self._value:
+            return
+        # Arrays and data sets have no single truth of equality: they are told every time.
+        if (
+            isinstance(value, str | int | float | bool | tuple | frozenset | type(None))
+            and value == self._value
+        ):
+            return
+        self._value = value
+        self.changed.emit(value)
+
+    def follow(self, listener: Callable[[T], object]) -> Callable[[], None]:
+        """Call a listener now and at every change; the returned function stops it."""
+        listener(self._value)
+        return self.changed.connect(listener)

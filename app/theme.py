@@ -1,0 +1,102 @@
+"""Colours of the application: one accent, data in the foreground. No Qt here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours by role, as ``#rrggbb``.
+
+    ``window`` lies behind everything, ``base`` behind data and input, ``line`` separates. ``muted`` is for
+    units and hints. All that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``. ``pins`` colour
+    spectra one after the other and are told apart by people with any colour vision (after Okabe and Ito).
+    """
+
+    name: str
+    window: str
+    base: str
+    raised: str
+    line: str
+    text: str
+    muted: str
+    accent: str
+    on_accent: str
+    good: str
+    warn: str
+    bad: str
+    pins: tuple[str, ...]
+
+
+LIGHT = Theme(
+    name="light",
+    window="#f3f4f6",
+    base="#ffffff",
+    raised="#e6e8ec",
+    line="#c9cdd4",
+    text="#1b1e24",
+    muted="#5b6270",
+    accent="#1f6feb",
+    on_accent="#ffffff",
+    good="#1a7f37",
+    warn="#8a5a00",
+    bad="#c02626",
+    pins=("#0072b2", "#d55e00", "#009e73", "#b8568a", "#7a6a00", "#1787bd", "#5b3fa0", "#a02020"),
+)
+DARK = Theme(
+    name="dark",
+    window="#1d2026",
+    base="#14161a",
+    raised="#2a2e36",
+    line="#3b414c",
+    text="#e7e9ee",
+    muted="#9aa3b2",
+    accent="#4c8dff",
+    on_accent="#0b1020",
+    good="#4cc46a",
+    warn="#e0a63a",
+    bad="#ff6b6b",
+    pins=("#56b4e9", "#e69f00", "#2fc79a", "#e59ac2", "#f0e442", "#5c9dff", "#b39ddb", "#ff8a80"),
+)
+
+
+def style_sheet(theme: Theme) -> str:
+    """The style sheet of the whole application for a theme."""
+    t = theme
+    return f"""
+QToolTip {{ background: {t.raised}; color: {t.text}; border: 1px solid {t.line}; padding: 4px; }}
+QMainWindow::separator {{ background: {t.line}; width: 1px; height: 1px; }}
+QDockWidget {{ color: {t.text}; }}
+QDockWidget::title {{ background: {t.window}; padding: 5px 8px; border-bottom: 1px solid {t.line}; }}
+QGroupBox {{ border: 1px solid {t.line}; border-radius: 4px; margin-top: 18px; padding: 8px; }}
+QGroupBox::title {{ subcontrol-origin: margin; left: 0px; top: 2px; color: {t.muted}; font-weight: 600; }}
+QLabel[role="muted"] {{ color: {t.muted}; }}
+QLabel[role="title"] {{ font-size: 15pt; font-weight: 600; }}
+QLabel[role="heading"] {{ font-weight: 600; }}
+QLabel[role="good"] {{ color: {t.good}; }}
+QLabel[role="warn"] {{ color: {t.warn}; }}
+QLabel[role="bad"] {{ color: {t.bad}; }}
+QFrame#rail {{ background: {t.raised}; border-right: 1px solid {t.line}; }}
+QFrame#rail QToolButton {{ border: none; padding: 8px 4px; color: {t.muted};
+  border-left: 3px solid transparent; }}
+QFrame#rail QToolButton:hover {{ background: {t.window}; color: {t.text}; }}
+QFrame#rail QToolButton:checked {{ color: {t.text}; border-left: 3px solid {t.accent};
+  background: {t.window}; }}
+QFrame#rail QToolButton:focus {{ color: {t.text}; text-decoration: underline; }}
+QPushButton[role="primary"] {{ background: {t.accent}; color: {t.on_accent}; border: 1px solid {t.accent};
+  border-radius: 4px; padding: 5px 14px; font-weight: 600; }}
+QPushButton[role="primary"]:disabled {{ background: {t.raised}; color: {t.muted}; border-color: {t.line}; }}
+QPushButton[role="primary"]:focus {{ border: 2px solid {t.text}; }}
+QFrame[role="card"] {{ background: {t.base}; border: 1px solid {t.line}; border-radius: 6px; }}
+QFrame[role="toast"] {{ background: {t.raised}; border: 1px solid {t.line}; border-left: 4px solid {t.accent};
+  border-radius: 4px; }}
+QFrame[role="toast"][level="warning"] {{ border-left-color: {t.warn}; }}
+QFrame[role="toast"][level="error"] {{ border-left-color: {t.bad}; }}
+QFrame[role="banner"] {{ background: {t.bad}; border: none; }}
+QFrame[role="banner"] QLabel {{ color: {t.base}; font-weight: 600; }}
+QTableView {{ gridline-color: {t.line}; }}
+QHeaderView::section {{ background: {t.window}; color: {t.muted}; border: none;
+  border-bottom: 1px solid {t.line}; padding: 4px 6px; }}
+QPlainTextEdit#log {{ font-family: monospace; }}
+"""

@@ -1,0 +1,26 @@
+"""Icons drawn in the colours of the theme, sharp at any scaling."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from PySide6.QtCore import QByteArray, QRectF, Qt
+from PySide6.QtGui import QIcon, QPainter, QPixmap
+from PySide6.QtSvg import QSvgRenderer
+
+from dsl_core.resources import resource_path
+
+#: Pixels a side; Qt scales down to what a control needs.
+SIZE_PX = 96
+
+
+@lru_cache(maxsize=64)
+def icon(name: str, colour: str) -> QIcon:
+    """The icon ``resources/icons/NAME.svg`` with its lines in a colour (``#rrggbb``)."""
+    drawing = resource_path(f"icons/{name}.svg").read_text(encoding="utf-8").replace("COLOR", colour)
+    picture = QPixmap(SIZE_PX, SIZE_PX)
+    picture.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(picture)
+    QSvgRenderer(QByteArray(drawing.encode())).render(painter, QRectF(0, 0, SIZE_PX, SIZE_PX))
+    painter.end()
+    return QIcon(picture)

@@ -1,0 +1,32 @@
+"""What every page of the rail can do; the main window knows pages only by this."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QWidget
+
+from app.theme import Theme
+
+
+class PageWidget(QWidget):
+    """A page. Everything is optional: a page overrides what it has to say."""
+
+    def page_actions(self) -> dict[str, Callable[[], object]]:
+        """Actions of the table, by key, that the page does itself while it is open."""
+        return {}
+
+    def command_line(self) -> str:
+        """The command that does what the page does now; empty when there is none."""
+        return ""
+
+    def open_path(self, path: Path) -> bool:
+        """Open a file or folder that was chosen or dropped; False when it is none of the page's."""
+        return False
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+
+    def release(self) -> None:
+        """Let go of devices, files and threads before the window closes."""

@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout
+from pytestqt.qtbot import QtBot
+
+from app.actions import ACTIONS, PAGES
+from app.application import ExceptionHook, make_window
+from app.main_window import MainWindow
+from app.views import RecordingNotifier
+from app.widgets.page import PageWidget
+
+
+class Page(PageWidget):
+    """A page that only says which one it is."""
+
+    def __init__(self, window: MainWindow, key: str) -> None:
+        super().__init__(window)
+        self.opened: list[Path] = []
+        self.released = False
+        QVBoxLayout(self).addWidget(QLabel(key))
+
+    def open_path(self, path: Path) -> bool:
+        if path.suffix != ".known":
+            return False
+        self.opened.append(path)
+        return True
+
+    def command_line(self) -> str:
+        return "dsl-scan rigs"
+
+    def release(self) -> None:
+        self.released = True
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
+    pages: dict[str, Callable[[MainWindow], PageWidget]] = {
+        page.key: lambda window, key=page.key: Page(window, key)  # type: ignore[misc]
+        for page in PAGES
+    }
+    made = make_window(pages, tmp_path)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+@pytest.mark.parametrize("action", [a.key for a in ACTIONS if a.key not in ("open", "report_bundle")])
+def test_every_action_does_something(window: MainWindow, action: str) -> None:
+    window.actions_by_key[action].trigger()
+    for dialog in window.findChildren(QDialog):
+        dialog.close()
+
+
+def test_shortcuts_and_mnemonics_are_unique() -> None:
+    keys = [action.shortcut for action in ACTIONS if action.shortcut]
+    assert len(keys) == len(set(keys))
+    for menu in {action.menu for action in ACTIONS}:
+        letters = [a.text[a.text.index("&") + 1].lower() for a in ACTIONS if a.menu == menu and "&" in a.text]
+        assert len(letters) == len(set(letters)), menu
+
+
+def test_pages_are_made_when_first_opened(window: MainWindow) -> None:
+    assert window.stack.count() == 1
+    window.open_page("results")
+    window.open_page("results")
+    assert window.stack.count() == 2
+    assert window.windowTitle().startswith("Results")
+
+
+def test_the_open_page_is_remembered(window: MainWindow, tmp_path: Path) -> None:
+    window.open_page("scan")
+    window.close()
+    assert '"page": "scan"' in (tmp_path / "settings.json").read_text()
+
+
+def test_pages_let_go_when_the_window_closes(window: MainWindow) -> None:
+    page = window.open_page("rig")
+    window.close()
+    assert isinstance(page, Page)
+    assert page.released
+
+
+def test_a_file_that_nobody_knows_is_told(window: MainWindow, tmp_path: Path) -> None:
+    window.open_path(tmp_path / "cat.jpeg")
+    assert "cat.jpeg is no scan" in window.toasts.shown[-1].text
+
+
+def test_a_known_file_becomes_a_recent_one(window: MainWindow, tmp_path: Path) -> None:
+    window.open_path(tmp_path / "a.known")
+    assert window.parts.settings.recent == [str(tmp_path / "a.known")]
+
+
+def test_the_log_shows_records_of_any_thread(window: MainWindow, qtbot: QtBot) -> None:
+    thread = threading.Thread(target=lambda: logging.getLogger("dsl_core.test").warning("far away"))
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: any("far away" in text for _, text in window.parts.records.lines))
+
+
+def test_an_uncaught_error_of_a_thread_is_told_in_the_window(qtbot: QtBot) -> None:
+    notifier = RecordingNotifier()
+    hook = ExceptionHook(notifier)
+    error = ValueError("odd")
+    thread = threading.Thread(target=lambda: hook.handle(ValueError, error, None))
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: bool(notifier.told))
+    assert "ValueError: odd" in notifier.told[0][1]
+
+
+def test_themes_reach_the_whole_window(window: MainWindow) -> None:
+    window.do("theme_light")
+    assert window.theme.name == "light"
+    window.do("theme_dark")
+    assert window.theme.name == "dark"
+    assert window.palette().window().color().name() == window.theme.window
+
+
+def test_toasts_leave_when_closed_and_never_pile_up(window: MainWindow) -> None:
+    for i in range(6):
+        window.toasts.tell("error", f"trouble {i}")
+    assert [toast.text for toast in window.toasts.shown] == [f"trouble {i}" for i in range(2, 6)]
+    window.toasts.shown[0].dismiss()
+    assert len(window.toasts.shown) == 3
