@@ -76,10 +76,17 @@ def pixel_rays(lens: Lens) -> NDArray[np.float64]:
     columns, rows = np.meshgrid(
         np.arange(lens.width_px, dtype=np.float64), np.arange(lens.height_px, dtype=np.float64)
     )
-    x, y = undistort((columns - lens.cx_px) / lens.fx_px, (rows - lens.cy_px) / lens.fy_px, lens.distortion)
-    rays = np.stack([x, y, np.ones_like(x)])
+    rays = rays_at(lens, columns, rows)
     rays.setflags(write=False)
     return rays
+
+
+def rays_at(lens: Lens, columns_px: NDArray[np.float64], rows_px: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Direction of the rays through places in the image, z = 1, shape (3, ...)."""
+    x, y = undistort(
+        (columns_px - lens.cx_px) / lens.fx_px, (rows_px - lens.cy_px) / lens.fy_px, lens.distortion
+    )
+    return np.stack([x, y, np.ones_like(x)])
 
 
 @lru_cache(maxsize=8)

@@ -66,13 +66,12 @@ class Renderer:
         self.rig = rig
         self.device = torch.device(device)
         self.shape = truth.depth_mm.shape
-        visible = np.isfinite(truth.depth_mm) & (truth.material >= 0)
-        self.pixels = self._tensor(np.flatnonzero(visible), torch.int64)
-        depth = self._tensor(truth.depth_mm[visible])
-        channel = bayer_channels(rig.sensor.bayer, *self.shape)[visible]
-        material_channel = self._tensor(truth.material[visible].astype(np.int64) * 3 + channel, torch.int64)
-        self.material_channel = material_channel
-        self.shading = self._tensor(self._shading(truth)[visible])
+        pixel, material, share = truth.parts()
+        self.pixels = self._tensor(pixel, torch.int64)
+        depth = self._tensor(truth.depth_mm.ravel()[pixel])
+        channel = bayer_channels(rig.sensor.bayer, *self.shape).ravel()[pixel]
+        self.material_channel = self._tensor(material.astype(np.int64) * 3 + channel, torch.int64)
+        self.shading = self._tensor(self._shading(truth).ravel()[pixel] * share)
         self.column, self.row = zero_order(rig, self.pixels, depth)
         w, h = rig.projector.width_px, rig.projector.height_px
         inside = (self.row > -0.5) & (self.row < h - 0.5) & (self.column > -1.5) & (self.column < w + 0.5)
@@ -169,7 +168,7 @@ class Renderer:
         runs = _white_runs(colour)
         signal = self._any(colour) if runs is None or len(runs) > MAX_RUNS else self._lines(runs)
         out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
-        out[self.pixels] = signal * self.shading
+        out.index_add_(0, self.pixels, signal * self.shading)
         return out.reshape(self.shape).cpu().numpy()
 
     def _black(self) -> Tensor | float:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dsl_core.errors import PlanError
-from dsl_core.simulation import scene_flat, scene_solid
+from dsl_core.simulation import scene_board, scene_flat, scene_solid
 from dsl_core.simulation.truth import Materials, Scene, SceneTruth
 
 __all__ = ["Materials", "Scene", "SceneEntry", "SceneTruth", "make_scene", "scene_catalogue"]
@@ -21,6 +21,7 @@ _BUILDERS: dict[str, Callable[..., Scene]] = {
     "sphere": scene_solid.sphere,
     "box": scene_solid.box,
     "color-checker": scene_flat.color_checker,
+    "board": scene_board.board,
     "filters": scene_flat.filters,
     "leaves": scene_flat.leaves,
     "relief": scene_solid.relief,

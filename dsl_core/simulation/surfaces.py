@@ -9,9 +9,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.geometry import Lens
-from dsl_core.optics.pinhole import pixel_rays
-
 Floats = NDArray[np.float64]
 #: Material index of points given by two surface coordinates in mm.
 Paint = Callable[[Floats, Floats], NDArray[np.int32]]
@@ -164,18 +161,10 @@ class Hits:
     lit: NDArray[np.bool_]
 
 
-def trace(surfaces: tuple[Surface, ...], camera: Lens, projector_centre_mm: Floats) -> Hits:
-    """First hit of every pixel's ray, and whether the projector's centre sees it."""
-    rays = pixel_rays(camera).reshape(3, -1)
+def trace(surfaces: tuple[Surface, ...], rays: Floats, projector_centre_mm: Floats) -> Hits:
+    """First hits of camera rays (3, n) with z = 1, and whether the projector's centre sees them."""
+    nearest, owner = _first(surfaces, rays)
     count = rays.shape[1]
-    nearest = np.full(count, np.inf)
-    owner = np.full(count, -1)
-    for index, surface in enumerate(surfaces):
-        # Rays have z = 1, so that t is depth.
-        t = surface.intersect(np.zeros(3), rays)
-        closer = t < nearest
-        nearest[closer] = t[closer]
-        owner[closer] = index
     normals = np.full((3, count), np.nan)
     material = np.full(count, -1, np.int32)
     lit = np.zeros(count, bool)
@@ -186,6 +175,29 @@ def trace(surfaces: tuple[Surface, ...], camera: Lens, projector_centre_mm: Floa
         material[mine] = surface.paint(points)
         lit[mine] = _lit(surfaces, points, normals[:, mine], projector_centre_mm)
     return Hits(np.where(owner >= 0, nearest, np.nan), normals, material, lit)
+
+
+def materials_along(surfaces: tuple[Surface, ...], rays: Floats) -> NDArray[np.int32]:
+    """Material of the first hits of camera rays (3, n) with z = 1; -1 where nothing is hit."""
+    nearest, owner = _first(surfaces, rays)
+    material = np.full(rays.shape[1], -1, np.int32)
+    for index, surface in enumerate(surfaces):
+        mine = np.flatnonzero(owner == index)
+        material[mine] = surface.paint(rays[:, mine] * nearest[mine])
+    return material
+
+
+def _first(surfaces: tuple[Surface, ...], rays: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Depth of the first hit of every ray, inf for none, and which surface it lies on, -1 for none."""
+    nearest = np.full(rays.shape[1], np.inf)
+    owner = np.full(rays.shape[1], -1)
+    for index, surface in enumerate(surfaces):
+        # Rays have z = 1, so that t is depth.
+        t = surface.intersect(np.zeros(3), rays)
+        closer = t < nearest
+        nearest[closer] = t[closer]
+        owner[closer] = index
+    return nearest, owner
 
 
 def _facing(normals: Floats, rays: Floats) -> Floats:

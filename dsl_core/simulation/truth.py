@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.geometry import Lens
-from dsl_core.simulation.surfaces import Surface, trace
+from dsl_core.optics.pinhole import pixel_rays, rays_at
+from dsl_core.simulation.surfaces import Surface, materials_along, trace
 
 #: Fine grid of all palettes, nm: 400 to 700 in steps of 1, shape (301,).
 FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
 FINE_NM.setflags(write=False)
+
+#: Rays into a pixel on an edge, which tell the shares of its two materials.
+EDGE_RAYS = 64
 
 
 @dataclass(frozen=True)
@@ -45,12 +49,22 @@ class Materials:
 
 
 @dataclass(frozen=True)
+class MixedPixels:
+    """Pixels on an edge: flat indices, their second material and its share (below or at one half), (n,)."""
+
+    pixels: NDArray[np.int64]
+    material: NDArray[np.int32]
+    share: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class SceneTruth:
     """A scene seen by one camera; h and w are the camera's rows and columns.
 
     ``depth_mm`` (h, w) along the camera axis, NaN where there is no surface; ``normals`` (3, h, w), unit,
     camera coordinates, towards the camera, NaN where there is no surface; ``material`` (h, w), index into
     ``materials``, -1 where there is no surface; ``lit`` (h, w): the projector's centre sees the point.
+    ``mixed`` are pixels of two materials, both at the pixel's one depth; `material` holds the larger one.
     """
 
     depth_mm: NDArray[np.float64]
@@ -58,6 +72,20 @@ class SceneTruth:
     material: NDArray[np.int32]
     materials: Materials
     lit: NDArray[np.bool_]
+    mixed: MixedPixels | None = None
+
+    def parts(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+        """What light comes from: pixel, material and share of the pixel, (n,); mixed pixels come twice."""
+        solid = np.flatnonzero(np.isfinite(self.depth_mm) & (self.material >= 0))
+        material, share = self.material.ravel()[solid], np.ones(self.depth_mm.size)
+        if self.mixed is None:
+            return solid, material, share[solid]
+        share[self.mixed.pixels] -= self.mixed.share
+        return (
+            np.concatenate([solid, self.mixed.pixels]),
+            np.concatenate([material, self.mixed.material]),
+            np.concatenate([share[solid], self.mixed.share]),
+        )
 
     def reflectance(self, wavelengths_nm: NDArray[np.float64]) -> NDArray[np.float32]:
         """Reflectance cube, shape (bands, h, w), NaN where there is no surface."""
@@ -69,21 +97,61 @@ class SceneTruth:
 
 @dataclass(frozen=True)
 class Scene:
-    """Surfaces in camera coordinates (mm) and the palette they are painted with."""
+    """Surfaces in camera coordinates (mm) and the palette they are painted with.
+
+    With ``mixed_edges`` a pixel on an edge takes a share of both its materials, as where edges are measured
+    below one pixel; without, it is all of the material in its middle.
+    """
 
     name: str
     description: str
     surfaces: tuple[Surface, ...]
     materials: Materials
+    mixed_edges: bool = False
 
     def render(self, camera: Lens, projector_centre_mm: NDArray[np.float64]) -> SceneTruth:
         """The truth at every pixel of a camera, lens distortion included; centre in camera mm, shape (3,)."""
         shape = (camera.height_px, camera.width_px)
-        hits = trace(self.surfaces, camera, np.asarray(projector_centre_mm, np.float64))
+        centre = np.asarray(projector_centre_mm, np.float64)
+        hits = trace(self.surfaces, pixel_rays(camera).reshape(3, -1), centre)
+        material = hits.material.reshape(shape)
+        mixed = self._mixed(camera, material) if self.mixed_edges else None
         return SceneTruth(
             depth_mm=hits.depth_mm.reshape(shape),
             normals=hits.normals.reshape(3, *shape),
-            material=hits.material.reshape(shape),
+            material=material,
             materials=self.materials,
             lit=hits.lit.reshape(shape),
+            mixed=mixed,
         )
+
+    def _mixed(self, camera: Lens, material: NDArray[np.int32]) -> MixedPixels:
+        """Shares of two materials at pixels beside others; writes the larger one into ``material``."""
+        edges = np.flatnonzero(_beside_others(material))
+        row, column = np.divmod(edges, camera.width_px)
+        across, down = _spots(EDGE_RAYS)
+        rays = rays_at(camera, column[:, None] + across, row[:, None] + down)
+        seen = materials_along(self.surfaces, rays.reshape(3, -1)).reshape(len(edges), EDGE_RAYS)
+        counts = np.stack([(seen == index).sum(1) for index in range(len(self.materials.names))], 1)
+        order = np.argsort(-counts, 1, kind="stable")[:, :2]
+        first, second = np.take_along_axis(counts, order, 1).T
+        solid = first > 0
+        material.ravel()[edges[solid]] = order[solid, 0]
+        two = second > 0
+        share = second[two] / (first + second)[two]
+        return MixedPixels(edges[two], order[two, 1].astype(np.int32), share)
+
+
+def _beside_others(material: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Pixels one of whose eight neighbours is of another material."""
+    padded = np.pad(material, 1, mode="edge")
+    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
+    return np.asarray((around != material[:, :, None, None]).any((2, 3)))
+
+
+def _spots(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places in a pixel, -0.5 to 0.5: Hammersley's points, all of whose columns and rows differ."""
+    index = np.arange(count)
+    bits = count.bit_length() - 1
+    reverse = sum(((index >> bit) & 1) << (bits - 1 - bit) for bit in range(bits))
+    return (index + 0.5) / count - 0.5, (np.asarray(reverse) + 0.5) / count - 0.5
