@@ -1,0 +1,194 @@
+"""Blur and halo of the projector from the zero order of scan lines on a flat target.
+
+A pixel at column q sees ``y_k = a g(q - x_k) + o`` of the line at x_k: box, blur and halo
+(`optics.light_path.zero_order_profile`). Amplitude a, column q and dark signal o are each pixel's own; blur
+width, halo peak and halo decay are common. All are fitted together by Gauss-Newton steps in which each pixel's
+unknowns are eliminated first. Lines closer than their width show each edge at several places, so that blur and
+column do not mix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.plan import ScanLines
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.light_path import zero_order_profile
+
+Floats = NDArray[np.float64]
+
+#: Lines this far from the decoded column (px) still show no first order.
+REACH_PX = 150.0
+#: Relative error of the modelled profile within `NEAR_PX` of a line, added to each variance.
+MODEL_ERROR, NEAR_PX = 0.002, 8.0
+#: Steps in all, and those at the start that move columns only, until each is near its own.
+ITERATIONS, SETTLING = 14, 4
+MIN_PIXELS = 100
+#: The decay of a halo too faint to show it: start and deviation of its logarithm.
+DECAY_PX, DECAY_LOG_STD = 30.0, 0.7
+#: Steps of numerical derivatives by blur, peak and the decay's logarithm.
+STEPS = (1e-3, 1e-5, 1e-3)
+#: A pixel whose chi-square is so many times the others' sees something else; so does one that moved so far.
+MAX_CHI_SQUARE, MAX_SHIFT_PX = 5.0, 2.0
+
+
+@dataclass(frozen=True)
+class ZeroOrderFit:
+    """Columns (px) and amplitudes (DN per ms) of pixels (P,), which of them are good, and what all share.
+
+    ``std`` holds the deviations of blur (px), halo peak (1/px) and halo decay (px).
+    """
+
+    column_px: Floats
+    amplitude: Floats
+    good: NDArray[np.bool_]
+    response: ProjectorResponse
+    std: tuple[float, float, float]
+    chi_square: float
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Values of the lines around each pixel, (window, P): signal, variance (infinite: unused), centres."""
+
+    y: Floats
+    variance: Floats
+    centres: Floats
+    width_px: int
+
+
+def fit_zero_order(
+    lines: ScanLines,
+    coarse_px: Floats,
+    radiance: NDArray[np.floating],
+    std: NDArray[np.floating],
+    start: ProjectorResponse,
+) -> ZeroOrderFit:
+    """Fit blur and halo with the columns of some pixels.
+
+    ``coarse_px`` (P,) are decoded columns; ``radiance`` and ``std`` (frames, P) are DN per ms, the deviation
+    infinite where saturated. Raises `CalibrationError` when too few pixels follow the model.
+    """
+    data = _window(lines, coarse_px, radiance, std)
+    common = np.array([start.blur_px, start.halo_peak_per_px, np.log(start.halo_decay_px or DECAY_PX)])
+    column, amplitude, offset = coarse_px.copy(), data.y.max(0), np.zeros(len(coarse_px))
+    use = np.ones(len(coarse_px), bool)
+    for round_ in range(ITERATIONS):
+        variance = data.variance + np.where(
+            np.abs(column - data.centres) < NEAR_PX, (MODEL_ERROR * amplitude) ** 2, 0.0
+        )
+        weight = 1 / variance
+        value, by_column, by_common = _derivatives(data, column, start, common)
+        residual = data.y - amplitude * value - offset
+        local = np.stack([value, amplitude * by_column, np.ones_like(value)])
+        step, step_common, covariance = _step(
+            local, amplitude * by_common, residual, weight, use, common, hold=round_ < SETTLING
+        )
+        chi = (weight * residual**2).sum(0) / np.maximum(np.isfinite(variance).sum(0) - 3, 1)
+        if round_ >= SETTLING:
+            use = (
+                (chi < MAX_CHI_SQUARE * max(float(np.median(chi)), 1.0))
+                & (np.abs(column - coarse_px) < MAX_SHIFT_PX)
+                & (amplitude > 0)
+            )
+        if use.sum() < MIN_PIXELS:
+            raise CalibrationError(
+                f"Only {int(use.sum())} of {len(use)} pixels see the projected lines as lines. Check that a flat"
+                " white target fills the picture, in focus and not saturated, and capture the step again."
+            )
+        common = common + step_common
+        common[:2] = common[0].clip(0.05, 5.0), common[1].clip(0.0, 0.1)
+        common[2] = common[2].clip(np.log(3.0), np.log(300.0))
+        amplitude, column, offset = amplitude + step[0], column + step[1].clip(-0.7, 0.7), offset + step[2]
+    scale = np.sqrt(max(float(np.median(chi[use])), 1.0))
+    blur, peak, decay = float(common[0]), float(common[1]), float(np.exp(common[2]))
+    spread = np.sqrt(np.diag(covariance)) * scale * (1.0, 1.0, decay)
+    response = start.model_copy(update={"blur_px": blur, "halo_peak_per_px": peak, "halo_decay_px": decay})
+    return ZeroOrderFit(
+        column, amplitude, use, response, (spread[0], spread[1], spread[2]), float(np.mean(chi[use]))
+    )
+
+
+def _window(
+    lines: ScanLines, coarse_px: Floats, radiance: NDArray[np.floating], std: NDArray[np.floating]
+) -> _Data:
+    half = int(REACH_PX / lines.step_px)
+    first = (lines.width_px - 1) / 2
+    nearest = np.round((coarse_px - first) / lines.step_px).astype(int)
+    index = nearest + np.arange(-half, half + 1)[:, None]
+    exists = (index >= 0) & (index < len(radiance))
+    index_in = index.clip(0, len(radiance) - 1)
+    y = np.take_along_axis(radiance, index_in, 0).astype(float)
+    variance = np.take_along_axis(std, index_in, 0).astype(float) ** 2
+    exists &= np.isfinite(variance) & np.isfinite(y)
+    return _Data(
+        np.where(exists, y, 0.0),
+        np.where(exists, variance, np.inf),
+        first + lines.step_px * index.astype(float),
+        lines.width_px,
+    )
+
+
+def _profile(data: _Data, column: Floats, start: ProjectorResponse, common: Floats) -> Floats:
+    response = start.model_copy(
+        update={
+            "blur_px": float(common[0]),
+            "halo_peak_per_px": float(common[1]),
+            "halo_decay_px": float(np.exp(common[2])),
+        }
+    )
+    distance = torch.as_tensor(column - data.centres)
+    return np.asarray(
+        zero_order_profile(distance, -data.width_px / 2, data.width_px / 2, response).numpy(), np.float64
+    )
+
+
+def _derivatives(
+    data: _Data, column: Floats, start: ProjectorResponse, common: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Profile, its derivative by the column, and by what pixels share, (3, window, P)."""
+    value = _profile(data, column, start, common)
+    shift = 1e-3
+    by_column = (
+        _profile(data, column + shift, start, common) - _profile(data, column - shift, start, common)
+    ) / (2 * shift)
+    rows = []
+    for i, step in enumerate(STEPS):
+        moved = common.copy()
+        moved[i] += step
+        rows.append((_profile(data, column, start, moved) - value) / step)
+    return value, by_column, np.stack(rows)
+
+
+def _step(
+    local: Floats,
+    common: Floats,
+    residual: Floats,
+    weight: Floats,
+    use: NDArray[np.bool_],
+    at: Floats,
+    *,
+    hold: bool,
+) -> tuple[Floats, Floats, Floats]:
+    """Steps of each pixel's unknowns (3, P) and the common ones (3,), and the covariance of the latter."""
+    own = np.einsum("akp,bkp,kp->pab", local, local, weight) + 1e-12 * np.eye(3)
+    cross = np.einsum("akp,gkp,kp->pag", local, common, weight)
+    right = np.einsum("akp,kp,kp->pa", local, residual, weight)
+    solved = np.linalg.solve(own, np.concatenate([cross, right[..., None]], -1))
+    normal = np.einsum("gkp,hkp,kp->pgh", common, common, weight) - np.einsum(
+        "pag,pah->pgh", cross, solved[..., :3]
+    )
+    toward = np.einsum("gkp,kp,kp->pg", common, residual, weight) - np.einsum(
+        "pag,pa->pg", cross, solved[..., 3]
+    )
+    total, pull = normal[use].sum(0), toward[use].sum(0)
+    total[2, 2] += DECAY_LOG_STD**-2
+    pull[2] -= (at[2] - np.log(DECAY_PX)) * DECAY_LOG_STD**-2
+    covariance = np.linalg.inv(total + 1e-9 * np.diag(np.diag(total)))
+    step_common = np.zeros(3) if hold else covariance @ pull
+    return (solved[..., 3] - solved[..., :3] @ step_common).T, step_common, covariance
