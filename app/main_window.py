@@ -278,6 +278,8 @@ class MainWindow(QMainWindow):
             page.release()
         self.parts.runner.shut_down()
         self.remember()
+        # Python's logging outlives the window and must not call into it.
+        logging.getLogger().removeHandler(self.parts.records)
         event.accept()
 
     def _may_stop(self) -> bool:

@@ -1,0 +1,190 @@
+"""What the Rig page decides: connect, look, expose, project. No Qt."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from app.jobs.base import Job, JobRunner
+from app.state.rig import Link, RigChoice, RigState
+from app.views import Notifier
+from dsl_core.devices.base import DeviceRig, Projector
+from dsl_core.errors import DeviceError, DslError
+from dsl_core.model.frames import Frame
+from dsl_core.patterns.trial_pictures import PictureKind, trial_picture
+from dsl_core.progress import Progress
+
+#: What only one job may use at a time.
+RIG = "the rig"
+#: Lost frames in a row after which a camera counts as lost.
+LOST_AFTER = 3
+#: Shortest time between two live frames, s: a twin would else keep a core busy for nobody.
+LIVE_PERIOD_S = 1 / 30
+
+
+class RigController:
+    """Connects a rig and shows what it sees.
+
+    ``wrap_projector`` may put another projector before the rig's own, such as a real second screen.
+    """
+
+    def __init__(
+        self,
+        state: RigState,
+        runner: JobRunner,
+        notifier: Notifier,
+        wrap_projector: Callable[[Projector], Projector] = lambda projector: projector,
+    ) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+        self._wrap = wrap_projector
+        self._live_job: Job[None] | None = None
+        self._waiting: list[Job[Any]] = []
+        self._mail: Frame | None = None
+        self._lock = threading.Lock()
+        self.frames_seen = 0
+        self.frames_lost = 0
+
+    # Connect ---------------------------------------------------------------------------------------
+
+    def connect(self, choice: RigChoice) -> None:
+        """Open a rig by name, closing the one at hand."""
+        if self.state.link.value is Link.OPENING:
+            return
+        self.state.choice.set(choice)
+        self.state.link.set(Link.OPENING)
+        self.state.trouble.set("")
+        old = self.state.devices.value
+        self.state.devices.set(None)
+
+        def work(progress: Progress) -> DeviceRig:
+            from dsl_core.devices.registry import open_rig
+
+            if old is not None:
+                old.close()
+            devices = open_rig(choice.name, dict(choice.options))
+            devices.projector = self._wrap(devices.projector)
+            return devices
+
+        self.run(Job(f"Connect {choice.name}", work, self._connected, self._refused, exclusive=RIG))
+
+    def disconnect(self) -> None:
+        """Close the devices."""
+        old = self.state.devices.value
+        self.state.devices.set(None)
+        self.state.link.set(Link.CLOSED)
+        if old is not None:
+            self.run(Job("Disconnect", lambda progress: old.close(), exclusive=RIG))
+
+    def _connected(self, devices: DeviceRig) -> None:
+        self.state.devices.set(devices)
+        self.state.link.set(Link.OPEN)
+        low, high = devices.camera.info.exposure_range_ms
+        self.state.exposure_ms.set(min(max(self.state.exposure_ms.value, low), high))
+
+    def _refused(self, error: Exception) -> None:
+        self.state.link.set(Link.CLOSED)
+        self.state.trouble.set(str(error))
+        self._notifier.tell("error", str(error))
+
+    # Look ------------------------------------------------------------------------------------------
+
+    def start_live(self) -> None:
+        """Show frames as they come until `stop_live`."""
+        devices = self.state.devices.value
+        if devices is None or self._live_job is not None:
+            return
+        job = Job(
+            "Live view",
+            lambda progress: self._look(devices, progress),
+            on_failed=self._live_failed,
+            on_cancelled=self._live_ended,
+            exclusive=RIG,
+        )
+        try:
+            self._runner.submit(job)
+        except DeviceError as error:
+            self._notifier.tell("warning", str(error))
+            return
+        self._live_job = job
+        self.state.live.set(True)
+
+    def stop_live(self) -> None:
+        """Stop after the frame at hand."""
+        if self._live_job is not None:
+            self._live_job.cancel()
+
+    def take_frame(self) -> None:
+        """Hand the newest frame to who follows it; called by the window's clock."""
+        with self._lock:
+            frame, self._mail = self._mail, None
+        if frame is not None:
+            self.state.frame.set(frame)
+
+    def _look(self, devices: DeviceRig, progress: Progress) -> None:
+        lost = 0
+        while True:
+            progress.report("live", self.frames_seen, 0)
+            start = time.monotonic()
+            try:
+                devices.camera.configure(self.state.exposure_ms.value)
+                frame = devices.camera.snap()
+            except DeviceError:
+                lost, self.frames_lost = lost + 1, self.frames_lost + 1
+                if lost >= LOST_AFTER:
+                    raise
+                continue
+            lost, self.frames_seen = 0, self.frames_seen + 1
+            with self._lock:
+                self._mail = frame
+            time.sleep(max(LIVE_PERIOD_S - (time.monotonic() - start), 0))
+
+    def _live_ended(self) -> None:
+        self._live_job = None
+        self.state.live.set(False)
+        waiting, self._waiting = self._waiting, []
+        for job in waiting:
+            self.run(job)
+
+    def _live_failed(self, error: Exception) -> None:
+        self.state.link.set(Link.LOST)
+        self.state.trouble.set(str(error))
+        self._notifier.tell("error", f"The live view stopped: {error}")
+        self._live_ended()
+
+    # Use -------------------------------------------------------------------------------------------
+
+    def run(self, job: Job[Any]) -> bool:
+        """Run a job that uses the rig, after the live view has stopped; False when another one uses it."""
+        if self._live_job is not None:
+            self._waiting.append(job)
+            self.stop_live()
+            return True
+        try:
+            self._runner.submit(job)
+        except DslError as error:
+            self._notifier.tell("warning", str(error))
+            return False
+        return True
+
+    def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
+        """Project a trial picture; the live view goes on meanwhile."""
+        devices = self.state.devices.value
+        if devices is None:
+            self._notifier.tell("info", "No projector is connected. Connect a rig first.")
+            return
+        info = devices.projector.info
+        try:
+            picture = trial_picture(kind, (info.width_px, info.height_px), level, column_px)
+            devices.projector.show(picture)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+
+    def set_exposure(self, exposure_ms: float) -> None:
+        """Expose live frames so long from now on, within what the camera can do."""
+        camera = self.state.camera
+        if camera is not None:
+            low, high = camera.exposure_range_ms
+            exposure_ms = min(max(exposure_ms, low), high)
+        self.state.exposure_ms.set(exposure_ms)

@@ -1,0 +1,109 @@
+"""Run by its test in a process of its own, on a display with two monitors: what the projector window does."""
+
+from __future__ import annotations
+
+import sys
+import threading
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QCoreApplication, QTimer
+from PySide6.QtGui import QGuiApplication, QImage, QScreen
+from PySide6.QtWidgets import QApplication
+
+from app.projector_window import ProjectorWindow, ScreenProjector, mirrors, pixel_size
+from dsl_core.errors import DeviceError
+from tests.app.two_screens import PROJECTOR, plug, set_monitor, unplug
+
+application = QApplication(sys.argv)
+display = sys.argv[1]
+
+
+def wait(condition: object, seconds: float = 10.0) -> None:
+    """Let events happen until a condition holds."""
+    assert callable(condition)
+    for _ in range(int(seconds / 0.02)):
+        QCoreApplication.processEvents()
+        if condition():
+            return
+        threading.Event().wait(0.02)
+    raise AssertionError("waited in vain")
+
+
+def screen(name: str) -> QScreen | None:
+    return next((s for s in QGuiApplication.screens() if s.name() == name), None)
+
+
+def pixels(of: QScreen) -> NDArray[np.uint8]:
+    """What the frame buffer holds on a screen."""
+    picture = of.grabWindow(0).toImage().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(picture.constBits(), np.uint8).reshape(picture.height(), picture.bytesPerLine())
+    return rows[:, : 3 * picture.width()].reshape(picture.height(), picture.width(), 3).copy()
+
+
+def pattern(width: int, height: int) -> NDArray[np.uint8]:
+    """All levels in all channels, a checker of single pixels, and noise."""
+    image = np.random.default_rng(1).integers(0, 256, (height, width, 3), dtype=np.uint8)
+    image[:256, :256] = np.arange(256, dtype=np.uint8)[:, None, None]
+    image[:40, 256:] = 255 * (np.indices((40, width - 256)).sum(0) % 2)[..., None]
+    return image
+
+
+def main() -> None:
+    wait(lambda: screen(PROJECTOR) is not None)
+    beam = screen(PROJECTOR)
+    assert beam is not None
+    window = ProjectorWindow()
+    told: list[str] = []
+    window.lost.connect(lambda name: told.append(f"lost {name}"))
+    window.restored.connect(lambda name: told.append(f"restored {name}"))
+    window.arm(beam)
+    wait(lambda: window.is_armed)
+
+    image = pattern(*pixel_size(beam))
+    projector = ScreenProjector(window, latency_ms=1.0)
+    errors: list[BaseException] = []
+
+    def show(levels: NDArray[np.uint8]) -> None:
+        try:
+            projector.show(levels)
+        except BaseException as error:  # handed to the main thread
+            errors.append(error)
+
+    worker = threading.Thread(target=show, args=(image,))
+    worker.start()
+    wait(lambda: not worker.is_alive())
+    assert not errors, errors
+    seen = pixels(beam)
+    assert seen.shape == image.shape, (seen.shape, image.shape)
+    print("differing pixels at 1:1:", int((seen != image).any(2).sum()))
+
+    half = pattern(640, 360)
+    window.show_pixels(half)
+    window.repaint()
+    doubled = half.repeat(2, 0).repeat(2, 1)
+    print("differing pixels at 1:2:", int((pixels(beam) != doubled).any(2).sum()))
+
+    unplug(display)
+    wait(lambda: told == ["lost PROJECTOR"])
+    assert not window.isVisible()
+    show(image)
+    assert isinstance(errors.pop(), DeviceError)
+    plug(display)
+    wait(lambda: told == ["lost PROJECTOR", "restored PROJECTOR"])
+    assert not window.isVisible()
+
+    set_monitor(display, "MIRROR", "1280/300x720/170+1280+0", "none")
+    wait(lambda: screen("MIRROR") is not None)
+    beam = screen(PROJECTOR)
+    assert beam is not None
+    assert mirrors(beam)
+    try:
+        window.arm(beam)
+    except DeviceError as error:
+        print("mirrored:", error)
+    QTimer.singleShot(0, application.quit)
+    application.exec()
+
+
+main()

@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.controllers.rig import LOST_AFTER, RigController
+from app.jobs.base import InlineRunner, Job
+from app.jobs.qt_runner import QtRunner
+from app.state.rig import Link, RigChoice, RigState
+from app.views import RecordingNotifier
+from dsl_core.errors import DeviceError
+from dsl_core.model.frames import Frame
+from dsl_core.patterns.trial_pictures import PictureKind
+from dsl_core.simulation.sim_devices import SimCamera
+
+Live = Callable[[], tuple[RigController, RecordingNotifier, QtRunner]]
+TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
+
+
+def controller(runner: object = None) -> tuple[RigController, RecordingNotifier]:
+    notifier = RecordingNotifier()
+    made = RigController(RigState(TWIN), runner or InlineRunner(), notifier)  # type: ignore[arg-type]
+    return made, notifier
+
+
+def test_a_rig_is_connected_and_let_go() -> None:
+    rig, _ = controller()
+    rig.connect(TWIN)
+    camera = rig.state.camera
+    assert camera is not None
+    assert (rig.state.link.value, camera.width_px) == (Link.OPEN, 64)
+    rig.disconnect()
+    assert (rig.state.link.value, rig.state.camera) == (Link.CLOSED, None)
+
+
+def test_a_rig_that_cannot_be_opened_says_why() -> None:
+    rig, notifier = controller()
+    rig.connect(RigChoice("twin", (("scene", "moon"),)))
+    assert rig.state.link.value is Link.CLOSED
+    assert "moon" in rig.state.trouble.value
+    assert notifier.told[0][0] == "error"
+
+
+def test_what_is_shown_reaches_the_camera() -> None:
+    rig, _ = controller()
+    rig.connect(TWIN)
+    devices = rig.state.devices.value
+    assert devices is not None
+    means = []
+    kinds: tuple[PictureKind, ...] = ("black", "white")
+    for kind in kinds:
+        rig.show(kind)
+        means.append(float(devices.camera.snap().pixels.mean()))
+    assert means[1] > means[0] + 50
+
+
+def test_the_exposure_stays_within_the_camera() -> None:
+    rig, _ = controller()
+    rig.connect(TWIN)
+    rig.set_exposure(1e9)
+    assert rig.state.exposure_ms.value == 30_000.0
+
+
+def test_showing_without_a_rig_says_what_to_do() -> None:
+    rig, notifier = controller()
+    rig.show("white")
+    assert "Connect a rig first" in notifier.told[0][1]
+
+
+@pytest.fixture
+def live(qtbot: QtBot) -> Live:
+    def start() -> tuple[RigController, RecordingNotifier, QtRunner]:
+        runner = QtRunner()
+        rig, notifier = controller(runner)
+        rig.connect(TWIN)
+        qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN)
+        rig.start_live()
+        return rig, notifier, runner
+
+    return start
+
+
+def test_live_frames_arrive_until_the_view_stops(qtbot: QtBot, live: Live) -> None:
+    rig, _, runner = live()
+    frames: list[Frame | None] = []
+    rig.state.frame.changed.connect(frames.append)
+
+    def seen() -> bool:
+        rig.take_frame()
+        return len(frames) >= 3
+
+    qtbot.waitUntil(seen)
+    rig.stop_live()
+    qtbot.waitUntil(lambda: not rig.state.live.value)
+    assert isinstance(frames[0], Frame)
+    assert frames[0].pixels.dtype == np.uint16
+    runner.shut_down()
+
+
+def test_a_job_waits_for_the_live_view_to_stop(qtbot: QtBot, live: Live) -> None:
+    rig, _, runner = live()
+    states: list[bool] = []
+    done: list[str] = []
+    rig.run(Job("Scan", lambda progress: states.append(rig.state.live.value), lambda _: done.append("scan")))
+    qtbot.waitUntil(lambda: done == ["scan"])
+    assert states == [False]
+    runner.shut_down()
+
+
+def test_a_camera_that_goes_silent_is_lost_and_told(
+    qtbot: QtBot, live: Live, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        time.sleep(0.001)
+        raise DeviceError("The camera sent no frame. Check its cable.")
+
+    monkeypatch.setattr(SimCamera, "snap", silent)
+    rig, notifier, runner = live()
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.LOST)
+    assert rig.frames_lost == LOST_AFTER
+    assert "Check its cable" in notifier.told[-1][1]
+    runner.shut_down()
