@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -81,15 +82,18 @@ def calibrate_all(
     name: str = "",
     recipe_of: Callable[[str], Recipe] | None = None,
     recipes: Sequence[Recipe] | None = None,
+    stage: Callable[[str], AbstractContextManager[None]] | None = None,
 ) -> Rig:
     """Run every calibration in order and assemble the rig; goes on where it was interrupted.
 
     ``recipe_of`` makes the recipe of a name with the campaign's settings, ``recipes`` are all of them.
+    ``stage`` surrounds each calibration under its title, to measure it.
     """
     recipes = all_recipes() if recipes is None else recipes
     for recipe in recipes:
         chosen = recipe if recipe_of is None else recipe_of(recipe.name)
-        run_calibration(CalibrationSession(chosen, devices, campaign, recipes), guide, progress)
+        with stage(chosen.title) if stage else nullcontext():
+            run_calibration(CalibrationSession(chosen, devices, campaign, recipes), guide, progress)
     return calibrated_rig(campaign, devices, name, recipes)
 
 

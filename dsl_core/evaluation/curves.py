@@ -54,16 +54,16 @@ def spectrum_curve(
     outline = ""
     if std is not None:
         upper, lower = values + BAND_95 * std, values - BAND_95 * std
-        outline = _points(np.r_[x, x[::-1]], np.r_[upper, lower[::-1]], top)
+        outline = points(np.r_[x, x[::-1]], np.r_[upper, lower[::-1]], top)
     return Curve(
         title,
         note,
-        _points(x, values, top),
+        points(x, values, top),
         outline,
-        "" if truth is None else _points(x, truth, top),
+        "" if truth is None else points(x, truth, top),
         _css(values, bands),
         "" if truth is None else _css(truth, bands),
-        _wavelength_ticks(bands),
+        wavelength_ticks(bands),
         (Tick(HEIGHT, "0"), Tick(0.0, f"{top:g}")),
     )
 
@@ -73,9 +73,7 @@ def share_curve(bands: Floats, share: Floats) -> Curve:
     x = (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
     ticks = (Tick(HEIGHT, "0"), Tick(0.0, "1"))
     note = "mean over pixels: 1 is decided by data alone, 0 by the prior alone"
-    return Curve(
-        "Share of data", note, _points(x, share, 1.0), x_ticks=_wavelength_ticks(bands), y_ticks=ticks
-    )
+    return Curve("Share of data", note, points(x, share, 1.0), x_ticks=wavelength_ticks(bands), y_ticks=ticks)
 
 
 def calibration_curve(title: str, found: Calibration) -> Curve:
@@ -86,8 +84,8 @@ def calibration_curve(title: str, found: Calibration) -> Curve:
     return Curve(
         title,
         note,
-        _points(promised * WIDTH, observed, 1.0),
-        truth=_points(np.array([0.0, WIDTH]), np.array([0.0, 1.0]), 1.0),
+        points(promised * WIDTH, observed, 1.0),
+        truth=points(np.array([0.0, WIDTH]), np.array([0.0, 1.0]), 1.0),
         x_ticks=ticks,
         y_ticks=(Tick(HEIGHT, "0"), Tick(0.0, "1")),
     )
@@ -101,7 +99,7 @@ def rainbow(bands: Floats) -> list[tuple[float, str]]:
     return [(i / 23, _hex(rgb[:, i])) for i in range(24)]
 
 
-def _points(x: Floats, y: Floats, top: float) -> str:
+def points(x: Floats, y: Floats, top: float) -> str:
     """SVG points; values outside the drawing are cut at its rim, values that are not finite left out."""
     height = (1.0 - np.clip(y / top, -0.04, 1.04)) * HEIGHT
     return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, height, strict=True) if np.isfinite(b))
@@ -112,7 +110,8 @@ def _nice_top(largest: float) -> float:
     return next((top for top in (0.1, 0.2, 0.4, 0.6, 0.8, 1.0) if largest <= top), np.ceil(largest * 2) / 2)
 
 
-def _wavelength_ticks(bands: Floats) -> tuple[Tick, ...]:
+def wavelength_ticks(bands: Floats) -> tuple[Tick, ...]:
+    """Ticks at round wavelengths between the first and the last band (nm), which span the width."""
     first, last = float(bands[0]), float(bands[-1])
     step = 50.0 if last - first <= 400 else 200.0
     inner = np.arange(np.ceil(first / step) * step, last + 1, step)

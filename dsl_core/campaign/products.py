@@ -1,0 +1,79 @@
+"""What a finished campaign leaves: the rig's file, its report, an entry of the library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.campaign.assembly import accepted_calibrations, all_recipes
+from dsl_core.campaign.recipe import Recipe
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.rig_file import save_rig
+from dsl_core.io.staging import staged
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.rig import Rig
+
+if TYPE_CHECKING:
+    from dsl_core.evaluation.cost import StageCost
+
+RIG_NAME, REPORT_NAME = "rig.json", "report.html"
+
+
+@dataclass(frozen=True)
+class Products:
+    """Where they lie; ``entry`` is the name in the library, None where none was wanted."""
+
+    rig: Path
+    report: Path
+    entry: str | None
+
+
+def write_products(
+    campaign: CampaignFolder,
+    rig: Rig,
+    library_name: str | None,
+    costs: Sequence[StageCost] = (),
+    recipes: Sequence[Recipe] | None = None,
+) -> Products:
+    """Write ``rig.json`` and ``report.html`` anew and store the rig in the library; raises `StoreError`.
+
+    A rig that equals the library's current one but for its date is not stored a second time.
+    """
+    recipes = all_recipes() if recipes is None else recipes
+    accepted = tuple(accepted_calibrations(campaign, recipes).values())
+    history = tuple(old for recipe in recipes for old in campaign.history(recipe.name))
+    path = save_rig(rig, campaign.path / RIG_NAME, overwrite=True)
+    report = write_calibration_report(campaign.path / REPORT_NAME, rig, accepted, history, costs)
+    if library_name is not None:
+        _store(library_name, rig, accepted, history)
+    return Products(path, report, library_name)
+
+
+def write_calibration_report(
+    path: Path,
+    rig: Rig,
+    accepted: tuple[AcceptedCalibration, ...],
+    history: tuple[AcceptedCalibration, ...],
+    costs: Sequence[StageCost] = (),
+) -> Path:
+    """Write the page, over what is there, whole or not at all; raises `StoreError`."""
+    from dsl_core.evaluation.calibration_report import CalibrationContent, render_calibration_report
+
+    page = render_calibration_report(CalibrationContent(rig, accepted, history, costs))
+    with staged([path], overwrite=True) as (draft,):
+        draft.write_text(page, encoding="utf-8")
+    return path
+
+
+def _store(
+    name: str, rig: Rig, accepted: tuple[AcceptedCalibration, ...], history: tuple[AcceptedCalibration, ...]
+) -> None:
+    from dsl_core.io.calibration_library import CalibrationLibrary
+
+    library = CalibrationLibrary()
+    same = {"provenance": rig.provenance}
+    if name in library.names() and library.find(name).rig.model_copy(update=same) == rig:
+        return
+    library.store(name, rig, accepted, history)
