@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import calibrate, demo, files, results, scans
+from dsl_core.cli import calibrate, calibrations, demo, files, results, scans
 
 app = typer.Typer(
     name="dsl-scan",
@@ -29,7 +29,9 @@ for command in (
     app.command()(command)
 app.command("import")(files.import_)
 app.command()(files.info)
+app.command()(calibrate.selftest)
 app.add_typer(calibrate.calibrate, name="calibrate")
+app.add_typer(calibrations.calibrations, name="calibrations")
 
 
 def _print_version(wanted: bool) -> None:

@@ -1,142 +1,173 @@
-"""Commands that calibrate a rig: ``calibrate geometry``."""
+"""Commands that calibrate a rig step by step: ``selftest`` and ``calibrate ...``."""
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import Force, Json, parse_size
+from dsl_core.cli.guidance import ConsoleGuide, figures_json, going_on_with, opened_campaign
+from dsl_core.cli.guided import Guided
+from dsl_core.cli.options import Force, Json, RigOptions, parse_options
 from dsl_core.cli.output import Output
+from dsl_core.cli.pictures import BoardOptions, PictureOptions, calibrate_pictures
 from dsl_core.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from dsl_core.model.board import Charuco, Checkerboard
-    from dsl_core.model.geometry_calibration import GeometryCalibration, PoseQuality
-    from dsl_core.model.rig import BayerPattern
+    from collections.abc import Callable
 
-calibrate = typer.Typer(help="Calibrate a rig from pictures of targets.", no_args_is_help=True)
+calibrate = typer.Typer(
+    help="Calibrate a rig step by step; a campaign's folder keeps all captures.", no_args_is_help=True
+)
+
+Campaign = Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Folder of the campaign, new or begun.")]
+CampaignRig = Annotated[
+    str | None, typer.Option("--rig", help="Name of a rig; the campaign's own, for a new one the twin.")
+]
+Set = Annotated[
+    list[str], typer.Option("--set", help="Setting of the calibration as key=value; may be repeated.")
+]
+Redo = Annotated[list[str], typer.Option("--redo", help="A step to capture anew; may be repeated.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Ask nobody: every target is in place when it is needed.")]
+AcceptFailed = Annotated[
+    bool, typer.Option("--accept-failed", help="Go on although figures are outside their limits.")
+]
+
+_HELP = {
+    "spectralon": "Measure LED emission, flat field and white scale on a Spectralon, film off.",
+    "color-checker": "Refine camera response and LED emission on a Color Checker, film off.",
+    "bandpass": "Measure the film's efficiency through bandpass filters, film on.",
+    "depth-stage": "Find the film's pose and shape from a plane at several depths, film on.",
+}
 
 
-@calibrate.callback()
-def _calibrate() -> None:
-    """Calibrate a rig from pictures of targets."""
+def selftest(
+    campaign: Annotated[
+        Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign to keep the outcome in.")
+    ] = None,
+    rig: CampaignRig = None,
+    option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
+    set_: Set = [],  # noqa: B006
+    yes: Yes = False,
+    json: Json = False,
+) -> None:
+    """Test camera and projector before anything else: each figure passes or says what to do."""
+    with tempfile.TemporaryDirectory(prefix="dsl-selftest-") as spare:
+        folder = campaign or Path(spare) / "campaign"
+        Guided("selftest", folder, rig, option, set_, yes, json, anew=True).run()
 
 
 @calibrate.command()
 def geometry(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="One folder of numbered pictures a pose.")],
-    board: Annotated[str, typer.Option(help="COLUMNSxROWS of inner corners; with --marker-mm, of squares.")],
-    square_mm: Annotated[float, typer.Option(help="Side of a printed square, measured.")],
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="Folder of the campaign; with --pictures, of pictures.")
+    ],
+    board: Annotated[
+        str | None, typer.Option(help="COLUMNSxROWS of inner corners; with --marker-mm, of squares.")
+    ] = None,
+    square_mm: Annotated[float | None, typer.Option(help="Side of a printed square, measured.")] = None,
     marker_mm: Annotated[float | None, typer.Option(help="Side of a marker: the board is a ChArUco.")] = None,
     dictionary: Annotated[str, typer.Option(help="Markers of a ChArUco board.")] = "DICT_5X5_100",
-    projector: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the projector, px.")] = "640x360",
-    binning: Annotated[float, typer.Option(help="Sensor pixels a camera pixel spans along a side.")] = 1.0,
-    bayer: Annotated[str | None, typer.Option(help="Mosaic of raw pictures: RGGB, BGGR, GRBG, GBRG.")] = None,
+    rig: CampaignRig = None,
+    option: RigOptions = [],  # noqa: B006
+    set_: Set = [],  # noqa: B006
+    redo: Redo = [],  # noqa: B006
+    yes: Yes = False,
+    accept_failed: AcceptFailed = False,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="FOLDER holds a folder of numbered pictures for each pose.")
+    ] = False,
+    projector: Annotated[str, typer.Option(help="Pictures: WIDTHxHEIGHT of the projector, px.")] = "640x360",
+    binning: Annotated[float, typer.Option(help="Pictures: sensor pixels a camera pixel spans.")] = 1.0,
+    bayer: Annotated[str | None, typer.Option(help="Pictures: mosaic, RGGB, BGGR, GRBG, GBRG.")] = None,
     baseline_mm: Annotated[
-        float | None, typer.Option(help="Distance of camera and projector, to check the printed size.")
+        float | None, typer.Option(help="Pictures: distance of camera and projector, checks the print.")
     ] = None,
-    target: Annotated[Path | None, typer.Option("--output", "-o", help="GEOMETRY.json to write.")] = None,
-    xml: Annotated[Path | None, typer.Option(help="Published XML or YAML to write.")] = None,
+    target: Annotated[Path | None, typer.Option("--output", help="Pictures: GEOMETRY.json to write.")] = None,
+    xml: Annotated[Path | None, typer.Option(help="Pictures: published XML or YAML to write.")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
     """Find lenses and pose of camera and projector from a board under Gray code, film off."""
-    from dsl_core import pipeline
-    from dsl_core.io.geometry_file import as_stereo, save_geometry
-    from dsl_core.io.published.stereo import save_stereo
-    from dsl_core.io.staging import check_targets
+    printed = BoardOptions(board, square_mm, marker_mm, dictionary)
+    if pictures:
+        options = PictureOptions(projector, binning, bayer, baseline_mm, target, xml, force)
+        calibrate_pictures(Output(json), folder, printed, options)
+        return
+    if target is not None or xml is not None:
+        raise CalibrationError("--output and --xml go with --pictures; 'calibrate all' writes the rig.")
+    found = printed.build()
+    own = [] if found is None else [f"board={found.model_dump_json()}"]
+    Guided("geometry", folder, rig, option, [*own, *set_], yes, json, redo, accept_failed).run()
 
-    output = Output(json)
-    files = [path for path in (target, xml) if path is not None]
-    check_targets(files, overwrite=force)
-    printed = _board(board, square_mm, marker_mm, dictionary)
-    size, mosaic = parse_size("--projector", projector), _bayer(bayer)
-    with output.progress() as progress:
-        found = pipeline.calibrate_geometry(folder, printed, size, mosaic, binning, baseline_mm, progress)
-    if target is not None:
-        save_geometry(found, target, overwrite=force)
-    if xml is not None:
-        save_stereo(as_stereo(found), xml, overwrite=force)
-    _print(output, found)
-    output.say(f"Written: {', '.join(map(str, files))}" if files else "Nothing is written without --output.")
-    output.put(calibration=found.model_dump(mode="json"), files=[str(path) for path in files])
+
+def _command(name: str) -> Callable[..., None]:
+    """The command of a calibration that needs no options of its own."""
+
+    def command(
+        campaign: Campaign,
+        rig: CampaignRig = None,
+        option: RigOptions = [],  # noqa: B006
+        set_: Set = [],  # noqa: B006
+        redo: Redo = [],  # noqa: B006
+        yes: Yes = False,
+        accept_failed: AcceptFailed = False,
+        json: Json = False,
+    ) -> None:
+        Guided(name, campaign, rig, option, set_, yes, json, redo, accept_failed).run()
+
+    return command
+
+
+for _name, _help in _HELP.items():
+    calibrate.command(_name, help=_help)(_command(_name))
+
+
+@calibrate.command("all")
+def all_(
+    campaign: Campaign,
+    rig: CampaignRig = None,
+    option: RigOptions = [],  # noqa: B006
+    name: Annotated[
+        str | None, typer.Option(help="Name in the library; that of the campaign's folder if not given.")
+    ] = None,
+    library: Annotated[
+        bool, typer.Option("--library/--no-library", help="Keep the rig in the library.")
+    ] = True,
+    yes: Yes = False,
+    accept_failed: AcceptFailed = False,
+    json: Json = False,
+) -> None:
+    """Calibrate everything in order: from an unknown rig to a calibrated one, with a report."""
+    from dsl_core.campaign.guide import calibrate_all
+    from dsl_core.campaign.products import write_products
+    from dsl_core.campaign.recipes import load_recipe
+    from dsl_core.evaluation.cost import StageTimer
+
+    output, timer = Output(json), StageTimer()
+    guide = ConsoleGuide(output, yes, accept_failed)
+    with (
+        going_on_with(f"dsl-scan calibrate all {campaign}"),
+        opened_campaign(campaign, rig, parse_options(option), {}) as (folder, devices),
+    ):
+        settings = folder.info.settings
+        with output.progress() as progress:
+            calibrated = calibrate_all(
+                folder,
+                devices,
+                guide,
+                progress,
+                name or "",
+                recipe_of=lambda each: load_recipe(each, settings.get(each)),
+                stage=timer.stage,
+            )
+        made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)
+    output.costs(timer.stages)
+    output.say(f"The calibrated rig lies in {made.rig}, its report in {made.report}.")
+    if made.entry is not None:
+        output.say(f"In the library: {made.entry}. Next: dsl-scan scan SCAN.dsl --calibration {made.entry}")
+    output.put(rig=made.rig, report=made.report, library=made.entry)
+    output.put(figures={note.name: figures_json(note.figures) for note in calibrated.calibrations})
     output.finish()
-
-
-def _board(text: str, square_mm: float, marker_mm: float | None, dictionary: str) -> Checkerboard | Charuco:
-    from pydantic import ValidationError
-
-    from dsl_core.model.board import Charuco, Checkerboard
-
-    columns, rows = parse_size("--board", text)
-    try:
-        if marker_mm is None:
-            return Checkerboard(columns=columns, rows=rows, square_mm=square_mm)
-        return Charuco(
-            columns=columns, rows=rows, square_mm=square_mm, marker_mm=marker_mm, dictionary=dictionary
-        )
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "board"
-        raise CalibrationError(f"The board is impossible: {where}: {first['msg']}. Correct it.") from error
-
-
-def _bayer(text: str | None) -> BayerPattern | None:
-    match text:
-        case None | "RGGB" | "BGGR" | "GRBG" | "GBRG":
-            return text
-    raise CalibrationError(f"--bayer must be RGGB, BGGR, GRBG or GBRG, not {text!r}. Leave it out for mono.")
-
-
-def _print(output: Output, found: GeometryCalibration) -> None:
-    lenses = (
-        ("camera", found.camera, found.camera_deviation),
-        ("projector", found.projector, found.projector_deviation),
-    )
-    names = ("fx_px", "fy_px", "cx_px", "cy_px")
-    rows = [
-        (what, *(f"{getattr(lens, name):.2f} ± {getattr(deviation, name):.2f}" for name in names))
-        for what, lens, deviation in lenses
-    ]
-    output.table(("lens", "fx px", "fy px", "cx px", "cy px"), rows)
-    headings = (
-        "pose",
-        "corners",
-        "out",
-        "camera px",
-        "projector px",
-        "tilt",
-        "square mm",
-        "plane mm",
-        "unseen mm",
-    )
-    output.table(headings, [_row(pose) for pose in found.poses])
-    output.say(
-        f"Reprojection {found.rms_px:.3f} px rms (camera {found.camera_rms_px:.3f}, projector"
-        f" {found.projector_rms_px:.3f}; {found.rms_with_outliers_px:.3f} with outliers);"
-        f" {found.full_resolution_rms_px:.3f} px with unbinned camera pixels."
-    )
-    squares = found.squares
-    output.say(
-        f"Squares {squares.square_mm:.3f} ± {squares.square_std_mm:.3f} mm, printed"
-        f" {found.board.square_mm:g} mm; planes to {found.plane_rms_share:.1e} of their distance."
-    )
-    for warning in found.warnings:
-        output.say(f"Warning: {warning}")
-
-
-def _row(pose: PoseQuality) -> tuple[object, ...]:
-    unseen = "-" if pose.left_out is None else f"{pose.left_out.square_mm:.3f}"
-    return (
-        pose.name if pose.used else f"{pose.name} (left out)",
-        pose.corners,
-        pose.outliers,
-        f"{pose.camera_rms_px:.3f}",
-        f"{pose.projector_rms_px:.3f}",
-        f"{pose.tilt_deg:.0f}°",
-        f"{pose.measured.square_mm:.3f} ± {pose.measured.square_std_mm:.3f}",
-        f"{pose.measured.plane_rms_mm:.3f}",
-        unseen,
-    )

@@ -32,6 +32,7 @@ class FakeRecipe:
     keys: tuple[str, ...] = ("dim", "bright")
     scale: float = 2.0
     largest_dn: float = 4000.0
+    good_look: int = 1
     bad_steps: set[str] = field(default_factory=set)
     looks: list[str] = field(default_factory=list)
     captured: list[str] = field(default_factory=list)
@@ -46,9 +47,10 @@ class FakeRecipe:
         )
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
-        """Count the looks."""
+        """Count the looks; it takes ``good_look`` of them to see the target right."""
         self.looks.append(step.key)
-        return (Figure(name="looks", value=len(self.looks), unit=""),)
+        advice = "Move the target closer."
+        return (Figure(name="looks", value=len(self.looks), unit="", low=self.good_look, advice=advice),)
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether the scan is there and whole."""
@@ -104,3 +106,19 @@ class FakeRecipe:
     def apply(self, record: Record, rig: Rig) -> Rig:
         """Change the white scale by a known factor."""
         return rig.model_copy(update={"white_scale": rig.white_scale * self.scale})
+
+
+@dataclass
+class FakeSelfTest(FakeRecipe):
+    """Stands for the self-test."""
+
+    name: str = "selftest"
+
+
+@dataclass
+class FakeGeometry(FakeRecipe):
+    """Stands for a calibration that needs the self-test."""
+
+    name: str = "geometry"
+    needs: tuple[str, ...] = ("selftest",)
+    keys: tuple[str, ...] = ("pose",)

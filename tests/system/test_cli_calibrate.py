@@ -1,4 +1,4 @@
-"""``calibrate geometry`` on real pictures, and on folders that are not as they should be."""
+"""``calibrate geometry --pictures`` on real pictures, and on folders that are not as they should be."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .conftest import Give
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).resolve().parents[3] / "shared"))
 REAL = SHARED / "data" / "procam_checkerboard" / "half_res"
-SMALL = ["--board", "5x4", "--square-mm", 30, "--projector", "128x96"]
+SMALL = ["--pictures", "--board", "5x4", "--square-mm", 30, "--projector", "128x96"]
 
 
 @pytest.mark.skipif(not REAL.is_dir(), reason=f"the real captures are not in {REAL}")
 def test_real_captures(give: Give, tmp_path: Path) -> None:
     """Published tools reach 0.40 px and 0.43 mm with the pictures at full resolution."""
-    files = ["-o", tmp_path / "geometry.json", "--xml", tmp_path / "stereo.xml"]
+    files = ["--output", tmp_path / "geometry.json", "--xml", tmp_path / "stereo.xml"]
     board = ["--board", "9x7", "--square-mm", 75, "--projector", "1024x768", "--binning", 2]
-    ending = give("calibrate", "geometry", REAL, *board, *files, "--json")
+    ending = give("calibrate", "geometry", REAL, "--pictures", *board, *files, "--json")
     assert ending.code == 0, ending.err
     found = load_geometry(tmp_path / "geometry.json")
     assert ending.json["calibration"] == found.model_dump(mode="json")
@@ -107,7 +107,7 @@ def test_what_is_wrong_is_named_and_nothing_written(
 ) -> None:
     folder = Path(shutil.copytree(pictures, tmp_path / "pictures"))
     damage(folder)
-    ending = give("calibrate", "geometry", folder, *SMALL, "-o", tmp_path / "geometry.json")
+    ending = give("calibrate", "geometry", folder, *SMALL, "--output", tmp_path / "geometry.json")
     assert ending.code == 2
     assert sentence in ending.sentence
     assert not (tmp_path / "geometry.json").exists()

@@ -1,0 +1,191 @@
+"""Whether light and film still are as calibrated, from white and a few lines on a plane.
+
+The calibration predicts every signal of a plane of known reflectance. What is measured over what is predicted
+says how far the light has changed; how far the first orders stand from where they should, whether the film
+has moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.figure import Figure
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import Footprint, correspondence
+from dsl_core.optics.image_formation import ImageFormation, OrderPath
+from dsl_core.optics.spectra import hat_moments
+
+Floats = NDArray[np.float64]
+
+LIGHT_LIMIT, FILM_LIMIT_PX, EFFICIENCY_LIMIT = 0.03, 0.2, 0.05
+STEP_NM = 5.0
+BANDS_NM = np.arange(415.0, 691.0, STEP_NM)
+#: First orders may be displaced by this much for the slopes of the prediction, projector px.
+_SLOPE_PX = 0.5
+_MIN_SIGNALS = 200
+
+
+@dataclass(frozen=True)
+class PlaneSignals:
+    """Frames of a plane at some pixels.
+
+    ``pixels`` are flat indices (P,), ``colours`` their mosaic colour 0..2, ``depth_mm`` and ``shading`` those
+    of the plane; ``profiles`` (frames, width) 0..1 are what was shown, alike in all LEDs; ``radiance`` and
+    its deviation ``std`` (infinite: unusable) are (frames, P), DN per ms.
+    """
+
+    pixels: NDArray[np.int64]
+    colours: NDArray[np.int64]
+    depth_mm: Floats
+    shading: Floats
+    profiles: Floats
+    radiance: Floats
+    std: Floats
+
+
+def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figure]:
+    """Measured over predicted white signal of each colour, for a target of known reflectance."""
+    expected = _expected(rig, white, reflectance)[0]
+    usable = np.isfinite(white.std[0]) & (expected > 0.2 * np.median(expected))
+    figures = []
+    for colour, name in enumerate(("red", "green", "blue")):
+        mine = usable & (white.colours == colour)
+        if mine.sum() < _MIN_SIGNALS // 4:
+            raise CalibrationError(
+                f"Only {int(mine.sum())} {name} pixels of the target are lit and not saturated."
+                " Let the target fill the middle of the picture."
+            )
+        ratio = white.radiance[0, mine] / expected[mine]
+        spread = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
+        figures.append(
+            Figure(
+                name=f"white signal, {name}, over calibration",
+                value=float(np.median(ratio)),
+                std=float(np.hypot(1.2533 * spread / np.sqrt(mine.sum()), rig.white_scale_rel_std)),
+                unit="1",
+                low=1 - LIGHT_LIMIT,
+                high=1 + LIGHT_LIMIT,
+                advice="Light or exposure has changed, or the target is not the Spectralon: let the projector"
+                " warm up and clean the target, else repeat the spectralon calibration.",
+            )
+        )
+    return figures
+
+
+def film_drift(rig: Rig, lines: PlaneSignals, reflectance: float) -> list[Figure]:
+    """Displacement of each first order (px) and its brightness over the zero order, against the calibration.
+
+    ``reflectance`` is only a scale: the brightness is divided by that of the zero order.
+    """
+    zero = _expected(rig, lines, reflectance, orders=(0,))
+    every = np.isfinite(lines.std)
+    brightness = _scale(lines, zero, every & (zero > 0.5 * zero.max(0)))
+    figures: list[Figure] = []
+    for order in (1, -1):
+        here, ahead, behind = (
+            _expected(rig, lines, reflectance, (order,), shift) for shift in (0.0, _SLOPE_PX, -_SLOPE_PX)
+        )
+        slope = (ahead - behind) / (2 * _SLOPE_PX)
+        # Only where this order is nearly all there is, so that errors of the zero order's halo do not count.
+        other = _expected(rig, lines, reflectance, (0, -order))
+        mine = every & (here > 0.02 * here.max()) & (other < 0.02 * here)
+        if mine.sum() < _MIN_SIGNALS:
+            raise CalibrationError(
+                f"The first order {order:+d} lights only {int(mine.sum())} of the chosen pixels. Let a flat"
+                " target fill the middle of the picture, film on."
+            )
+        data = (lines.radiance - other * brightness)[mine] / brightness
+        shift, gain, shift_std, gain_std = _shift(data, here[mine], slope[mine], lines.std[mine] / brightness)
+        figures += _film_figures(order, shift, shift_std, gain, gain_std)
+    return figures
+
+
+def _film_figures(
+    order: int, shift: float, shift_std: float, gain: float, gain_std: float
+) -> tuple[Figure, Figure]:
+    return (
+        Figure(
+            name=f"displacement of order {order:+d}",
+            value=shift,
+            std=shift_std,
+            unit="px",
+            low=-FILM_LIMIT_PX,
+            high=FILM_LIMIT_PX,
+            advice="The film has moved: fix it and repeat the depth-stage calibration.",
+        ),
+        Figure(
+            name=f"brightness of order {order:+d}, over calibration",
+            value=gain,
+            std=gain_std,
+            unit="1",
+            low=1 - EFFICIENCY_LIMIT,
+            high=1 + EFFICIENCY_LIMIT,
+            advice="The film is dirty or another one: clean it, else repeat the bandpass calibration.",
+        ),
+    )
+
+
+def _scale(lines: PlaneSignals, expected: Floats, usable: NDArray[np.bool_]) -> float:
+    """Median of measured over expected signals."""
+    if usable.sum() < _MIN_SIGNALS:
+        raise CalibrationError(
+            f"The lines light only {int(usable.sum())} of the chosen pixels directly. Let a flat target fill"
+            " the middle of the picture."
+        )
+    return float(np.median(lines.radiance[usable] / expected[usable]))
+
+
+def _shift(data: Floats, model: Floats, slope: Floats, std: Floats) -> tuple[float, float, float, float]:
+    """Displacement (px) and gain by least squares, Huber weights, with standard deviations."""
+    design = np.stack([slope, model], 1)
+    # An error of the model in proportion to the signal keeps bright pixels from deciding alone.
+    weight = 1 / (std**2 + (0.03 * model) ** 2)
+    for _ in range(5):
+        normal = design.T @ (weight[:, None] * design)
+        answer = np.linalg.solve(normal, design.T @ (weight * data))
+        off = data - design @ answer
+        spread = 1.4826 * np.median(np.abs(off) * np.sqrt(weight))
+        sigmas = np.abs(off) * np.sqrt(weight) / max(spread, 1e-12)
+        weight = weight * np.minimum(1, 1.345 / np.maximum(sigmas, 1.345))
+    inverse = np.linalg.inv(design.T @ (weight[:, None] * design))
+    bread = design * (weight * off)[:, None]
+    covariance = inverse @ (bread.T @ bread) @ inverse
+    gain = float(answer[1])
+    std_shift, std_gain = np.sqrt(np.diag(covariance))
+    return float(answer[0] / gain), gain, float(std_shift / gain), float(std_gain)
+
+
+def _expected(
+    rig: Rig,
+    signals: PlaneSignals,
+    reflectance: float,
+    orders: tuple[int, ...] = (0, 1, -1, 2, -2),
+    shift_px: float = 0.0,
+) -> Floats:
+    """Predicted signals (frames, P) in each pixel's own colour, DN per ms; first orders displaced."""
+    model = correspondence(rig)
+    pixels, depth = torch.as_tensor(signals.pixels), torch.as_tensor(signals.depth_mm)
+    paths = []
+    for order in orders:
+        moments, centroids = hat_moments(rig, order, BANDS_NM, STEP_NM)
+        footprint = model.trace(pixels, depth, order, centroids if order else centroids[:1])
+        inside = footprint.inside(rig.projector.width_px, rig.projector.height_px, 20.0)
+        columns = footprint.columns + (shift_px if order else 0.0)
+        paths.append(OrderPath(columns, inside, moments, _band_px(footprint) if order else 0.0))
+    profiles = np.repeat(signals.profiles[:, :, None], 3, axis=2)
+    formation = ImageFormation(rig.projector_response, profiles, paths, torch.as_tensor(signals.shading))
+    target = torch.full((len(BANDS_NM), len(signals.pixels)), reflectance, dtype=torch.float64)
+    every_colour = formation.forward(target).numpy()
+    return np.asarray(every_colour[signals.colours, :, np.arange(len(signals.pixels))].T)
+
+
+def _band_px(footprint: Footprint) -> float:
+    """Mean half width of a band in projector columns."""
+    usable = torch.isfinite(footprint.columns).all(0)
+    span = (footprint.columns[-1] - footprint.columns[0])[usable].abs().mean()
+    return max(float(span) / (len(BANDS_NM) - 1), 0.05)

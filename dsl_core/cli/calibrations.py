@@ -1,0 +1,212 @@
+"""Commands around the library of calibrated rigs: ``calibrations list|show|check|restore|export|import``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsl_core.cli.guidance import figures_json, print_figures
+from dsl_core.cli.options import Force, Json, OverrideCalibration, RigName, RigOptions, parse_options
+from dsl_core.cli.output import Output
+from dsl_core.errors import CalibrationError, StoreError
+
+if TYPE_CHECKING:
+    from dsl_core.io.calibration_library import LibraryEntry, LibraryLine
+    from dsl_core.model.rig import Rig
+
+calibrations = typer.Typer(help="The calibrated rigs of this computer.", no_args_is_help=True)
+
+Name = Annotated[str, typer.Argument(metavar="NAME", help="A calibration's name, or NAME@DATE.")]
+
+
+@calibrations.command("list")
+def list_(json: Json = False) -> None:
+    """List every version of every calibration, damaged ones with the reason."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+
+    output, library = Output(json), CalibrationLibrary()
+    lines = library.lines()
+    if not lines:
+        output.say(f"The library in {library.home} is empty. 'dsl-scan calibrate all' fills it.")
+    else:
+        headings = ("name", "version", "", "camera", "projector", "outside limits")
+        output.table(headings, [_row(line) for line in lines])
+    output.put(library=library.home, calibrations=[_facts(line) for line in lines])
+    output.finish()
+
+
+@calibrations.command()
+def show(
+    name: Name,
+    report: Annotated[Path | None, typer.Option(help="HTML page to write as well.")] = None,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Say what a calibration holds: conditions, dates, figures with uncertainties."""
+    from dsl_core.campaign.products import write_calibration_report
+    from dsl_core.io.calibration_library import CalibrationLibrary
+    from dsl_core.io.staging import check_targets
+
+    output, entry = Output(json), CalibrationLibrary().find(name)
+    if report is not None:
+        check_targets([report], overwrite=force)
+        write_calibration_report(report, entry.rig, entry.accepted, entry.history)
+    output.say(f"{entry.name}, version {entry.stamp}, rig {entry.rig.name}")
+    _say_conditions(output, entry.rig)
+    for note in entry.rig.calibrations:
+        output.say(f"{note.title}, accepted {note.accepted[:16]}")
+        print_figures(output, note.figures)
+    if report is not None:
+        output.say(f"The report lies in {report}")
+    output.put(name=entry.name, version=entry.stamp, report=report, rig=entry.rig.model_dump(mode="json"))
+    output.finish()
+
+
+@calibrations.command()
+def check(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A name of the library, or a rig's file.")],
+    rig: RigName = "twin",
+    option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
+    spectralon: Annotated[
+        bool, typer.Option("--spectralon/--any-target", help="The flat target is the Spectralon.")
+    ] = True,
+    keep: Annotated[Path | None, typer.Option(help="Folder to keep the frames in.")] = None,
+    override: OverrideCalibration = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nobody: the target is in place.")] = False,
+    json: Json = False,
+) -> None:
+    """Check by one quick shot of a flat target whether the rig still is as it was calibrated."""
+    import tempfile
+
+    from dsl_core.campaign.drift import PLACEMENT, measure_drift
+    from dsl_core.cli.guidance import place_by_hand
+    from dsl_core.devices.conditions import use_calibration
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.calibration_library import load_calibration
+    from dsl_core.model.figure import failures
+
+    output, known = Output(json), load_calibration(name)
+    with open_rig(rig, parse_options(option)) as devices, tempfile.TemporaryDirectory() as spare:
+        for clause in use_calibration(devices, known, override):
+            output.say(f"Overridden: {clause}.")
+        if devices.place is not None:
+            devices.place(PLACEMENT)
+        elif not yes:
+            place_by_hand(f"Place {'the Spectralon' if spectralon else 'a flat, matt target'}, film on.")
+        with output.progress() as progress:
+            figures = measure_drift(devices, known, keep or Path(spare) / "check.dsl", spectralon, progress)
+    print_figures(output, figures)
+    output.put(name=name, figures=figures_json(figures), stable=not failures(figures))
+    wrong = failures(figures)
+    if wrong:
+        clauses = "; ".join(f"{figure}. {figure.advice}".rstrip(". ") for figure in wrong)
+        raise CalibrationError(f"The rig is not as {name} says: {clauses}.")
+    output.say(f"The rig is as {name} says.")
+    output.finish()
+
+
+@calibrations.command()
+def restore(
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    version: Annotated[str, typer.Argument(metavar="DATE", help="A version, or how it begins.")],
+    json: Json = False,
+) -> None:
+    """Make an older version the current one; the one that was stays in the library."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+
+    output, entry = Output(json), CalibrationLibrary().restore(name, version)
+    output.say(f"{name} is version {entry.stamp} from now on.")
+    output.put(name=name, version=entry.stamp)
+    output.finish()
+
+
+@calibrations.command()
+def export(
+    name: Name,
+    target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
+    form: Annotated[
+        str, typer.Option(help="entry (all there is), rig (its file), or published (XML and .npy).")
+    ] = "entry",
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Write a calibration for another computer or program."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+
+    output, entry = Output(json), CalibrationLibrary().find(name)
+    files = _export(entry, target, form, force)
+    output.say(f"Written: {', '.join(map(str, files))}")
+    output.put(files=[str(file) for file in files])
+    output.finish()
+
+
+@calibrations.command("import")
+def import_(
+    source: Annotated[
+        Path, typer.Argument(metavar="FILE", help="What 'export' wrote, or a rig's JSON file.")
+    ],
+    name: Annotated[str | None, typer.Option(help="Name in the library; its own if not given.")] = None,
+    json: Json = False,
+) -> None:
+    """Take a calibration into the library, as the current version of its name."""
+    from dsl_core.io.calibration_library import CalibrationLibrary, read_entry
+    from dsl_core.io.rig_file import load_rig
+
+    output, found = Output(json), read_entry(source)
+    rig = load_rig(source) if found is None else found.rig
+    own = rig.name if found is None else found.name
+    accepted, history = ((), ()) if found is None else (found.accepted, found.history)
+    entry = CalibrationLibrary().store(name or own, rig, accepted, history)
+    output.say(f"{entry.name} is in the library, version {entry.stamp}.")
+    output.put(name=entry.name, version=entry.stamp)
+    output.finish()
+
+
+def _export(entry: LibraryEntry, target: Path, form: str, force: bool) -> list[Path]:
+    from dsl_core.io.published import export_calibration
+    from dsl_core.io.rig_file import save_rig
+    from dsl_core.io.staging import staged
+
+    match form:
+        case "entry":
+            with staged([target], overwrite=force) as (draft,):
+                draft.write_text(entry.model_dump_json(indent=1) + "\n", encoding="utf-8")
+            return [target]
+        case "rig":
+            return [save_rig(entry.rig, target, overwrite=force)]
+        case "published":
+            return export_calibration(entry.rig, target, overwrite=force)
+    raise StoreError(f"--form must be entry, rig or published, not {form!r}.")
+
+
+def _row(line: LibraryLine) -> tuple[str, ...]:
+    current = "current" if line.is_current else ""
+    if line.entry is None:
+        return line.name, line.stamp, current, f"damaged: {line.error}", "", ""
+    rig = line.entry.rig
+    missed = [f"{figure}" for note in rig.calibrations for figure in note.failed]
+    camera = f"{rig.provenance.camera_serial or '-'} {rig.camera.width_px}x{rig.camera.height_px}"
+    return line.name, line.stamp, current, camera, rig.provenance.projector_serial or "-", ", ".join(missed)
+
+
+def _facts(line: LibraryLine) -> dict[str, object]:
+    facts: dict[str, object] = {"name": line.name, "version": line.stamp, "current": line.is_current}
+    if line.entry is None:
+        return {**facts, "error": line.error}
+    rig = line.entry.rig
+    conditions = rig.conditions.model_dump(mode="json") if rig.conditions else None
+    notes = {note.name: figures_json(note.figures) for note in rig.calibrations}
+    return {**facts, "conditions": conditions, "figures": notes}
+
+
+def _say_conditions(output: Output, rig: Rig) -> None:
+    if rig.conditions is None:
+        output.say("Nobody noted under which settings it was captured.")
+        return
+    for name, part in (("camera", rig.conditions.camera), ("projector", rig.conditions.projector)):
+        values = ", ".join(
+            f"{key} {value}" for key, value in part.model_dump().items() if value not in (None, "")
+        )
+        output.say(f"{name}: {values}")

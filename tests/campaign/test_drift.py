@@ -1,0 +1,102 @@
+"""One quick shot tells a rig that is as it was calibrated from one that is not, and what has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.drift import smooth_part
+from dsl_core.campaign.drift import drift_figures, quick_plan
+from dsl_core.errors import CalibrationError
+from dsl_core.model.figure import failures
+from dsl_core.model.geometry import Pose
+from dsl_core.model.rig import Rig
+from tests.cases.twin_scan import MemoryScan, twin_scan
+
+#: Pixels whose light is compared: enough to see, few enough to be quick.
+FEW = 1500
+Change = Callable[[Rig], Rig]
+
+
+@pytest.fixture(scope="module")
+def shot() -> tuple[Rig, MemoryScan]:
+    devices, scan = twin_scan(quick_plan(), size="160x104", scene="plane", tilt_x_deg="5", tilt_y_deg="-8")
+    assert devices.calibration is not None
+    return devices.calibration, scan
+
+
+def turned(rig: Rig, angle_deg: float) -> Rig:
+    """The projector turned about its own x axis, which moves what it shows up or down."""
+    c, s = np.cos(np.deg2rad(angle_deg)), np.sin(np.deg2rad(angle_deg))
+    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    a, b, d = (turn @ rig.pose.matrix).tolist()
+    x, y, z = (turn @ rig.pose.vector_mm).tolist()
+    return rig.model_copy(update={"pose": Pose(rotation=(a, b, d), translation_mm=(x, y, z))})
+
+
+def other_lens(rig: Rig) -> Rig:
+    k1, *others = rig.projector.distortion
+    return _changed(rig, "projector", distortion=(k1 + 0.05, *others))
+
+
+def tilted_film(rig: Rig) -> Rig:
+    return _changed(rig, "film", tilt_y_deg=rig.film.tilt_y_deg + 1.5)
+
+
+def other_film(rig: Rig) -> Rig:
+    return _changed(rig, "film", lines_per_mm=rig.film.lines_per_mm * 1.004)
+
+
+def _changed(rig: Rig, part: str, **values: object) -> Rig:
+    return rig.model_copy(update={part: getattr(rig, part).model_copy(update=values)})
+
+
+def test_a_rig_as_it_was_calibrated_passes(shot: tuple[Rig, MemoryScan]) -> None:
+    rig, scan = shot
+    figures = drift_figures(scan, rig, spectralon=False, pixels=FEW)
+    assert [figure.name for figure in figures if not figure.passed] == []
+    by_name = {figure.name: figure for figure in figures}
+    assert by_name["row drift"].value < 0.05
+    assert by_name["column drift on a plane"].value < 0.06
+    assert abs(by_name["displacement of order +1"].value) < 0.1
+    assert by_name["brightness of order -1, over calibration"].value == pytest.approx(1, abs=0.02)
+
+
+def test_the_light_is_compared_with_a_spectralon(shot: tuple[Rig, MemoryScan]) -> None:
+    """The plane of the twin is one."""
+    rig, scan = shot
+    for figure in drift_figures(scan, rig, spectralon=True, pixels=FEW):
+        if figure.name.startswith("white"):
+            assert figure.value == pytest.approx(1, abs=0.005), figure
+            assert figure.std is not None
+            assert figure.std < 0.002
+    brighter = rig.model_copy(update={"white_scale": rig.white_scale * 1.06})
+    missed = [
+        figure for figure in drift_figures(scan, brighter, spectralon=True, pixels=FEW) if not figure.passed
+    ]
+    assert [figure.name.split(",")[0] for figure in missed] == ["white signal"] * 3
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        (lambda rig: turned(rig, 0.03), "row drift"),
+        (other_lens, "column drift on a plane"),
+        (tilted_film, "displacement of order"),
+        (other_film, "displacement of order"),
+    ],
+)
+def test_what_has_changed_is_named(shot: tuple[Rig, MemoryScan], change: Change, name: str) -> None:
+    rig, scan = shot
+    missed = failures(drift_figures(scan, change(rig), False, pixels=FEW))
+    assert any(figure.name.startswith(name) for figure in missed), missed
+    assert all(figure.advice for figure in missed)
+
+
+def test_a_target_that_is_too_small_is_told() -> None:
+    known = np.zeros((104, 160), bool)
+    known[40:50, 60:80] = True
+    with pytest.raises(CalibrationError, match="fills only"):
+        smooth_part(np.zeros(known.sum()), known)
