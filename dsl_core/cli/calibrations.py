@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.guidance import figures_json, print_figures
+from dsl_core.cli.guidance import answer, figures_json, print_figures
 from dsl_core.cli.options import Force, Json, OverrideCalibration, RigName, RigOptions, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, StoreError
@@ -81,7 +81,6 @@ def check(
     import tempfile
 
     from dsl_core.campaign.drift import PLACEMENT, measure_drift
-    from dsl_core.cli.guidance import place_by_hand
     from dsl_core.devices.conditions import use_calibration
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.calibration_library import load_calibration
@@ -94,7 +93,8 @@ def check(
         if devices.place is not None:
             devices.place(PLACEMENT)
         elif not yes:
-            place_by_hand(f"Place {'the Spectralon' if spectralon else 'a flat, matt target'}, film on.")
+            target = "the Spectralon" if spectralon else "a flat, matt target"
+            answer(output, f"Place {target}, film on. Then press Enter: ")
         with output.progress() as progress:
             figures = measure_drift(devices, known, keep or Path(spare) / "check.dsl", spectralon, progress)
     print_figures(output, figures)

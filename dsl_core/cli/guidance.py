@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -43,7 +42,7 @@ class ConsoleGuide:
         if self.unattended:
             self.output.say(ask)
         else:
-            _answer(f"{ask} Then press Enter (Ctrl-C stops, everything captured is kept): ")
+            answer(self.output, f"{ask} Then press Enter (Ctrl-C stops, everything captured is kept): ")
 
     def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
         """Tell what a look found; where it is not good, a person decides."""
@@ -55,17 +54,13 @@ class ConsoleGuide:
         advice = " ".join(f"{figure}: {figure.advice}" for figure in wrong)
         if self.unattended:
             raise CalibrationError(f"The step {step.title!r} does not look right: {advice}")
-        return _answer(f"{advice} Enter looks again, 'go' goes on as it is: ").strip().lower() == "go"
+        said = answer(self.output, f"{advice} Enter looks again, 'go' goes on as it is: ")
+        return said.strip().lower() == "go"
 
     def judge(self, fitted: AcceptedCalibration) -> bool:
         """Print the key figures; accept when all are within their limits, or anything if tolerant."""
         print_figures(self.output, fitted.figures)
         return self.tolerant or not failures(fitted.figures)
-
-
-def place_by_hand(instruction: str) -> None:
-    """Wait until a person has placed something."""
-    _answer(f"{instruction} Then press Enter: ")
 
 
 def print_figures(output: Output, figures: Sequence[Figure]) -> None:
@@ -130,12 +125,12 @@ def going_on_with(command: str) -> Iterator[None]:
         raise Cancelled(f"Stopped; everything captured is stored. Go on with: {command}") from None
 
 
-def _answer(question: str) -> str:
-    print(question, end="", file=sys.stderr, flush=True)
-    answer = sys.stdin.readline()
-    if not answer:
+def answer(output: Output, question: str) -> str:
+    """The line a person answers; raises `CalibrationError` when there is nobody."""
+    line = output.ask(question)
+    if not line:
         raise CalibrationError(
             "Nobody answers: standard input has ended. Run it in a terminal, or with --yes where every target"
             " is placed by itself."
         )
-    return answer
+    return line

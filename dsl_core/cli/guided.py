@@ -64,7 +64,7 @@ class Guided:
         else:
             output.say(f"{accepted.title} is accepted.")
         output.put(name=accepted.name, accepted=accepted.accepted, figures=figures_json(accepted.figures))
-        output.put(campaign=self.campaign, record=accepted.record)
+        output.put(campaign=self.campaign)
         output.finish()
 
     @property

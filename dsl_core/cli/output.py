@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Without a terminal a line of progress is written this often, seconds.
 _LINE_EVERY_S = 5.0
+#: More bars than this, and those that are full disappear.
+_MOST_BARS = 6
 #: Width of tables that no terminal limits, characters.
 _WIDE = 200
 
@@ -31,16 +33,19 @@ class Output:
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
         self._data: dict[str, Any] = {}
+        self._bars = _Bars()
 
     def say(self, line: str) -> None:
         """Print a line for a person."""
         if not self.as_json:
+            self._bars.close()
             print(line, flush=True)
 
     def table(self, headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
         """Print a table for a person."""
         if self.as_json:
             return
+        self._bars.close()
         from rich.console import Console
         from rich.table import Table
 
@@ -79,11 +84,17 @@ class Output:
         if not sys.stderr.isatty():
             yield _Lines()
             return
-        from rich.console import Console
-        from rich.progress import Progress as RichBars
+        self._bars = _Bars()
+        try:
+            yield self._bars
+        finally:
+            self._bars.close()
 
-        with RichBars(console=Console(stderr=True), transient=True) as bars:
-            yield _Bars(bars)
+    def ask(self, question: str) -> str:
+        """Ask a person on standard error and return the line answered, empty when input has ended."""
+        self._bars.close()
+        print(question, end="", file=sys.stderr, flush=True)
+        return sys.stdin.readline()
 
 
 class _Lines:
@@ -100,16 +111,40 @@ class _Lines:
 
 
 class _Bars:
-    """A bar for each stage."""
+    """A bar for each stage, from the first report until something else is said."""
 
-    def __init__(self, bars: RichBars) -> None:
-        self._bars = bars
+    def __init__(self) -> None:
+        self._bars: RichBars | None = None
         self._tasks: dict[str, TaskID] = {}
 
     def report(self, stage: str, done: int, total: int) -> None:
+        bars = self._bars or self._open()
         if stage not in self._tasks:
-            self._tasks[stage] = self._bars.add_task(stage, total=total)
-        self._bars.update(self._tasks[stage], completed=done)
+            self._make_room(bars)
+            self._tasks[stage] = bars.add_task(stage, total=total)
+        bars.update(self._tasks[stage], completed=done)
+
+    def close(self) -> None:
+        """Take the bars away, so that what is said next is not mixed with them."""
+        if self._bars is not None:
+            self._bars.stop()
+        self._bars, self._tasks = None, {}
+
+    def _open(self) -> RichBars:
+        from rich.console import Console
+        from rich.progress import Progress as RichBars
+
+        self._bars = RichBars(console=Console(stderr=True), transient=True, redirect_stdout=False)
+        self._bars.start()
+        return self._bars
+
+    def _make_room(self, bars: RichBars) -> None:
+        """Let finished bars go when there are many."""
+        if len(self._tasks) < _MOST_BARS:
+            return
+        done = {task.id for task in bars.tasks if task.finished}
+        for stage in [stage for stage, task in self._tasks.items() if task in done]:
+            bars.remove_task(self._tasks.pop(stage))
 
 
 def _plain(value: Any) -> Any:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from dsl_core.errors import StoreError
+from dsl_core.io.campaign_folder import CAMPAIGN_NAME, CampaignFolder
 from dsl_core.io.plan_file import load_plan
 from dsl_core.io.result_file import load_result
 from dsl_core.io.rig_file import load_rig
@@ -19,12 +20,14 @@ Facts = dict[str, Any]
 
 
 def describe(path: Path, verify: bool = False) -> Facts:
-    """Facts about a session, result, calibration or plan; ``verify`` also reads every frame of a session.
+    """Facts about a session, result, campaign, rig or plan; ``verify`` also reads every frame of a session.
 
     Raises `StoreError` when the path is none of them, and the reader's own error when it is a damaged one.
     """
     if (path / MANIFEST_NAME).is_file():
         return _session(path, verify)
+    if (path / CAMPAIGN_NAME).is_file():
+        return _campaign(CampaignFolder.open(path))
     if (path / "zarr.json").is_file():
         return _result(path)
     if path.is_file() and path.suffix.lower() == ".json":
@@ -55,6 +58,20 @@ def _session(path: Path, verify: bool) -> Facts:
         "checked": "every pixel" if verify else "names, sizes and log",
         "problems": problems,
         "notes": manifest.notes,
+    }
+
+
+def _campaign(campaign: CampaignFolder) -> Facts:
+    names = sorted(path.name for path in campaign.path.iterdir() if path.is_dir())
+    accepted = {name: found for name in names if (found := campaign.accepted(name)) is not None}
+    return {
+        "kind": "campaign",
+        "created": campaign.info.created,
+        "rig": campaign.info.rig,
+        "options": campaign.info.options,
+        "accepted": {name: each.accepted for name, each in accepted.items()},
+        "outside_limits": [f"{name}: {f}" for name, each in accepted.items() for f in each.note.failed],
+        "settings": campaign.info.settings,
     }
 
 

@@ -56,6 +56,9 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
     assert [stage["name"] for stage in ending.json["stages"]] == ["Brightness", "Brightness"]
     assert "Calibration of lab 3" in (folder / "report.html").read_text()
     assert CalibrationLibrary().find("lab 3").rig == rig
+    info = give("info", folder, "--json").json
+    assert info["kind"] == "campaign"
+    assert list(info["accepted"]) == ["geometry", "selftest"]
     # A second time nothing is captured, and the library gets no second version.
     before = (folder / "geometry" / "pose" / "capture.json").stat().st_mtime_ns
     assert give("calibrate", "all", folder, "--yes", "--name", "lab 3").code == 0

@@ -1,0 +1,34 @@
+"""What a command says on a terminal goes where it belongs, and bars are not in its way."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from dsl_core.cli.output import Output
+
+
+class Terminal(io.StringIO):
+    """Pretends to be one."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_bars_give_way_to_what_is_said_and_asked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setattr("sys.stdin", io.StringIO("yes\n"))
+    output = Output(False)
+    with output.progress() as progress:
+        for number in range(9):
+            progress.report(f"step {number}", 1, 1)
+        output.say("found")
+        assert output.ask("Placed? ") == "yes\n"
+        progress.report("fit", 1, 2)
+    assert capsys.readouterr().out == "found\n"
+    shown = terminal.getvalue()
+    assert shown.index("step 0") < shown.index("Placed? ") < shown.index("fit")
