@@ -1,0 +1,140 @@
+"""What the self-test of a rig measured: camera, projector, timing, focus and ambient light."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from dsl_core.model.base import Record
+
+
+class Measured(Record):
+    """A measured value and one standard deviation, both in the unit of the field that holds them."""
+
+    value: float
+    std: float = Field(ge=0)
+
+
+class CameraCheck(Record):
+    """How light becomes digital numbers, from exposure series and pairs of frames.
+
+    ``linearity_percent`` is the largest distance from a straight line for red, green and blue, in percent of
+    full scale, within the useful range: from ``black_level_dn`` to ``useful_dn``, the largest signal that no
+    pixel of the region clipped. ``intercept_dn`` is where the line meets an exposure of zero.
+    """
+
+    bit_depth: int
+    black_level_dn: Measured
+    intercept_dn: Measured
+    linearity_percent: tuple[Measured, Measured, Measured]
+    useful_dn: float
+    saturation_dn: Measured
+    electrons_per_dn: Measured
+    read_noise_dn: Measured
+    hot_share: Measured
+
+
+class RampCheck(Record):
+    """One colour ramp: the best ``black + (1 - black) * level ** gamma``, and how well it fits.
+
+    ``residual_percent`` is the rms relative distance between measured and fitted light; ``falls`` counts the
+    steps of the ramp at which more drive gave less light.
+    """
+
+    colour: Literal["white", "red", "green", "blue"]
+    gamma: Measured
+    residual_percent: Measured
+    falls: int
+
+
+class ProjectorCheck(Record):
+    """From drive level to light.
+
+    ``gamma`` is the one value for all colours that a rig holds. ``black_fraction`` is the light of a dark
+    projector as a share of white; where no pixel sees beside the projected picture, ambient light cannot be
+    told from it, and ``black_has_ambient`` says so.
+    """
+
+    ramps: tuple[RampCheck, ...]
+    gamma: Measured
+    black_fraction: Measured
+    black_has_ambient: bool
+
+
+class LatencyCheck(Record):
+    """From ``show`` to light on the sensor.
+
+    ``blocking_ms`` is how long ``show`` takes to return, ``wait_ms`` the shortest wait after it that gave the
+    new picture every time; ``stale_frames`` counts frames that showed the picture before even after the
+    longest wait while the next frame did not.
+    """
+
+    blocking_ms: Measured
+    wait_ms: Measured
+    claimed_ms: float
+    stale_frames: int
+    checked: int
+
+
+class Beat(Record):
+    """Spread over repeats at one exposure, percent of the mean: red, green, blue, and the colour ratios.
+
+    ``ratio_percent`` is the larger spread of red to green and of blue to green; ``floor_percent`` is what the
+    noise of the sensor alone gives.
+    """
+
+    exposure_ms: float
+    channels_percent: tuple[Measured, Measured, Measured]
+    ratio_percent: Measured
+    floor_percent: float
+
+
+class CycleCheck(Record):
+    """The colour cycle of the projector's light.
+
+    ``period_ms`` is None for steady light. ``modulation`` is the amplitude relative to the mean of the
+    channel that varies most; for steady light the bound that it stays below. ``shortest_ms`` is the shortest
+    exposure that holds whole cycles, ``advised_ms`` are those nearest to ``wanted_ms``.
+    """
+
+    period_ms: Measured | None
+    modulation: Measured
+    method: Literal["timestamps", "spread"]
+    shortest_ms: float
+    wanted_ms: tuple[float, ...]
+    advised_ms: tuple[float, ...]
+    beats: tuple[Beat, ...]
+
+
+class FocusCheck(Record):
+    """Blur (standard deviation) of a projected edge, camera and projector together.
+
+    ``camera_px`` and ``projector_px`` are means over the picture in pixels of either device; ``worst_px`` is
+    the largest of left, middle and right third, in projector pixels.
+    """
+
+    camera_px: Measured
+    projector_px: Measured
+    worst_px: Measured
+
+
+class AmbientCheck(Record):
+    """Light while the projector shows black, red, green, blue: DN per ms and as a share of white."""
+
+    rate_dn_per_ms: tuple[Measured, Measured, Measured]
+    share_of_white: Measured
+
+
+class SelfTest(Record):
+    """All that the self-test found, and what it took: frames, and seconds of the rig's clock."""
+
+    schema_version: Literal[1] = 1
+    camera: CameraCheck
+    projector: ProjectorCheck
+    latency: LatencyCheck
+    cycle: CycleCheck
+    focus: FocusCheck
+    ambient: AmbientCheck
+    frames: int
+    duration_s: float
