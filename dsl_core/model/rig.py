@@ -13,6 +13,7 @@ from dsl_core.model.base import Record
 from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
+from dsl_core.model.flat_field import FlatField
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.spectral import SpectralCurve
 
@@ -112,13 +113,14 @@ class Rig(Record):
 
         white_scale * s * sum_lambda response_c H sum_m efficiency_m sum_c' emission_c' P_c' d_lambda
 
-    with the shading ``s = cos(incidence) * (reference_distance_mm / distance)**2`` and the efficiency
-    of order zero equal to one by definition. ``conditions`` are the settings under which all this holds, None
-    where nobody noted them; ``calibrations`` say when each part was found and how well.
+    with the shading ``s = cos(incidence) * (reference_distance_mm / distance)**2``, times the camera's
+    relative gain if it has a ``flat_field``, and the efficiency of order zero equal to one by definition.
+    ``conditions`` are the settings under which all this holds, None where nobody noted them; ``calibrations``
+    say when each part was found and how well.
     ``residual`` corrects the columns of the grating equation; ``correspondence`` is the data-driven model.
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
-    ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that the
-    calibration leaves in every reflectance.
+    ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that
+    the calibration leaves in every reflectance.
     """
 
     schema_version: Literal[1] = 1
@@ -141,6 +143,7 @@ class Rig(Record):
     column_std_px: float = Field(default=0.02, ge=0)
     correspondence: CorrespondenceGrid | None = None
     residual: ColumnResidual | None = None
+    flat_field: FlatField | None = None
     geometry_covariance: tuple[float, ...] | None = None
     provenance: Provenance = Provenance()
     conditions: CaptureConditions | None = None

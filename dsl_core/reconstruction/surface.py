@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
+from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.pinhole import pixel_rays
 
 Map = NDArray[np.float64]
@@ -130,10 +131,10 @@ def _normals(fit: Map, unit: Map, noise: Map) -> tuple[Map, Map]:
 
 
 def _shading(rig: Rig, points: Map, normals: Map) -> tuple[Map, Map]:
-    """``cos(incidence) (reference / distance)^2`` and the tangent of the incidence."""
+    """``cos(incidence) (reference / distance)^2`` times the camera's gain; tangent of the incidence."""
     to_light = rig.pose.projector_centre_mm[:, None, None] - points
     distance = np.linalg.norm(to_light, axis=0)
     cosine = (normals * to_light).sum(0) / distance
     safe = np.clip(cosine, 0.05, 1)
-    shading = safe * (rig.reference_distance_mm / distance) ** 2
+    shading = safe * (rig.reference_distance_mm / distance) ** 2 * relative_gain(rig)
     return shading, np.sqrt(1 - safe**2) / safe

@@ -1,0 +1,64 @@
+"""The camera's gain: bilinear between nodes, and divided out of what is measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from dsl_core.model.flat_field import FlatField
+from dsl_core.model.rig import Rig
+from dsl_core.optics.flat_field import relative_gain
+from dsl_core.reconstruction.surface import reconstruct_surface
+from dsl_core.simulation.published_rig import published_rig
+
+SIZE = (45, 31)
+FIELD = FlatField(rows_px=(5.0, 25.0), columns_px=(0.0, 20.0, 44.0), gain=((0.8, 1.0, 0.9), (1.0, 1.2, 0.7)))
+
+
+def rig(field: FlatField | None) -> Rig:
+    full = published_rig()
+    return full.model_copy(update={"camera": full.camera.resized(*SIZE), "flat_field": field})
+
+
+def test_gain_is_bilinear_between_nodes_and_constant_outside() -> None:
+    gain = relative_gain(rig(FIELD))
+    assert gain.shape == SIZE[::-1]
+    assert gain[5, 20] == pytest.approx(1.0)
+    assert gain[25, 44] == pytest.approx(0.7)
+    assert gain[15, 10] == pytest.approx((0.8 + 1.0 + 1.0 + 1.2) / 4)
+    assert gain[0, 0] == pytest.approx(gain[5, 0])
+    assert gain[30, 32] == pytest.approx(gain[25, 32])
+    assert not gain.flags.writeable
+
+
+def test_a_rig_without_flat_field_sees_evenly() -> None:
+    assert np.broadcast_to(relative_gain(rig(None)), SIZE).min() == 1.0
+
+
+def test_gain_belongs_to_the_shading_of_a_surface() -> None:
+    depth = np.full(SIZE[::-1], 700.0)
+    even, uneven = (reconstruct_surface(rig(f), depth, np.full_like(depth, 0.1)) for f in (None, FIELD))
+    ratio = uneven.shading / even.shading
+    assert np.isfinite(ratio).mean() > 0.9
+    assert np.nanmax(np.abs(ratio - relative_gain(rig(FIELD)))) < 1e-12
+    assert uneven.shading_rel_std == pytest.approx(even.shading_rel_std, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"gain": ((1.0, 1.0, 1.0),)}, "2 rows of 3"),
+        ({"gain": ((1.0, 1.0, 1.0), (1.0, 0.0, 1.0))}, "above zero"),
+        ({"rows_px": (5.0, 5.0)}, "rise strictly"),
+        ({"columns_px": ()}, "at least one"),
+    ],
+)
+def test_impossible_flat_fields_are_refused(changed: dict[str, object], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        FlatField.model_validate(FIELD.model_dump() | changed)
+
+
+def test_a_rig_with_flat_field_survives_json() -> None:
+    there = rig(FIELD)
+    assert Rig.model_validate_json(there.model_dump_json()) == there
