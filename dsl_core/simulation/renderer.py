@@ -7,8 +7,9 @@ summed over spectral slices. Both use the same correspondence and response as th
 
 from __future__ import annotations
 
+import copy
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import (
     GratingModel,
     chebyshev_nodes,
@@ -55,6 +57,7 @@ class OrderTables:
     inverse: Tensor  # (DEGREE + 1, A): wavelength minus middle, as polynomial of scaled column
     limits_nm: tuple[Tensor, Tensor]  # wavelengths whose row lies inside the frame
     reach_px: tuple[Tensor, Tensor]  # smallest and largest column
+    sigma_nm: float  # projector blur in wavelength
     cumulative: Tensor  # (materials * 3 * len(NM), 2): value and forward difference, all LEDs
     slices: dict[int, Tensor]  # slice width -> (slices, LEDs, materials * 3): response between slice edges
 
@@ -63,7 +66,7 @@ class Renderer:
     """Expected signal of one scene on one rig, in DN per ms above black."""
 
     def __init__(self, rig: Rig, truth: SceneTruth, *, film: bool = True, device: str = "cpu") -> None:
-        self.rig = rig
+        self.rig = self._bare = rig
         self.device = torch.device(device)
         self.shape = truth.depth_mm.shape
         pixel, material, share = truth.parts()
@@ -76,10 +79,9 @@ class Renderer:
         w, h = rig.projector.width_px, rig.projector.height_px
         inside = (self.row > -0.5) & (self.row < h - 0.5) & (self.column > -1.5) & (self.column < w + 0.5)
         self.shading = self.shading * inside
-        reflectance = truth.materials.at(NM)
-        zero = (chain_response(rig, 0, NM)[None] * reflectance[:, None, None]).sum(-1)
-        self.zero_table = self._tensor(np.moveaxis(zero, 2, 0).reshape(3, -1))
-        self.orders = [self._order(m, depth, reflectance) for m in ORDERS] if film else []
+        self._reflectance = truth.materials.at(NM)
+        self.zero_table = self._zero_table()
+        self.orders = [self._order(m, depth) for m in ORDERS] if film else []
         halo = (
             rig.projector_response
             if film
@@ -87,6 +89,31 @@ class Renderer:
         )
         self.response = halo
         self._white: Tensor | None = None
+
+    def through(self, transmission: SpectralCurve | None) -> Renderer:
+        """The same view through a filter before the camera (None: without); the geometry is shared."""
+        other = copy.copy(self)
+        other.rig, other._white = self._bare, None
+        if transmission is not None:
+            passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
+            # On the renderer's own grid, as the rig's may be too coarse for a narrow band.
+            response = tuple(SpectralCurve.of(NM, curve.at(NM) * passed) for curve in self._bare.response)
+            other.rig = self._bare.model_copy(update={"response": response})
+        other.zero_table = other._zero_table()
+        other.orders = [replace(t, **other._spectra(t.order, t.sigma_nm)) for t in self.orders]
+        return other
+
+    def _zero_table(self) -> Tensor:
+        """Zero-order signal of each LED, (LEDs, materials * 3)."""
+        zero = (chain_response(self.rig, 0, NM)[None] * self._reflectance[:, None, None]).sum(-1)
+        return self._tensor(np.moveaxis(zero, 2, 0).reshape(3, -1))
+
+    def _spectra(self, order: int, sigma_nm: float) -> dict[str, Any]:
+        """The parts of an order's tables that depend on spectra."""
+        return {
+            "cumulative": self._cumulative(order, sigma_nm),
+            "slices": {step: self._slices(order, step) for step in (SLICE_NM, SLICE_ROWS_NM)},
+        }
 
     def _tensor(self, array: NDArray[Any], dtype: torch.dtype = torch.float32) -> Tensor:
         return torch.as_tensor(np.ascontiguousarray(array), device=self.device, dtype=dtype)
@@ -101,7 +128,7 @@ class Renderer:
         cosine = (np.nan_to_num(truth.normals) * to_light).sum(0) / distance
         return np.asarray(cosine.clip(min=0) * (self.rig.reference_distance_mm / distance) ** 2 * truth.lit)
 
-    def _order(self, order: int, depth: Tensor, reflectance: NDArray[np.float64]) -> OrderTables:
+    def _order(self, order: int, depth: Tensor) -> OrderTables:
         nodes = chebyshev_nodes(NM[0], NM[-1])
         columns, rows = GratingModel(self.rig).exact(self.pixels, depth, order, nodes)
         w, h = self.rig.projector.width_px, self.rig.projector.height_px
@@ -124,8 +151,8 @@ class Renderer:
             self._inverse(nodes, columns[:, active], middle, spread),
             limits,
             (low[active], high[active]),
-            self._cumulative(order, reflectance, sigma_nm),
-            {step: self._slices(order, reflectance, step) for step in (SLICE_NM, SLICE_ROWS_NM)},
+            sigma_nm,
+            **self._spectra(order, sigma_nm),
         )
 
     def _inverse(self, nodes: NDArray[np.float64], columns: Tensor, middle: Tensor, spread: Tensor) -> Tensor:
@@ -140,11 +167,11 @@ class Renderer:
             t = (t - (value - target) / derivative).clip(-1.3, 1.3)
         return like(np.linalg.inv(np.vander(offsets, DEGREE + 1, increasing=True)), columns) @ (150 * t)
 
-    def _cumulative(self, order: int, reflectance: NDArray[np.float64], sigma_nm: float) -> Tensor:
+    def _cumulative(self, order: int, sigma_nm: float) -> Tensor:
         """Blurred cumulative signal over wavelength and its difference, (materials * 3 * nm, 2)."""
         from scipy.ndimage import gaussian_filter1d
 
-        density = chain_response(self.rig, order, NM).sum(1)[None] * reflectance[:, None]
+        density = chain_response(self.rig, order, NM).sum(1)[None] * self._reflectance[:, None]
         blurred = gaussian_filter1d(density, sigma_nm, axis=-1, mode="nearest")
         total = np.concatenate(
             [np.zeros((*blurred.shape[:2], 1)), np.cumsum((blurred[..., 1:] + blurred[..., :-1]) / 2, -1)], -1
@@ -152,9 +179,9 @@ class Renderer:
         difference = np.diff(total, axis=-1, append=total[..., -1:])
         return self._tensor(np.stack([total, difference], -1).reshape(-1, 2))
 
-    def _slices(self, order: int, reflectance: NDArray[np.float64], step: int) -> Tensor:
+    def _slices(self, order: int, step: int) -> Tensor:
         """Signal between slice edges for each LED, (slices, LEDs, materials * 3)."""
-        density = chain_response(self.rig, order, NM)[None] * reflectance[:, None, None]
+        density = chain_response(self.rig, order, NM)[None] * self._reflectance[:, None, None]
         weight = np.ones(step + 1)
         weight[[0, -1]] = 0.5
         windows = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from dsl_core.errors import PlanError
 from dsl_core.model.board import Board, Charuco, Checkerboard
 from dsl_core.simulation import materials as spectra
 from dsl_core.simulation.options import ENDLESS, IMAGE_CENTRE_MM, check_range
-from dsl_core.simulation.surfaces import Paint, Rectangle, tilted, uniform
+from dsl_core.simulation.surfaces import Paint, tilted, turned, uniform
 from dsl_core.simulation.truth import Materials, Scene
 
 Floats = NDArray[np.float64]
@@ -51,15 +51,9 @@ def board(
     check_range("marker_mm", marker_mm, 0, 0.95 * square_mm, "mm")
     printed = printed_board(columns, rows, square_mm, marker_mm, dictionary)
     half = (0.5 * (columns + 1) * square_mm, 0.5 * (rows + 1) * square_mm)
+    size = (half[0] + margin_mm, half[1] + margin_mm)
     flat = tilted((x_mm, y_mm, depth_mm), tilt_x_deg, tilt_y_deg, ENDLESS, uniform(PAPER))
-    turn = np.radians(roll_deg)
-    sheet = Rectangle(
-        flat.centre_mm,
-        np.cos(turn) * flat.axis_u + np.sin(turn) * flat.axis_v,
-        np.cos(turn) * flat.axis_v - np.sin(turn) * flat.axis_u,
-        (half[0] + margin_mm, half[1] + margin_mm),
-        _painter(printed, half),
-    )
+    sheet = turned(replace(flat, half_size_mm=size, painter=_painter(printed, half)), roll_deg)
     # Deep enough that no corner of a tilted sheet reaches through the wall.
     reach = float(np.hypot(*sheet.half_size_mm)) * max(
         np.sin(np.radians(abs(tilt_x_deg) + abs(tilt_y_deg))), 0

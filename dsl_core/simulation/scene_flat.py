@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.simulation import materials as spectra
 from dsl_core.simulation.options import ENDLESS, IMAGE_CENTRE_MM, check_range
-from dsl_core.simulation.surfaces import Paint, tilted, uniform
+from dsl_core.simulation.surfaces import Paint, Sphere, tilted, turned, uniform
 from dsl_core.simulation.truth import Materials, Scene
 
 _STAGE_POSITIONS_MM = tuple(np.linspace(600.0, 900.0, 15).tolist())
@@ -26,6 +26,16 @@ def plane(
     surface = tilted((0.0, 0.0, depth_mm), tilt_x_deg, tilt_y_deg, ENDLESS, uniform(0))
     palette = Materials.of({"diffuser": spectra.flat(reflectance)})
     return Scene("plane", f"flat white diffuser at {depth_mm:g} mm", (surface,), palette)
+
+
+def bowed(depth_mm: float = 700.0, bow_mm: float = 1.0, reflectance: float = 0.99) -> Scene:
+    """A white diffuser that should be flat and bulges towards the camera, by ``bow_mm`` over 300 mm."""
+    check_range("depth_mm", depth_mm, 100, 5000, "mm")
+    check_range("bow_mm", bow_mm, 0.01, 50, "mm")
+    radius = 150.0**2 / (2 * bow_mm) + bow_mm / 2
+    ball = Sphere(np.array([0.0, 0.0, depth_mm + radius]), radius, uniform(0))
+    palette = Materials.of({"diffuser": spectra.flat(reflectance)})
+    return Scene("bowed", f"diffuser at {depth_mm:g} mm, bowed by {bow_mm:g} mm", (ball,), palette)
 
 
 def stage(index: int = 7, position_mm: float = math.nan) -> Scene:
@@ -51,7 +61,9 @@ def patch_grid(columns: int, rows: int, pitch_mm: float, size_mm: float, frame: 
     return paint
 
 
-def color_checker(depth_mm: float = 700.0, tilt_x_deg: float = 0.0, tilt_y_deg: float = 0.0) -> Scene:
+def color_checker(
+    depth_mm: float = 700.0, tilt_x_deg: float = 0.0, tilt_y_deg: float = 0.0, roll_deg: float = 0.0
+) -> Scene:
     """The 24 patches of the classic Color Checker (BabelColor average) in a dark frame before a wall."""
     check_range("depth_mm", depth_mm, 300, 2000, "mm")
     check_range("tilt_x_deg", tilt_x_deg, -45, 45, "degrees")
@@ -61,7 +73,9 @@ def color_checker(depth_mm: float = 700.0, tilt_x_deg: float = 0.0, tilt_y_deg: 
     palette = Materials.of({**patches, **around}, tuple(around))
     frame, wall = len(patches), len(patches) + 1
     painter = patch_grid(6, 4, 52.0, 44.0, frame)
-    chart = tilted((*IMAGE_CENTRE_MM, depth_mm), tilt_x_deg, tilt_y_deg, (161.0, 109.0), painter)
+    check_range("roll_deg", roll_deg, -180, 180, "degrees")
+    flat = tilted((*IMAGE_CENTRE_MM, depth_mm), tilt_x_deg, tilt_y_deg, (161.0, 109.0), painter)
+    chart = turned(flat, roll_deg)
     behind = tilted((0.0, 0.0, depth_mm + 80.0), 0.0, 0.0, ENDLESS, uniform(wall))
     return Scene("color-checker", f"Color Checker at {depth_mm:g} mm", (chart, behind), palette)
 

@@ -16,6 +16,7 @@ Option = str | float | int
 
 _BUILDERS: dict[str, Callable[..., Scene]] = {
     "plane": scene_flat.plane,
+    "bowed": scene_flat.bowed,
     "stage": scene_flat.stage,
     "steps": scene_solid.steps,
     "sphere": scene_solid.sphere,

@@ -19,11 +19,17 @@ from dsl_core.devices.base import (
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.simulation.bandpass_filters import measured_transmissions
+from dsl_core.simulation.placing import Mishaps, TwinHand
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
 from dsl_core.simulation.scenes import make_scene
-from dsl_core.simulation.world import Clock, World
+from dsl_core.simulation.spot import spot_light
+from dsl_core.simulation.world import AMBIENT_DN_PER_MS, Clock, World
 
 LATENCY_MS = 50.0
+#: What the projector says of its frames, whatever its LEDs do.
+CLAIMED_PERIOD_MS = 1000.0 / 60.0
 EXPOSURE_RANGE_MS = (0.019, 30_000.0)
 STAGE_RANGE_MM = (500.0, 1000.0)
 #: Scenes that a stage can carry towards and away from the camera.
@@ -39,8 +45,8 @@ class SimCamera(Camera):
         self._shot, self._attempt, self._frame_id = -1, 0, 0
         lens, sensor = world.rig.camera, world.rig.sensor
         self._info = CameraInfo(
-            "twin of GS3-U3-32S4C", "TWIN-C", lens.width_px, lens.height_px, sensor.bayer, sensor.bit_depth,
-            EXPOSURE_RANGE_MS,
+            "twin of GS3-U3-32S4C", world.rig.provenance.camera_serial or "TWIN-C", lens.width_px,
+            lens.height_px, sensor.bayer, sensor.bit_depth, EXPOSURE_RANGE_MS,
         )  # fmt: skip
 
     @property
@@ -67,6 +73,8 @@ class SimCamera(Camera):
         """Expose and return the frame."""
         world = self.world
         pixels = world.expose(self._exposure_ms, self._shot + 1, self._attempt)
+        # Whoever looks twice without announcing a shot sees other noise.
+        self._attempt += 1
         world.clock.wait(self._exposure_ms / 1000)
         self._frame_id += 1
         return Frame(pixels, self._exposure_ms, world.clock.now_s, self._frame_id)
@@ -79,8 +87,9 @@ class SimProjector(Projector):
         self.world = world
         lens = world.rig.projector
         self._info = ProjectorInfo(
-            "twin of PH30N", "TWIN-P", lens.width_px, lens.height_px, LATENCY_MS, world.rig.frame_period_ms
-        )
+            "twin of PH30N", world.rig.provenance.projector_serial or "TWIN-P", lens.width_px, lens.height_px,
+            LATENCY_MS, CLAIMED_PERIOD_MS,
+        )  # fmt: skip
 
     @property
     def info(self) -> ProjectorInfo:
@@ -127,9 +136,10 @@ class SimStage(Stage):
 
 
 class SimSpectroradiometer(Spectroradiometer):
-    """Measures the spot in the middle of the camera's view under the mean light of the picture shown.
+    """Measures the spot in the middle of the camera's view, over whole LED cycles.
 
-    The scale is that of the rig's emission curves, not absolute; ``NOISE`` is relative to the peak.
+    Through the film it sees the first orders of other columns too. The scale is that of the rig's emission
+    curves, not absolute; ``NOISE`` is relative to the peak.
     """
 
     NOISE = 0.002
@@ -145,12 +155,7 @@ class SimSpectroradiometer(Spectroradiometer):
         spot = (truth.depth_mm.shape[0] // 2, truth.depth_mm.shape[1] // 2)
         material = int(truth.material[spot])
         reflectance = truth.materials.reflectance[material] if material >= 0 else np.zeros(len(nm))
-        # Grey images drive the three LEDs alike.
-        shown = np.zeros((1, 1, 1), np.uint8) if world.image is None else np.atleast_3d(world.image)
-        light = np.broadcast_to(world.rig.projector_response.radiance(shown / 255).mean((0, 1)), 3)
-        value = reflectance * sum(
-            w * curve.at(nm) for w, curve in zip(light, world.rig.emission, strict=True)
-        )
+        value = reflectance * spot_light(world, spot, nm)
         if world.noise:
             self._count += 1
             rng = np.random.Generator(np.random.SFC64([world.seed, 1 << 20, self._count]))
@@ -164,19 +169,34 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     ``scene`` (default ``color-checker``) and its own options, ``size`` (``890x580``), ``seed``, ``noise``
     (``on``, ``off``), ``sigma`` (extra Gaussian noise as a share of full scale, known to the calibration),
     ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``), ``realtime`` (``on`` waits as long as real
-    devices would). Raises `DeviceError` for a value that makes no sense.
+    devices would).
+
+    For calibrations: ``truth`` (a number draws a rig around the published one, whose calibration nobody
+    knows), ``led_cycle_hz`` (the LEDs flash in turn instead of shining steadily), ``ambient_dn_per_ms``. For
+    mishaps: ``defocus_px``, ``wrong_filter_nm``, ``filter_tilt_deg``, ``bow_mm``, ``stage_scale``,
+    ``chart_roll_deg``.
+
+    Raises `DeviceError` for a value that makes no sense.
     """
     rest = dict(options)
-    rig = published_rig()
+    nominal = rig = published_rig()
     size = rest.pop("size", "")
     if size:
-        rig = rig.model_copy(update={"camera": rig.camera.resized(*_size(size))})
+        nominal = rig = rig.model_copy(update={"camera": rig.camera.resized(*_size(size))})
+    truth = rest.pop("truth", None)
+    drawn = 0 if truth is None else int(_number("truth", truth))
+    if truth is not None:
+        rig = random_rig(drawn, rig)
+    cycle_hz = _number("led_cycle_hz", rest.pop("led_cycle_hz", "0"))
+    if cycle_hz:
+        rig = rig.model_copy(update={"frame_period_ms": 1000.0 / cycle_hz})
     sigma = _number("sigma", rest.pop("sigma", "0"))
     if sigma:
         noise_dn = np.hypot(rig.sensor.read_noise_dn, sigma * rig.sensor.full_scale_dn)
         rig = rig.model_copy(
             update={"sensor": rig.sensor.model_copy(update={"read_noise_dn": float(noise_dn)})}
         )
+    mishaps = _mishaps(rest)
     name = rest.pop("scene", "color-checker")
     world = World(
         rig,
@@ -185,6 +205,9 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         noise=_switch("noise", rest.pop("noise", "on")),
         film=_switch("film", rest.pop("film", "on")),
         device=rest.pop("device", "cpu"),
+        ambient_dn_per_ms=_number("ambient_dn_per_ms", rest.pop("ambient_dn_per_ms", str(AMBIENT_DN_PER_MS))),
+        led_cycle_ms=1000.0 / cycle_hz if cycle_hz else None,
+        defocus_px=_number("defocus_px", rest.pop("defocus_px", "0")),
         clock=Clock(sleep=time.sleep) if _switch("realtime", rest.pop("realtime", "off")) else Clock(),
     )
     if name in STAGED:
@@ -192,7 +215,24 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **rest)
     # Built once now, so that a wrong name or option is told before anything is captured.
     world.scene_at(world.position_mm)
-    return assemble(world)
+    devices = assemble(world)
+    devices.nominal, devices.filters = nominal, measured_transmissions(drawn)
+    devices.place = TwinHand(world, drawn, mishaps)
+    if truth is not None:
+        devices.calibration = None
+    return devices
+
+
+def _mishaps(options: dict[str, str]) -> Mishaps:
+    """Take the options of mishaps out of all options."""
+    wrong = options.pop("wrong_filter_nm", None)
+    return Mishaps(
+        None if wrong is None else _number("wrong_filter_nm", wrong),
+        _number("filter_tilt_deg", options.pop("filter_tilt_deg", "0")),
+        _number("bow_mm", options.pop("bow_mm", "0")),
+        _number("stage_scale", options.pop("stage_scale", "1")),
+        _number("chart_roll_deg", options.pop("chart_roll_deg", "0")),
+    )
 
 
 def assemble(world: World) -> DeviceRig:

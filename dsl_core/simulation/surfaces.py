@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -93,6 +93,16 @@ def tilted(
     axis_u = np.array([np.cos(b), 0.0, np.sin(b)])
     axis_v = np.array([-np.sin(a) * np.sin(b), np.cos(a), np.sin(a) * np.cos(b)])
     return Rectangle(np.array(centre_mm, float), axis_u, axis_v, half_size_mm, painter)
+
+
+def turned(flat: Rectangle, roll_deg: float) -> Rectangle:
+    """A rectangle turned in its own plane, clockwise as the camera sees it."""
+    turn = np.radians(roll_deg)
+    return replace(
+        flat,
+        axis_u=np.cos(turn) * flat.axis_u + np.sin(turn) * flat.axis_v,
+        axis_v=np.cos(turn) * flat.axis_v - np.sin(turn) * flat.axis_u,
+    )
 
 
 @dataclass(frozen=True)

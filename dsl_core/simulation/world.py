@@ -9,10 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.led_cycle import led_weights
 from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread
+
+#: Largest delay between asking the camera for an exposure and its start, ms, where it matters.
+JITTER_MS = 1.0
+#: Light of a darkened room.
+AMBIENT_DN_PER_MS = 0.002
 
 
 @dataclass
@@ -28,12 +35,22 @@ class Clock:
         self.sleep(seconds)
 
 
+def _only(led: int) -> Callable[[NDArray[np.uint8]], NDArray[np.uint8]]:
+    """Takes the other LEDs out of an image."""
+    kept = (np.arange(3) == led).astype(np.uint8)
+    return lambda image: image * kept
+
+
 @dataclass
 class World:
     """State shared by the simulated devices.
 
-    ``scene_at`` gives the scene for a stage position (mm). Noise depends only on the seed, the shot and
-    the attempt, never on what was captured before, so that an interrupted scan continues bit for bit.
+    ``scene_at`` gives the scene for a stage position (mm). ``filter`` stands before the camera. Noise depends
+    only on the seed, on what stands where (``noise_key``), on the shot and the attempt, never on what was
+    captured before, so that an interrupted scan continues bit for bit.
+
+    With ``led_cycle_ms`` the projector flashes its LEDs one after the other, running freely on the world's
+    clock; None is steady light. Light of a dark projector is taken as steady.
     """
 
     rig: Rig
@@ -41,23 +58,43 @@ class World:
     position_mm: float = 700.0
     seed: int = 0
     noise: bool = True
-    ambient_dn_per_ms: float = 0.002
+    ambient_dn_per_ms: float = AMBIENT_DN_PER_MS
     film: bool = True
+    filter: SpectralCurve | None = None
+    led_cycle_ms: float | None = None
+    defocus_px: float = 0.0
+    noise_key: tuple[int, ...] = ()
     device: str = "cpu"
     clock: Clock = field(default_factory=Clock)
     image: NDArray[np.uint8] | None = None
     _truth: SceneTruth | None = None
+    _bare: Renderer | None = None
     _renderer: Renderer | None = None
-    _rate: NDArray[np.float32] | None = None
+    _rates: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def show(self, image: NDArray[np.uint8]) -> None:
         """Change what the projector shows."""
-        self.image, self._rate = image.copy(), None
+        self.image, self._rates = image.copy(), {}
 
     def move_to(self, position_mm: float) -> None:
         """Move the stage; the scene changes with it."""
         if position_mm != self.position_mm:
-            self.position_mm, self._truth, self._renderer, self._rate = position_mm, None, None, None
+            self.position_mm = position_mm
+            self._forget()
+
+    def place(self, scene_at: Callable[[float], Scene], position_mm: float) -> None:
+        """Put another scene before the camera."""
+        self.scene_at, self.position_mm = scene_at, position_mm
+        self._forget()
+
+    def insert(self, film: bool, filter: SpectralCurve | None) -> None:
+        """Change what is in the beams; a new filter costs far less than a new film."""
+        if film != self.film:
+            self.film, self._bare = film, None
+        self.filter, self._renderer, self._rates = filter, None, {}
+
+    def _forget(self) -> None:
+        self._truth, self._bare, self._renderer, self._rates = None, None, None, {}
 
     @property
     def truth(self) -> SceneTruth:
@@ -73,20 +110,57 @@ class World:
         """Renderer of the scene as it stands."""
         if self._renderer is None:
             with one_kernel_thread():
-                self._renderer = Renderer(self.rig, self.truth, film=self.film, device=self.device)
+                if self._bare is None:
+                    self._bare = Renderer(self.rig, self.truth, film=self.film, device=self.device)
+                self._renderer = self._bare.through(self.filter) if self.filter else self._bare
         return self._renderer
 
     def rate(self) -> NDArray[np.float32]:
         """Expected signal of the camera for the pattern shown, DN per ms, shape (rows, columns)."""
-        if self._rate is None:
+        return self._rendered("all", lambda image: image)
+
+    def _rendered(
+        self, key: str, choose: Callable[[NDArray[np.uint8]], NDArray[np.uint8]]
+    ) -> NDArray[np.float32]:
+        """Expected signal of a part of the pattern shown, ambient light included; kept until it changes."""
+        if key not in self._rates:
             shape = (self.rig.projector.height_px, self.rig.projector.width_px, 3)
-            image = np.zeros(shape, np.uint8) if self.image is None else self.image
+            image = (
+                np.zeros(shape, np.uint8) if self.image is None else np.broadcast_to(self._colour(), shape)
+            )
             with one_kernel_thread():
-                self._rate = self.renderer.expected(image) + np.float32(self.ambient_dn_per_ms)
-        return self._rate
+                rate = self.renderer.expected(choose(image)) + np.float32(self.ambient_dn_per_ms)
+            if self.defocus_px:
+                from scipy.ndimage import gaussian_filter
+
+                rate = gaussian_filter(rate, self.defocus_px, mode="nearest")
+            self._rates[key] = rate
+        return self._rates[key]
+
+    def _colour(self) -> NDArray[np.uint8]:
+        assert self.image is not None
+        return self.image if self.image.ndim == 3 else self.image[..., None]
+
+    def _noise_key(self) -> tuple[int, ...]:
+        """What stands where, once something was placed; a moved stage counts."""
+        return (*self.noise_key, round(1000 * self.position_mm)) if self.noise_key else ()
+
+    def _light(self, exposure_ms: float, jitter_ms: float) -> NDArray[np.float32]:
+        """Expected signal of an exposure that starts now, DN per ms."""
+        if self.led_cycle_ms is None:
+            return self.rate()
+        weights = led_weights(1000 * self.clock.now_s + jitter_ms, exposure_ms, self.led_cycle_ms)
+        if (weights == 1).all():
+            return self.rate()
+        dark = self._rendered("dark", np.zeros_like)
+        light = dark.copy()
+        for led, weight in enumerate(weights):
+            light += np.float32(weight) * (self._rendered(f"LED {led}", _only(led)) - dark)
+        return light
 
     def expose(self, exposure_ms: float, shot: int, attempt: int = 0) -> NDArray[np.uint16]:
         """Raw mosaic of one exposure."""
-        signal = self.rate() * np.float32(exposure_ms)
-        rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt])) if self.noise else None
-        return digitise(self.rig.sensor, signal, rng)
+        rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt, *self._noise_key()]))
+        jitter_ms = JITTER_MS * rng.random() if self.led_cycle_ms else 0.0
+        signal = self._light(exposure_ms, jitter_ms) * np.float32(exposure_ms)
+        return digitise(self.rig.sensor, signal, rng if self.noise else None)

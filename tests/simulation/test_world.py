@@ -181,7 +181,7 @@ def test_stage_moves_the_plane_and_dims_it() -> None:
 
 @pytest.mark.parametrize("grey", [True, False])
 def test_spectroradiometer_sees_the_leds_through_the_target(grey: bool) -> None:
-    rig = open_small(noise="off")
+    rig = open_small(noise="off", film="off")
     meter = rig.spectroradiometer
     assert isinstance(meter, SimSpectroradiometer)
     dark = np.array(meter.measure().values)
@@ -192,6 +192,20 @@ def test_spectroradiometer_sees_the_leds_through_the_target(grey: bool) -> None:
     assert np.array(curve.values) == pytest.approx(0.99 * emission, rel=1e-6)
     black = published_rig().projector_response.black_fraction
     assert dark == pytest.approx(black * np.array(curve.values), rel=1e-6)
+
+
+def test_spectroradiometer_sees_first_orders_through_the_film() -> None:
+    curves = {}
+    for film in ("on", "off"):
+        rig = open_small(noise="off", film=film)
+        assert rig.spectroradiometer is not None
+        rig.projector.show(np.full((360, 640), 255, np.uint8))
+        curves[film] = rig.spectroradiometer.measure()
+    nm = np.array([450.0, 550.0])
+    gain = curves["on"].at(nm) / curves["off"].at(nm) - 1
+    efficiency = published_rig().efficiency
+    assert (gain > 0.5 * efficiency[-1].at(nm)).all()
+    assert (gain < 1.01 * (efficiency[1].at(nm) + efficiency[-1].at(nm))).all()
 
 
 def test_spectroradiometer_noise_is_a_share_of_the_peak() -> None:

@@ -1,0 +1,84 @@
+"""The twin's hand: puts targets, film and filters where a calibration asks for them."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from dsl_core.errors import DeviceError
+from dsl_core.model.placement import Placement
+from dsl_core.simulation.bandpass_filters import true_transmission
+from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.truth import Scene
+from dsl_core.simulation.world import World
+
+#: Where a stage stands when nothing is asked.
+STAGE_MM = 700.0
+
+
+@dataclass(frozen=True)
+class Mishaps:
+    """What a person might do wrong, for trying how calibrations notice.
+
+    ``wrong_filter_nm`` is in the beam whichever was asked for; filters are tilted by ``filter_tilt_deg``;
+    diffusers bulge by ``bow_mm`` over 300 mm; the stage moves ``stage_scale`` times as far from 700 mm as it
+    says; a chart is turned by ``roll_deg`` more than asked.
+    """
+
+    wrong_filter_nm: float | None = None
+    filter_tilt_deg: float = 0.0
+    bow_mm: float = 0.0
+    stage_scale: float = 1.0
+    roll_deg: float = 0.0
+
+
+@dataclass
+class TwinHand:
+    """Does for the twin what instructions ask of a person; ``filter_seed`` draws the set of filters."""
+
+    world: World
+    filter_seed: int = 0
+    mishaps: Mishaps = Mishaps()
+    _standing: tuple[str, dict[str, float | str]] | None = None
+
+    def __call__(self, placement: Placement) -> None:
+        """Place a target; raises `DeviceError` or `PlanError` for one that there is not."""
+        label = placement.filter_nm
+        if label is not None and self.mishaps.wrong_filter_nm is not None:
+            label = self.mishaps.wrong_filter_nm
+        tilt = self.mishaps.filter_tilt_deg
+        curve = None if label is None else true_transmission(float(label), self.filter_seed, tilt)
+        if placement.target != "as it is":
+            scene_at, position = self._scene(placement)
+            asked = (placement.target, dict(placement.options))
+            if asked != self._standing:
+                # Made once before anything moves, so that an impossible scene changes nothing.
+                scene_at(position)
+                self.world.place(scene_at, position)
+                self._standing = asked
+            self.world.move_to(position)
+        self.world.insert(placement.film, curve)
+        self.world.noise_key = (zlib.crc32(placement.model_dump_json().encode()),)
+
+    def _scene(self, placement: Placement) -> tuple[Callable[[float], Scene], float]:
+        """The scene at each stage position, and the position asked for."""
+        options = dict(placement.options)
+        match placement.target:
+            case "nothing":
+                return lambda position_mm: make_scene("plane", depth_mm=5000.0, reflectance=0.0), STAGE_MM
+            case "spectralon":
+                position = float(options.pop("depth_mm", STAGE_MM))
+                return lambda position_mm: self._diffuser(position_mm, options), position
+            case "color-checker":
+                turn = (float(options.pop("roll_deg", 0.0)) + self.mishaps.roll_deg + 180) % 360 - 180
+                return lambda position_mm: make_scene("color-checker", roll_deg=turn, **options), STAGE_MM
+            case "board":
+                return lambda position_mm: make_scene("board", **options), STAGE_MM
+        raise DeviceError(f"The twin has no target {placement.target!r}.")
+
+    def _diffuser(self, position_mm: float, options: dict[str, float | str]) -> Scene:
+        depth = STAGE_MM + (position_mm - STAGE_MM) * self.mishaps.stage_scale
+        if self.mishaps.bow_mm:
+            return make_scene("bowed", depth_mm=depth, bow_mm=self.mishaps.bow_mm)
+        return make_scene("plane", depth_mm=depth, **options)

@@ -1,0 +1,171 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError
+from dsl_core.model.placement import Placement
+from dsl_core.patterns.trial_pictures import trial_picture
+from dsl_core.simulation.bandpass_filters import LABELS_NM, true_transmission
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
+from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from dsl_core.simulation.world import World
+
+PLANE = Placement(target="spectralon", options={"depth_mm": 650.0})
+
+
+def twin(**options: str) -> tuple[DeviceRig, World]:
+    rig = open_twin({"size": "89x58", "noise": "off", **options})
+    assert isinstance(rig.camera, SimCamera)
+    assert rig.place is not None
+    return rig, rig.camera.world
+
+
+def place(rig: DeviceRig, placement: Placement) -> None:
+    assert rig.place is not None
+    rig.place(placement)
+
+
+def shine(rig: DeviceRig, exposure_ms: float = 500 / 3) -> np.ndarray:
+    rig.projector.show(trial_picture("white", (640, 360), 0.5))
+    rig.camera.configure(exposure_ms)
+    return rig.camera.snap().pixels.astype(float) - 260
+
+
+def test_targets_stand_where_they_are_asked() -> None:
+    rig, world = twin()
+    place(rig, PLANE)
+    assert world.truth.depth_mm == pytest.approx(650.0)
+    place(rig, Placement(target="board", options={"depth_mm": 720.0, "roll_deg": 20.0}))
+    assert "board" in world.scene_at(0).name
+    place(rig, Placement(target="nothing"))
+    assert shine(rig).max() < 5
+
+
+def test_the_stage_moves_a_diffuser_that_was_placed() -> None:
+    rig, world = twin()
+    place(rig, PLANE)
+    assert rig.stage is not None
+    rig.stage.move_to(800.0)
+    assert world.truth.depth_mm == pytest.approx(800.0)
+    place(rig, PLANE)
+    assert world.truth.depth_mm == pytest.approx(650.0)
+
+
+def test_a_filter_passes_its_band_only() -> None:
+    rig, _ = twin()
+    place(rig, PLANE)
+    bare = shine(rig)
+    signals = {}
+    for label in (450.0, 640.0):
+        place(rig, Placement(filter_nm=label))
+        signals[label] = shine(rig)
+    green, red, blue = (0, 1), (0, 0), (1, 1)
+    assert signals[450.0][blue] > 5 * signals[450.0][red]
+    assert signals[640.0][red] > 5 * signals[640.0][blue]
+    assert signals[450.0][green] < bare[green]
+    place(rig, Placement())
+    assert np.array_equal(shine(rig), bare)
+
+
+def test_a_view_through_a_filter_equals_one_made_for_it() -> None:
+    _, world = twin(scene="plane")
+    transmission = true_transmission(540.0)
+    nm = np.arange(390.0, 711.0)
+    response = tuple(
+        type(curve).of(nm, curve.at(nm) * transmission.at(nm)) for curve in published_rig().response
+    )
+    made = Renderer(world.rig.model_copy(update={"response": response}), world.truth)
+    pattern = np.zeros((360, 640, 3), np.uint8)
+    pattern[:, 300:305] = 204
+    seen = world.renderer.through(transmission).expected(pattern)
+    assert seen == pytest.approx(made.expected(pattern), rel=2e-3, abs=1e-7)
+
+
+def test_an_unknown_filter_is_told() -> None:
+    rig, _ = twin()
+    with pytest.raises(DeviceError, match="none of 435 nm"):
+        place(rig, Placement(filter_nm=435.0))
+
+
+def test_labels_are_not_the_truth_but_traces_are_near_it() -> None:
+    rig, _ = twin(truth="3")
+    assert sorted(rig.filters) == list(LABELS_NM)
+    off = []
+    for label, trace in rig.filters.items():
+        nm, measured = np.array(trace.wavelengths_nm), np.array(trace.values)
+        true = np.array(true_transmission(label, 3).values)
+        assert np.abs(measured - true).max() < 0.01
+        off.append(float((nm * measured).sum() / measured.sum()) - label)
+    assert 0.5 < np.std(off) < 2
+
+
+def test_noise_differs_between_placements_and_repeats_exactly() -> None:
+    frames = {}
+    for key in ("a", "b"):
+        rig, _ = twin(noise="on", scene="plane")
+        for placement in (PLANE, Placement(filter_nm=540.0)):
+            place(rig, placement)
+            rig.projector.show(trial_picture("black", (640, 360)))
+            rig.camera.prepare(5)
+            frames[key, placement.filter_nm] = rig.camera.snap().pixels
+    assert np.array_equal(frames["a", None], frames["b", None])
+    assert not np.array_equal(frames["a", None], frames["a", 540.0])
+
+
+def test_looking_twice_without_a_shot_gives_other_noise() -> None:
+    rig, _ = twin(noise="on", scene="plane")
+    first, second = rig.camera.snap().pixels, rig.camera.snap().pixels
+    assert not np.array_equal(first, second)
+
+
+def test_a_drawn_rig_is_unknown_and_repeatable() -> None:
+    rig, world = twin(truth="4")
+    assert rig.calibration is None
+    assert rig.nominal is not None
+    assert world.rig == random_rig(4, rig.nominal)
+    assert world.rig != random_rig(5, rig.nominal)
+    assert 470 <= world.rig.film.lines_per_mm <= 510
+    ratio = world.rig.response[1].at(550) / rig.nominal.response[1].at(550)
+    assert 0.8 < float(ratio) < 1.2
+
+
+@pytest.mark.parametrize(
+    ("mishap", "value"), [("stage_scale", "1.1"), ("bow_mm", "2"), ("filter_tilt_deg", "20")]
+)
+def test_mishaps_happen(mishap: str, value: str) -> None:
+    good, bad = twin(scene="plane"), twin(scene="plane", **{mishap: value})
+    for rig, _ in (good, bad):
+        place(rig, Placement(target="spectralon", filter_nm=540.0, options={"depth_mm": 600.0}))
+    if mishap == "filter_tilt_deg":
+        assert not np.allclose(shine(good[0]), shine(bad[0]), rtol=0.02)
+    else:
+        assert np.abs(good[1].truth.depth_mm - bad[1].truth.depth_mm).max() > 1
+
+
+def test_a_wrong_filter_is_in_the_beam() -> None:
+    wrong, right = twin(wrong_filter_nm="640"), twin()
+    place(wrong[0], PLANE.model_copy(update={"filter_nm": 450.0}))
+    place(right[0], PLANE.model_copy(update={"filter_nm": 640.0}))
+    assert np.array_equal(shine(wrong[0]), shine(right[0]))
+
+
+def test_a_chart_can_hang_upside_down() -> None:
+    rig, world = twin(chart_roll_deg="180")
+    place(rig, Placement(target="color-checker"))
+    turned = world.truth.material
+    place(rig, Placement(target="color-checker", options={"roll_deg": 180.0}))
+    upright = world.truth.material
+    assert world.truth.materials.names[upright[14, 22]] == world.truth.materials.names[turned[43, 66]]
+
+
+def test_defocus_softens_what_is_seen() -> None:
+    rows = {}
+    for defocus in ("0", "3"):
+        rig, world = twin(defocus_px=defocus)
+        rig.projector.show(trial_picture("white", (640, 360)))
+        rows[defocus] = np.abs(np.diff(world.rate(), axis=0)[:, ::2]).max()
+    assert rows["3"] < 0.5 * rows["0"]
