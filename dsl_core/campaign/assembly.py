@@ -21,9 +21,9 @@ from dsl_core.model.rig import Provenance, Rig
 Accepted = Mapping[str, AcceptedCalibration]
 
 
-def all_recipes() -> tuple[Recipe, ...]:
-    """Every calibration of this installation with its default settings, in order."""
-    return tuple(load_recipe(name) for name in recipe_names())
+def campaign_recipes(campaign: CampaignFolder) -> tuple[Recipe, ...]:
+    """Every calibration of this installation with the campaign's settings, in order."""
+    return tuple(load_recipe(name, campaign.info.settings.get(name)) for name in recipe_names())
 
 
 def accepted_calibrations(campaign: CampaignFolder, recipes: Sequence[Recipe]) -> Accepted:
@@ -76,14 +76,13 @@ def apply_records(accepted: Accepted, nominal: Rig, recipes: Sequence[Recipe]) -
 def assemble(
     accepted: Accepted,
     nominal: Rig,
-    recipes: Sequence[Recipe] | None = None,
+    recipes: Sequence[Recipe],
     name: str = "",
 ) -> Rig:
     """The calibrated rig: what was found, under which conditions, when, and how well.
 
     Raises `CalibrationError` as `apply_records` does, and when nothing was accepted at all.
     """
-    recipes = all_recipes() if recipes is None else recipes
     if not accepted:
         raise CalibrationError("No calibration was accepted yet, so there is no rig to assemble. Calibrate.")
     rig = apply_records(accepted, nominal, recipes)

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
-from dsl_core.campaign.assembly import accepted_calibrations, all_recipes, assemble, nominal_rig
+from dsl_core.campaign.assembly import accepted_calibrations, assemble, campaign_recipes, nominal_rig
 from dsl_core.campaign.recipe import Recipe, Step
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.base import DeviceRig
@@ -80,20 +80,18 @@ def calibrate_all(
     guide: Guide,
     progress: Progress,
     name: str = "",
-    recipe_of: Callable[[str], Recipe] | None = None,
     recipes: Sequence[Recipe] | None = None,
     stage: Callable[[str], AbstractContextManager[None]] | None = None,
 ) -> Rig:
     """Run every calibration in order and assemble the rig; goes on where it was interrupted.
 
-    ``recipe_of`` makes the recipe of a name with the campaign's settings, ``recipes`` are all of them.
-    ``stage`` surrounds each calibration under its title, to measure it.
+    ``recipes`` are all calibrations, those of this installation if not given; ``stage`` surrounds each one
+    under its title, to measure it.
     """
-    recipes = all_recipes() if recipes is None else recipes
+    recipes = campaign_recipes(campaign) if recipes is None else recipes
     for recipe in recipes:
-        chosen = recipe if recipe_of is None else recipe_of(recipe.name)
-        with stage(chosen.title) if stage else nullcontext():
-            run_calibration(CalibrationSession(chosen, devices, campaign, recipes), guide, progress)
+        with stage(recipe.title) if stage else nullcontext():
+            run_calibration(CalibrationSession(recipe, devices, campaign, recipes), guide, progress)
     return calibrated_rig(campaign, devices, name, recipes)
 
 
@@ -101,7 +99,7 @@ def calibrated_rig(
     campaign: CampaignFolder, devices: DeviceRig, name: str = "", recipes: Sequence[Recipe] | None = None
 ) -> Rig:
     """The rig as far as a campaign has calibrated it; raises `CalibrationError` when nothing is accepted."""
-    recipes = all_recipes() if recipes is None else recipes
+    recipes = campaign_recipes(campaign) if recipes is None else recipes
     accepted = accepted_calibrations(campaign, recipes)
     return assemble(accepted, nominal_rig(devices), recipes, name or campaign.path.name)
 

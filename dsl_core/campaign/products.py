@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.campaign.assembly import accepted_calibrations, all_recipes
+from dsl_core.campaign.assembly import accepted_calibrations, campaign_recipes
 from dsl_core.campaign.recipe import Recipe
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import save_rig
@@ -41,7 +41,7 @@ def write_products(
 
     A rig that equals the library's current one but for its date is not stored a second time.
     """
-    recipes = all_recipes() if recipes is None else recipes
+    recipes = campaign_recipes(campaign) if recipes is None else recipes
     accepted = tuple(accepted_calibrations(campaign, recipes).values())
     history = tuple(old for recipe in recipes for old in campaign.history(recipe.name))
     path = save_rig(rig, campaign.path / RIG_NAME, overwrite=True)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, get_origin, get_type_hints
 
 from dsl_core.campaign.recipe import Recipe
 from dsl_core.errors import CalibrationError
@@ -36,18 +37,12 @@ def load_recipe(name: str, settings: Mapping[str, str] | None = None) -> Recipe:
     return recipe
 
 
-def setting_names(name: str) -> tuple[str, ...]:
-    """The settings of a calibration."""
-    kind = getattr(importlib.import_module(_module(name)), _CLASSES[name])
-    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else ()
-
-
 def _module(name: str) -> str:
     return f"dsl_core.campaign.{name.replace('-', '_')}"
 
 
 def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
-    """A recipe from texts: JSON values, comma lists for tuples, plain words."""
+    """A recipe from texts, each read as `_value` does; a lone value serves where several are wanted."""
     from pydantic import TypeAdapter, ValidationError
 
     known = {field.name for field in fields(kind)} if is_dataclass(kind) else set()
@@ -59,7 +54,12 @@ def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
     if not settings:
         return kind()
     try:
-        return TypeAdapter(kind).validate_python({key: _value(text) for key, text in settings.items()})
+        types = get_type_hints(kind)
+        values = {key: _value(text) for key, text in settings.items()}
+        for key, value in values.items():
+            if get_origin(types[key]) is tuple and not isinstance(value, list):
+                values[key] = [value]
+        return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
@@ -67,13 +67,16 @@ def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
 
 
 def _value(text: str) -> Any:
-    """JSON where it is JSON, a list where there are commas, else the text itself.
+    """JSON where it is JSON, a list where there are commas or START:STOP:STEP, else the text itself.
 
-    >>> _value("430,450"), _value("0.99"), _value("center")
-    ([430, 450], 0.99, 'center')
+    >>> _value("430,450"), _value("430:450:10"), _value("0.99"), _value("center")
+    ([430, 450], [430.0, 440.0, 450.0], 0.99, 'center')
     """
     import json
 
+    if re.fullmatch(r"[\d.]+:[\d.]+:[\d.]+", text):
+        start, stop, step = (float(part) for part in text.split(":"))
+        return [start + step * i for i in range(int((stop - start) / step + 1.001))] if step > 0 else text
     try:
         return json.loads(text)
     except ValueError:

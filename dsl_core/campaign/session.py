@@ -15,8 +15,8 @@ from typing import Literal
 
 from dsl_core.campaign.assembly import (
     accepted_calibrations,
-    all_recipes,
     apply_records,
+    campaign_recipes,
     nominal_rig,
     record_of,
     require_needs,
@@ -68,7 +68,7 @@ class CalibrationSession:
         when nothing is known of the rig to start from.
         """
         self.recipe, self.devices, self.campaign = recipe, devices, campaign
-        recipes = all_recipes() if recipes is None else recipes
+        recipes = campaign_recipes(campaign) if recipes is None else recipes
         names = [each.name for each in recipes]
         before = recipes[: names.index(recipe.name)] if recipe.name in names else recipes
         accepted = accepted_calibrations(campaign, before)

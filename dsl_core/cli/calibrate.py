@@ -130,6 +130,9 @@ def all_(
     campaign: Campaign,
     rig: CampaignRig = None,
     option: RigOptions = [],  # noqa: B006
+    set_: Annotated[
+        list[str], typer.Option("--set", help="Setting as CALIBRATION.key=value; may be repeated.")
+    ] = [],  # noqa: B006
     name: Annotated[
         str | None, typer.Option(help="Name in the library; that of the campaign's folder if not given.")
     ] = None,
@@ -146,13 +149,14 @@ def all_(
     from dsl_core.campaign.recipes import load_recipe
     from dsl_core.evaluation.cost import StageTimer
 
-    output, timer = Output(json), StageTimer()
+    output, timer, wanted = Output(json), StageTimer(), _settings_by_name(set_)
+    for each, values in wanted.items():
+        load_recipe(each, values)  # wrong settings are told before anything is written
     guide = ConsoleGuide(output, yes, accept_failed)
     with (
         going_on_with(f"dsl-scan calibrate all {campaign}"),
-        opened_campaign(campaign, rig, parse_options(option), {}) as (folder, devices),
+        opened_campaign(campaign, rig, parse_options(option), wanted) as (folder, devices),
     ):
-        settings = folder.info.settings
         with output.progress() as progress:
             calibrated = calibrate_all(
                 folder,
@@ -160,7 +164,6 @@ def all_(
                 guide,
                 progress,
                 name or "",
-                recipe_of=lambda each: load_recipe(each, settings.get(each)),
                 stage=timer.stage,
             )
         made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)
@@ -171,3 +174,16 @@ def all_(
     output.put(rig=made.rig, report=made.report, library=made.entry)
     output.put(figures={note.name: figures_json(note.figures) for note in calibrated.calibrations})
     output.finish()
+
+
+def _settings_by_name(texts: list[str]) -> dict[str, dict[str, str]]:
+    """Settings of each calibration from texts like ``bandpass.line_px=5``; raises `CalibrationError`."""
+    found: dict[str, dict[str, str]] = {}
+    for key, value in parse_options(texts).items():
+        name, dot, setting = key.partition(".")
+        if not dot:
+            raise CalibrationError(
+                f"--set must be like bandpass.line_px=5 here, a calibration's name first, not {key}={value}."
+            )
+        found.setdefault(name, {})[setting] = value
+    return found

@@ -79,11 +79,11 @@ def limits(figure: Figure) -> str:
         case None, None:
             return ""
         case None, high:
-            return f"at most {high:g}"
+            return f"at most {high:.4g}"
         case low, None:
-            return f"at least {low:g}"
+            return f"at least {low:.4g}"
         case low, high:
-            return f"{low:g} to {high:g}"
+            return f"{low:.4g} to {high:.4g}"
 
 
 def verdict(figure: Figure) -> str:

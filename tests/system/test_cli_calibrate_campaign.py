@@ -45,12 +45,15 @@ def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_path: Path) -> None:
-    folder = tmp_path / "campaign"
-    ending = give("calibrate", "all", folder, *TWIN, "--yes", "--name", "lab 3", "--json")
+    folder, setting = tmp_path / "campaign", "geometry.scale=1.5"
+    ending = give("calibrate", "all", folder, *TWIN, "--yes", "--name", "lab 3", "--set", setting, "--json")
     assert ending.code == 0, ending.err
     rig = load_rig(folder / "rig.json")
     assert [note.name for note in rig.calibrations] == ["selftest", "geometry"]
     assert rig.name == "lab 3"
+    with registry.open_rig("twin", {"size": "32x24"}) as devices:
+        assert devices.nominal is not None
+        assert rig.white_scale == pytest.approx(2 * 1.5 * devices.nominal.white_scale)
     assert ending.json["library"] == "lab 3"
     assert ending.json["figures"]["geometry"][0]["name"] == "brightest"
     assert [stage["name"] for stage in ending.json["stages"]] == ["Brightness", "Brightness"]
@@ -164,6 +167,8 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
         (["selftest", "--rig", "nothing"], "There is no rig 'nothing'"),
         (["calibrate", "geometry", "c", "--output", "x.json"], "--output and --xml go with --pictures"),
         (["calibrate", "geometry", "c", "--board", "9x7"], "A board needs both"),
+        (["calibrate", "all", "c", "--set", "scale=3"], "a calibration's name first, not scale=3"),
+        (["calibrate", "all", "c", "--set", "geometry.colour=3"], "geometry has no setting colour"),
         (["calibrate", "bandpass", "c"], "There is no calibration 'bandpass'; choose selftest, geometry"),
     ],
 )
