@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.flat_field import FlatField
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.rig import Film, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -69,11 +70,26 @@ def random_rig(seed: int, around: Rig) -> Rig:
             "response": _rgb(around.response, rng),
             "emission": _rgb(around.emission, rng),
             "efficiency": {**first, **second},
+            "flat_field": _vignetting(camera, spread(0.05, 0.10)),
             "white_scale": around.white_scale * spread(0.9, 1.1),
             "provenance": around.provenance.model_copy(
                 update={"camera_serial": f"TWIN-C{seed}", "projector_serial": f"TWIN-P{seed}"}
             ),
         }
+    )
+
+
+def _vignetting(lens: Lens, loss: float) -> FlatField:
+    """Gain that falls with the square of the distance from the lens's centre, by ``loss`` in the far corner."""
+    rows = np.linspace(0, lens.height_px - 1, 17)
+    columns = np.linspace(0, lens.width_px - 1, 25)
+    x, y = columns - lens.cx_px, rows[:, None] - lens.cy_px
+    square = x**2 + y**2
+    gain = 1 - loss * square / square.max()
+    return FlatField(
+        rows_px=tuple(rows.tolist()),
+        columns_px=tuple(columns.tolist()),
+        gain=tuple(tuple(row) for row in gain.tolist()),
     )
 
 

@@ -119,14 +119,16 @@ class Renderer:
         return torch.as_tensor(np.ascontiguousarray(array), device=self.device, dtype=dtype)
 
     def _shading(self, truth: SceneTruth) -> NDArray[np.float64]:
-        """Cosine of incidence times inverse square distance, zero in cast shadow, shape (rows, columns)."""
+        """Cosine of incidence times inverse square distance times gain, zero in shadow, (rows, columns)."""
+        from dsl_core.optics.flat_field import relative_gain
         from dsl_core.optics.pinhole import pixel_rays
 
         points = pixel_rays(self.rig.camera) * np.nan_to_num(truth.depth_mm, nan=1.0)
         to_light = self.rig.pose.projector_centre_mm[:, None, None] - points
         distance = np.linalg.norm(to_light, axis=0)
         cosine = (np.nan_to_num(truth.normals) * to_light).sum(0) / distance
-        return np.asarray(cosine.clip(min=0) * (self.rig.reference_distance_mm / distance) ** 2 * truth.lit)
+        light = cosine.clip(min=0) * (self.rig.reference_distance_mm / distance) ** 2 * truth.lit
+        return np.asarray(light * relative_gain(self.rig))
 
     def _order(self, order: int, depth: Tensor) -> OrderTables:
         nodes = chebyshev_nodes(NM[0], NM[-1])

@@ -169,3 +169,14 @@ def test_defocus_softens_what_is_seen() -> None:
         rig.projector.show(trial_picture("white", (640, 360)))
         rows[defocus] = np.abs(np.diff(world.rate(), axis=0)[:, ::2]).max()
     assert rows["3"] < 0.5 * rows["0"]
+
+
+def test_a_drawn_camera_sees_its_corners_darker() -> None:
+    _, world = twin(truth="4", scene="plane")
+    assert world.rig.flat_field is not None
+    even = Renderer(world.rig.model_copy(update={"flat_field": None}), world.truth, film=False)
+    white = np.full((360, 640, 3), 255, np.uint8)
+    uneven = Renderer(world.rig, world.truth, film=False).expected(white)
+    gain = uneven / np.maximum(even.expected(white), 1e-12)
+    assert 0.9 <= gain[gain > 0].min() <= 0.96
+    assert gain.max() == pytest.approx(1.0, abs=0.01)
