@@ -80,7 +80,7 @@ def random_rig(seed: int, around: Rig) -> Rig:
 
 
 def _vignetting(lens: Lens, loss: float) -> FlatField:
-    """Gain that falls with the square of the distance from the lens's centre, by ``loss`` in the far corner."""
+    """Gain that falls with the square of the distance from the centre, by ``loss`` in the far corner."""
     rows = np.linspace(0, lens.height_px - 1, 17)
     columns = np.linspace(0, lens.width_px - 1, 25)
     x, y = columns - lens.cx_px, rows[:, None] - lens.cy_px
