@@ -27,13 +27,15 @@ MIN_SIGMAS, MIN_SHARE = 8.0, 2e-4
 #: Cells whose peak lies farther from the others' than this are not used, px; terms of the quadratic.
 OUTLIER_PX, TERMS = 12.0, 6
 REFINEMENTS = 2
+#: A cell's peak is never better known than this, px.
+CELL_PX = 0.3
 
 
 @dataclass(frozen=True)
 class OrderPlace:
     """Signed distance of an order from the zero order as a quadratic over the image.
 
-    ``std_px`` is the deviation of the cells from it; ``share`` the part of the light in the peak;
+    ``std_px`` is its deviation in the middle of the image; ``share`` the part of the light in the peak;
     ``width_px`` the rms width of the peak.
     """
 
@@ -106,7 +108,10 @@ def _fit(
     left = value[use] - terms @ change
     coefficients = change if before is None else before.coefficients + change
     share = float(np.median(shares)) if before is None else before.share
-    std_px = float(np.sqrt((left**2).mean() / max(use.sum(), 1))) + 1e-3
+    # Where few cells see the order, the middle of the image is far from them.
+    middle = _terms(np.array([[0.5], [0.5]]))[0]
+    lever = float(middle @ np.linalg.solve(terms.T @ terms + damping, middle))
+    std_px = float(np.hypot(np.sqrt((left**2).mean()), CELL_PX) * np.sqrt(lever))
     return OrderPlace(coefficients, std_px, share, float(np.median(widths)))
 
 

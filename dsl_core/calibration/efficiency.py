@@ -1,0 +1,112 @@
+"""Efficiency of a diffraction order over wavelength, from its light through bandpass filters.
+
+The light of the order relative to the zero order is the mean of the efficiency over what filter, LEDs and
+camera let pass, not its value at the filter's centre. The logarithm of the efficiency is a smooth function,
+a straight line and a Gaussian process, as smooth as the data say (`solve.smooth_functions`); the means are
+linearised around the curve itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import FINE_NM
+from dsl_core.solve.smooth_functions import Equations, SmoothPrior, solve_smooth
+
+Floats = NDArray[np.float64]
+
+#: Nodes of the logarithm, nm, and prior deviations of its level and its rise over all nodes.
+NODES_NM = np.arange(400.0, 701.0, 10.0)
+LEVEL_STD, RISE_STD = 4.0, 2.0
+AMPLITUDES, LENGTHS, NOISE_FACTORS = (
+    (0.003, 0.01, 0.03, 0.1, 0.3),
+    (30.0, 60.0, 120.0, 240.0),
+    (1.0, 1.4, 2.0, 4.0, 8.0),
+)
+MIN_SAMPLES, ROUNDS = 2, 4
+#: Least relative deviation of a ratio: nonlinearity of a camera and what scatters inside it.
+LEAST_STD = 3e-4
+
+
+@dataclass(frozen=True)
+class RatioSample:
+    """Ratio of an order to the zero order, its deviation, and the light it averages over at `FINE_NM`."""
+
+    ratio: float
+    std: float
+    light: Floats
+
+
+@dataclass(frozen=True)
+class EfficiencyFit:
+    """Efficiency with deviation, and the factor by which samples scatter more than they state."""
+
+    curve: SpectralCurve
+    misfit: float
+
+
+def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
+    """Smooth efficiency of one order; raises `CalibrationError` with fewer than two usable samples."""
+    used = [s for s in samples if np.isfinite(s.std) and s.ratio > 3 * s.std]
+    if len({round(_centre(s)) for s in used}) < MIN_SAMPLES:
+        raise CalibrationError(
+            f"Order {order:+d} was found through {len(used)} filters; {MIN_SAMPLES} of different wavelengths"
+            " are needed. Choose a place of the target where the order's light reaches it, and more filters."
+        )
+    hats = np.stack([np.interp(FINE_NM, NODES_NM, row) for row in np.eye(len(NODES_NM))], 1)
+    light = np.stack([s.light / s.light.sum() for s in used])
+    ratio = np.array([s.ratio for s in used])
+    std = np.hypot([s.std / s.ratio for s in used], LEAST_STD)
+    trend = np.polynomial.Polynomial.fit(light @ FINE_NM, np.log(ratio), 1, w=1 / std)
+    log_curve = trend(NODES_NM)
+    for _ in range(ROUNDS):
+        value = np.exp(hats @ log_curve)
+        mean = light @ value
+        design = (light * value) @ hats / mean[:, None]
+        level = float(log_curve.mean())
+        target = np.log(ratio / mean) + design @ (log_curve - level)
+        solution = solve_smooth(
+            Equations.of(design, target, std),
+            [SmoothPrior(NODES_NM, LEVEL_STD, RISE_STD)],
+            amplitudes=AMPLITUDES,
+            lengths=LENGTHS,
+            noise_factors=NOISE_FACTORS,
+        )
+        log_curve = solution.values + level
+    return EfficiencyFit(_curve(log_curve, solution.std), solution.noise_factor)
+
+
+def _curve(log_values: Floats, log_std: Floats) -> SpectralCurve:
+    """The curve on a grid so fine that straight lines between its points lose nothing."""
+    from scipy.interpolate import CubicSpline
+
+    nm = np.arange(NODES_NM[0], NODES_NM[-1] + 1, 2.0)
+    values = np.exp(CubicSpline(NODES_NM, log_values)(nm))
+    std = values * np.interp(nm, NODES_NM, log_std)
+    return SpectralCurve.of(nm, values).model_copy(update={"std": tuple(std.tolist())})
+
+
+def _centre(sample: RatioSample) -> float:
+    return float((sample.light * FINE_NM).sum() / sample.light.sum())
+
+
+def second_order_share(
+    samples: Sequence[tuple[float, float, float]],
+) -> tuple[float, float]:
+    """Mean share of second in first orders, and its deviation, from (ratio, deviation, first-order ratio).
+
+    Without any sample the share is zero and its deviation infinite.
+    """
+    used = np.array([s for s in samples if np.isfinite(s[1]) and s[2] > 0]).reshape(-1, 3)
+    if not len(used):
+        return 0.0, np.inf
+    share, weight = used[:, 0] / used[:, 2], (used[:, 2] / used[:, 1]) ** 2
+    mean = float((weight * share).sum() / weight.sum())
+    chi = float((weight * (share - mean) ** 2).sum()) / max(len(used) - 1, 1)
+    return max(mean, 0.0), float(np.sqrt(max(chi, 1.0) / weight.sum()))

@@ -1,0 +1,149 @@
+"""Whether the filter in the beam is the one asked for: by the places of the orders, and by colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import FINE_NM, moved, passed
+
+Floats = NDArray[np.float64]
+
+#: Centres of measured and of nominal curves are as good as this, nm; beyond a few times that, a filter tilts
+#: (always to the blue) or is another one.
+MEASURED_NM, NOMINAL_NM = 0.5, 1.5
+DOUBT_SIGMAS, WRONG_NM = 3.0, 7.0
+#: The data sheet's line density of a film is as good as this.
+DENSITY_STD = 0.04
+#: Fewer filters than this are compared with the film's data sheet, not with each other.
+ENOUGH = 5
+#: Peaks wider than this (rms px) or with less than this share of the light are not those of a narrow filter.
+BROAD_PX, BROAD_SHARE = 9.0, 0.7
+#: Candidates of the search by colour, nm; relative error of the response known so far, and stray light.
+SHIFTS_NM = np.arange(-140.0, 141.0, 2.0)
+RESPONSE_STD, STRAY = 0.2, 0.01
+
+
+@dataclass(frozen=True)
+class PlacedFilter:
+    """A filter's effective wavelength and the distances of its first orders, (px, deviation) by order."""
+
+    filter_nm: float
+    effective_nm: float
+    measured_curve: bool
+    offsets_px: dict[int, tuple[float, float]]
+
+
+def found_wavelengths(rig: Rig, filters: Sequence[PlacedFilter]) -> list[tuple[float, float] | None]:
+    """Where each filter is by the places of its orders: wavelength and deviation (nm), None without orders.
+
+    Each filter is compared with a quadratic through all others of the same order, robustly; with too few
+    others, with the film's data sheet.
+    """
+    by_order = {order: _by_others(filters, order) for order in (1, -1)}
+    found: list[tuple[float, float] | None] = []
+    for i, each in enumerate(filters):
+        estimates = [by_order[order][i] for order in by_order if by_order[order][i] is not None]
+        known = [e for e in estimates if e is not None] or _by_film(rig, each)
+        if not known:
+            found.append(None)
+            continue
+        nm, std = np.array(known).T
+        # Both orders share what makes a filter's centre uncertain, so that their mean is no surer than one.
+        found.append((float((nm / std**2).sum() / (std**-2.0).sum()), float(std.min())))
+    return found
+
+
+def _by_others(filters: Sequence[PlacedFilter], order: int) -> list[tuple[float, float] | None]:
+    nm = np.array([each.effective_nm for each in filters])
+    at = np.array([abs(each.offsets_px.get(order, (np.nan, 0.0))[0]) for each in filters])
+    spread = np.array([each.offsets_px.get(order, (np.nan, 0.0))[1] for each in filters])
+    centre = np.array([MEASURED_NM if each.measured_curve else NOMINAL_NM for each in filters])
+    seen = np.isfinite(at)
+    nm_per_px = float(np.ptp(nm[seen])) / max(float(np.ptp(at[seen])), 1e-6) if seen.any() else 0.0
+    tolerance = np.hypot(centre, nm_per_px * spread)
+    found: list[tuple[float, float] | None] = []
+    for i in range(len(filters)):
+        others = seen & (np.arange(len(filters)) != i)
+        if not np.isfinite(at[i]) or others.sum() < ENOUGH:
+            found.append(None)
+            continue
+        # Wavelength over distance, so that the answer is a wavelength whatever the dispersion.
+        x = (at - at[others].mean()) / max(float(np.ptp(at[others])), 1e-6)
+        weight = 1 / tolerance[others]
+        for _ in range(20):
+            fit = np.polynomial.Polynomial.fit(x[others], nm[others], 2, w=weight)
+            sigmas = np.abs(nm[others] - fit(x[others])) / tolerance[others]
+            # Cauchy weights: a wrong filter among the others pulls no more.
+            weight = 1 / tolerance[others] / np.sqrt(1 + (sigmas / 2) ** 2)
+        found.append((float(fit(x[i])), float(tolerance[i]) * (1 + max(0.0, abs(float(x[i])) - 0.5))))
+    return found
+
+
+def _by_film(rig: Rig, each: PlacedFilter) -> list[tuple[float, float]]:
+    """The wavelength by the film's data sheet, on a plane that faces projector and film."""
+    distance = [abs(px) for px, _ in each.offsets_px.values() if np.isfinite(px)]
+    if not distance:
+        return []
+    angle = np.arctan(np.mean(distance) / rig.projector.fx_px)
+    nm = float(np.sin(angle)) * rig.film.period_nm
+    return [(nm, DENSITY_STD * nm)]
+
+
+def verdict(
+    each: PlacedFilter, found: tuple[float, float] | None, width_px: float, share: float
+) -> tuple[bool, str]:
+    """Whether a filter cannot be used, and a sentence on what is wrong with it (empty: nothing)."""
+    name = f"the filter of {each.filter_nm:g} nm"
+    if width_px > BROAD_PX or share < BROAD_SHARE:
+        return True, (
+            f"{name}: the light of the first orders is spread over {2 * width_px:.0f} columns, as without a"
+            " narrow filter. Put the filter before the camera, shade other light, and capture the step again"
+        )
+    if found is None:
+        return False, f"{name}: no first order stands out; it is left out"
+    shift, std = found[0] - each.effective_nm, found[1]
+    if abs(shift) > max(WRONG_NM, DOUBT_SIGMAS * std):
+        return True, (
+            f"{name}: its first orders stand where {found[0]:.0f} nm belongs. It is not the filter asked for;"
+            " put the right one before the camera and capture the step again"
+        )
+    if abs(shift) > DOUBT_SIGMAS * std:
+        why = "it may stand tilted in the beam" if shift < 0 else "its curve is not the one assumed"
+        return (
+            False,
+            f"{name}: it passes {abs(shift):.1f} nm {'less' if shift < 0 else 'more'} than it should; {why}",
+        )
+    return False, ""
+
+
+def colour_shift(rig: Rig, seen: Floats, transmission: SpectralCurve) -> tuple[float, float]:
+    """How far (nm) the pass band must move to explain the colours seen (3,), and what that gains.
+
+    The gain is in chi-square against no shift; beyond about ten the filter is another one.
+    """
+    chi = []
+    for shift in SHIFTS_NM:
+        expected = passed(rig, moved(transmission, float(shift))).sum(1)
+        if not expected.max() > 0:
+            chi.append(np.inf)
+            continue
+        a, b = (np.log(rgb / rgb.max() + STRAY) for rgb in (np.maximum(seen, 0) + 1e-12, expected))
+        difference = a - b
+        spread = np.full(3, RESPONSE_STD)
+        mean = (difference / spread**2).sum() / (1 / spread**2).sum()
+        chi.append(float((((difference - mean) / spread) ** 2).sum()))
+    best = int(np.argmin(chi))
+    nothing = int(np.argmin(np.abs(SHIFTS_NM)))
+    return float(SHIFTS_NM[best]), float(chi[nothing] - chi[best])
+
+
+def effective_nm(light: Floats) -> float:
+    """Mean wavelength of light (3, `FINE_NM`), all colours together."""
+    total = light.sum(0)
+    return float((total * FINE_NM).sum() / total.sum())

@@ -1,0 +1,366 @@
+"""Bandpass filters before the camera: efficiency of the orders, response of the camera, blur and halo.
+
+A flat white target stands still while filters change. Without filter, code and dense lines say which column
+each pixel sees; through each filter, lines that tile the frame show how much light each order takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dsl_core.calibration.bandpass import (
+    SeenFilter,
+    first_order_reach_px,
+    fit_bandpass,
+    plane_pixels,
+    plane_profile,
+)
+from dsl_core.calibration.chain import LineScan
+from dsl_core.calibration.filter_check import colour_shift
+from dsl_core.calibration.order_light import filter_light
+from dsl_core.calibration.zero_order import ZeroOrderFit
+from dsl_core.campaign.diffuser_lines import diffuser_lines
+from dsl_core.campaign.exposures import WhiteLevel, bracket, bright_setting, measure_white
+from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.errors import CalibrationError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.io.session_reader import SessionReader
+from dsl_core.model.bandpass import BandpassCalibration, apply_bandpass
+from dsl_core.model.base import Record
+from dsl_core.model.figure import Figure
+from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
+from dsl_core.progress import Progress
+
+PLANE = "plane"
+SCAN_NAME, CURVE_NAME = "scan.dsl", "filter.json"
+FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
+#: A filter whose colours fit another one so many nm away so much better (chi-square) is another one.
+COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
+#: White without a filter is so many times brighter than through one, at least.
+OPEN_FACTOR = 3.0
+
+
+class FilterNote(Record):
+    """The filter of a step: nominal centre, transmission, and whether that was measured."""
+
+    filter_nm: float
+    transmission: SpectralCurve
+    measured: bool
+
+
+@dataclass(frozen=True)
+class BandpassRecipe:
+    """The calibration with bandpass filters.
+
+    ``filters_nm`` are nominal centres; ``line_px`` is width and step of the lines through a filter, which
+    must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for noisy cameras;
+    ``pixels`` is how many of the camera's are used; ``depth_mm`` is where the target stands;
+    ``reflectance`` is the target's.
+    """
+
+    filters_nm: tuple[float, ...] = FILTERS_NM
+    line_px: int = 5
+    long_ratio: float = 1.0
+    pixels: int = 20_000
+    depth_mm: float = 700.0
+    reflectance: float = 0.99
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        return "bandpass"
+
+    @property
+    def title(self) -> str:
+        """Title of the wizard."""
+        return "Bandpass filters"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Geometry for depth and shading, the LEDs' emission."""
+        return ("geometry", "spectralon")
+
+    @property
+    def record_type(self) -> type[Record]:
+        """The record that `fit` makes."""
+        return BandpassCalibration
+
+    def steps(self, bench: Bench) -> tuple[Step, ...]:
+        """The target without filter, then through each filter, from blue to red."""
+        if len(set(self.filters_nm)) < 2:
+            raise CalibrationError("Bandpass filters: at least two different filters are needed.")
+        where: dict[str, float | str] = {"depth_mm": self.depth_mm}
+        first = Step(
+            PLANE,
+            "White target without filter",
+            f"Mount the film before the projector. Place the Spectralon or another even white target about"
+            f" {self.depth_mm / 10:g} cm from the camera, facing it; it must not move until the last filter"
+            " is done. No filter before the camera.",
+            Placement(target="spectralon", film=True, options=where),
+        )
+        filtered = [
+            Step(
+                f"filter-{nm:g}",
+                f"Filter of {nm:g} nm",
+                f"Put the bandpass filter of {nm:g} nm flat before the camera's lens. Touch nothing else.",
+                Placement(target="spectralon", film=True, filter_nm=nm, options=where),
+            )
+            for nm in sorted(set(self.filters_nm))
+        ]
+        return (first, *filtered)
+
+    def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
+        """Brightness, other light and, through a filter, whether its colours are those of the right one."""
+        white = measure_white(bench.devices, bench.rig)
+        figures = [
+            Figure(
+                name="white after one LED cycle",
+                value=white.brightest * bench.rig.frame_period_ms,
+                unit="DN",
+                low=0.5,
+                advice="The picture is dark. Check lens cap, aperture, projector and filter.",
+            ),
+            Figure(
+                name="other light",
+                value=100 * white.ambient,
+                unit="% of white",
+                high=20.0,
+                advice="Darken the room or shade the target.",
+            ),
+        ]
+        if step.placement.filter_nm is not None:
+            shift, gain = colour_shift(bench.rig, white.mean, self._note(bench, step).transmission)
+            figures.append(
+                Figure(
+                    name="filter by its colours",
+                    value=shift if gain > COLOUR_GAIN else 0.0,
+                    unit="nm from the one asked for",
+                    low=-COLOUR_NM,
+                    high=COLOUR_NM,
+                    advice=f"Put the filter of {step.placement.filter_nm:g} nm before the camera.",
+                )
+            )
+        return tuple(figures)
+
+    def is_captured(self, bench: Bench, step: Step) -> bool:
+        """Whether the scan of a step is complete."""
+        folder = bench.step_folder(step) / SCAN_NAME
+        return (folder / MANIFEST_NAME).exists() and not SessionReader(folder).missing()
+
+    def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Choose exposures by a test shot and scan; a scan that was begun goes on with its own exposures."""
+        from dsl_core import pipeline
+
+        folder = bench.step_folder(step)
+        scan = folder / SCAN_NAME
+        if (scan / MANIFEST_NAME).exists():
+            plan = SessionReader(scan).plan
+        else:
+            white = measure_white(bench.devices, bench.rig)
+            self._require_filter(bench, step, white)
+            plan = pipeline.fit_plan(self._plan(bench.rig, step, white), bench.devices)
+            folder.mkdir(parents=True, exist_ok=True)
+            if step.placement.filter_nm is not None:
+                write_atomic(folder / CURVE_NAME, self._note(bench, step).model_dump_json(indent=1).encode())
+        pipeline.scan(bench.devices, plan, scan, progress)
+
+    def fit(self, bench: Bench, progress: Progress) -> BandpassCalibration:
+        """Calibrate from the captures of all steps."""
+        first, *filtered = self.steps(bench)
+        scan, profile = self._plane(bench, first, progress)
+        rig = bench.rig.model_copy(update={"projector_response": profile.response})
+        seen = []
+        for done, step in enumerate(filtered):
+            progress.report("filters", done, len(filtered))
+            seen.append(self._filter(bench, rig, step, scan))
+        progress.report("filters", len(filtered), len(filtered))
+        return fit_bandpass(rig, scan, profile, seen, self.reflectance)
+
+    def figures(self, record: Record) -> tuple[Figure, ...]:
+        """Deviations of efficiency and response, blur and halo, and filters in doubt."""
+        assert isinstance(record, BandpassCalibration)
+        return bandpass_figures(record)
+
+    def apply(self, record: Record, rig: Rig) -> Rig:
+        """The rig with efficiencies, response, white scale, blur and halo."""
+        assert isinstance(record, BandpassCalibration)
+        return apply_bandpass(record, rig)
+
+    def _note(self, bench: Bench, step: Step) -> FilterNote:
+        nm = step.placement.filter_nm
+        assert nm is not None
+        curve = bench.devices.filters.get(nm)
+        return FilterNote(filter_nm=nm, transmission=curve or nominal_filter(nm), measured=curve is not None)
+
+    def _require_filter(self, bench: Bench, step: Step, white: WhiteLevel) -> None:
+        """Raise `CalibrationError` when a test shot shows another filter than the step's, or none."""
+        nm = step.placement.filter_nm
+        if nm is None:
+            return
+        note = self._note(bench, step)
+        open_white = self._white_of(bench, self.steps(bench)[0])
+        if open_white is not None and white.brightest * OPEN_FACTOR > open_white:
+            raise CalibrationError(
+                f"{step.title}: the picture is about as bright as without a filter. Put the filter of {nm:g}"
+                " nm before the camera and capture the step again."
+            )
+        shift, gain = colour_shift(bench.rig, white.mean, note.transmission)
+        if gain > COLOUR_GAIN and abs(shift) > COLOUR_NM:
+            raise CalibrationError(
+                f"{step.title}: the colours are those of a filter of about {nm + shift:.0f} nm. Put the"
+                f" filter of {nm:g} nm before the camera and capture the step again."
+            )
+
+    def _white_of(self, bench: Bench, step: Step) -> float | None:
+        """Brightness of a captured step's white frame (DN per ms at full drive), None if not captured."""
+        if not self.is_captured(bench, step):
+            return None
+        from dsl_core.reconstruction.merge import MergedScan
+
+        frame = MergedScan(SessionReader(bench.step_folder(step) / SCAN_NAME), bench.rig).merge("white", 0)
+        return float(np.quantile(frame.radiance, 0.995))
+
+    def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
+        if step.placement.filter_nm is None:
+            settings = bracket(rig, white, 6.0)
+            return CapturePlan(
+                name="white target without filter",
+                code=GrayCode(),
+                spectral=ScanLines(width_px=5, step_px=2),
+                settings=settings,
+                code_settings=(0,),
+            )
+        short = bright_setting(rig, white, step.title)
+        settings = (short,)
+        if self.long_ratio > 1:
+            long_ms = round(short.exposure_ms * self.long_ratio / rig.frame_period_ms) * rig.frame_period_ms
+            settings = (short, Setting(exposure_ms=long_ms, level=short.level))
+        return CapturePlan(
+            name=step.title,
+            code=NoCode(),
+            spectral=ScanLines(width_px=self.line_px, step_px=self.line_px),
+            settings=settings,
+            code_settings=(0,),
+        )
+
+    def _plane(self, bench: Bench, step: Step, progress: Progress) -> tuple[LineScan, ZeroOrderFit]:
+        source = SessionReader(bench.step_folder(step) / SCAN_NAME)
+        scan = _named(step, lambda: diffuser_lines(source, bench.rig, progress, self.pixels))
+        return scan, _named(step, lambda: plane_profile(bench.rig, scan))
+
+    def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
+        from dsl_core.reconstruction.merge import MergedScan, check_source
+
+        folder = bench.step_folder(step)
+        note = read_record(folder / CURVE_NAME, FilterNote)
+        source = SessionReader(folder / SCAN_NAME)
+        plan = check_source(source, rig)
+        lines = plan.spectral
+        assert isinstance(lines, ScanLines)
+        merged = MergedScan(source, rig)
+        radiance = np.empty((plan.spectral_count, len(scan.pixels)), np.float32)
+        std = np.empty_like(radiance)
+        for frame in range(plan.spectral_count):
+            picture = merged.merge("spectral", frame)
+            radiance[frame] = picture.radiance.ravel()[scan.pixels]
+            std[frame] = np.sqrt(picture.variance.ravel()[scan.pixels])
+        light = filter_light(
+            lines,
+            plane_pixels(rig, scan, note.filter_nm),
+            radiance,
+            std,
+            rig.projector_response,
+            first_order_reach_px(rig),
+            rig.projector.width_px,
+        )
+        if light.saturated > 0.5:
+            raise CalibrationError(
+                f"{step.title}: the zero order is saturated in {light.saturated:.0%} of the pixels. Capture"
+                " the step again with nothing changed since the test shot."
+            )
+        return SeenFilter(note.filter_nm, note.transmission, note.measured, light)
+
+
+def bandpass_figures(record: BandpassCalibration) -> tuple[Figure, ...]:
+    """What a person judges the calibration by."""
+    centres = np.array([each.effective_nm for each in record.filters])
+    figures = [
+        Figure(
+            name=f"efficiency of order {order:+d}, deviation",
+            value=100 * float(np.median(_relative_std(record.efficiency[order], centres))),
+            unit="%",
+            high=2.0,
+            advice="Use more filters, or a longer second exposure (long_ratio).",
+        )
+        for order in (1, -1)
+    ]
+    figures += [
+        Figure(
+            name=f"response of {colour}, deviation",
+            value=100 * float(np.median(_relative_std(curve, centres[_bright(curve, centres)]))),
+            unit="%",
+            high=5.0,
+            advice="Measure the filters' transmissions, or calibrate with a Color Checker first.",
+        )
+        for colour, curve in zip(("red", "green", "blue"), record.response, strict=True)
+    ]
+    halo = 200 * record.halo_decay_px
+    figures += [
+        _plain(
+            "second orders",
+            "% of first",
+            100 * record.second_order_share,
+            100 * record.second_order_share_std,
+        ),
+        _plain("halo", "% of zero order", halo * record.halo_peak_per_px, halo * record.halo_peak_std_per_px),
+        Figure(
+            name="blur of the projector",
+            value=record.blur_px,
+            unit="px",
+            std=record.blur_std_px,
+            high=2.0,
+            advice="Focus the projector on the target.",
+        ),
+        Figure(
+            name="filters in doubt",
+            value=float(len(record.warnings)),
+            unit="",
+            high=0.0,
+            advice=". ".join(record.warnings),
+        ),
+    ]
+    return tuple(figures)
+
+
+def _plain(name: str, unit: str, value: float, std: float) -> Figure:
+    return Figure(name=name, value=value, unit=unit, std=std)
+
+
+def _relative_std(curve: SpectralCurve, nm: Any) -> Any:
+    std = curve.std or (0.0,) * len(curve.values)
+    return np.interp(nm, curve.wavelengths_nm, std) / np.maximum(np.abs(curve.at(nm)), 1e-12)
+
+
+def _bright(curve: SpectralCurve, nm: Any) -> Any:
+    """Wavelengths at which a response is not negligible."""
+    return curve.at(nm) > 0.05 * max(curve.values)
+
+
+def _named(step: Step, task: Callable[[], Any]) -> Any:
+    """Do a task of a step, whose errors then name it."""
+    from dsl_core.errors import DslError
+
+    try:
+        return task()
+    except DslError as error:
+        raise CalibrationError(f"{step.title}: {error}") from error

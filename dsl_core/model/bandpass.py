@@ -1,0 +1,77 @@
+"""What bandpass filters say: efficiency of the orders, response of the camera, blur and halo."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from dsl_core.model.base import Record
+from dsl_core.model.rig import Rgb, Rig
+from dsl_core.model.spectral import SpectralCurve
+
+
+class OrderSample(Record):
+    """One order through one filter: light relative to the zero order and distance from it, deviations."""
+
+    order: int
+    ratio: float
+    ratio_std: float = Field(ge=0)
+    offset_px: float
+    offset_std_px: float = Field(ge=0)
+
+
+class FilterSample(Record):
+    """One filter: nominal centre, effective wavelength of what it passes, zero order (DN per ms) and orders.
+
+    ``found_nm`` is where the orders' places say the filter is, None where it was not found.
+    """
+
+    filter_nm: float
+    effective_nm: float
+    found_nm: float | None = None
+    curve_measured: bool
+    zero_dn_per_ms: tuple[float, float, float]
+    orders: tuple[OrderSample, ...]
+
+
+class BandpassCalibration(Record):
+    """Efficiency by order relative to the zero order, response, white scale, blur and halo, with deviations.
+
+    The response keeps the scale that green had before; ``white_scale`` belongs to it. ``misfit`` is the
+    factor by which the scatter of the efficiency exceeds its stated deviations, by order.
+    """
+
+    filters: tuple[FilterSample, ...]
+    efficiency: dict[int, SpectralCurve]
+    second_order_share: float
+    second_order_share_std: float = Field(ge=0)
+    misfit: dict[int, float]
+    response: Rgb
+    white_scale: float = Field(gt=0)
+    white_scale_rel_std: float = Field(ge=0)
+    blur_px: float = Field(gt=0)
+    blur_std_px: float = Field(ge=0)
+    halo_peak_per_px: float = Field(ge=0)
+    halo_peak_std_per_px: float = Field(ge=0)
+    halo_decay_px: float = Field(gt=0)
+    halo_decay_std_px: float = Field(ge=0)
+    warnings: tuple[str, ...] = ()
+
+
+def apply_bandpass(record: BandpassCalibration, rig: Rig) -> Rig:
+    """The rig with efficiencies, response, white scale, blur and halo as measured."""
+    response = rig.projector_response.model_copy(
+        update={
+            "blur_px": record.blur_px,
+            "halo_peak_per_px": record.halo_peak_per_px,
+            "halo_decay_px": record.halo_decay_px,
+        }
+    )
+    return rig.model_copy(
+        update={
+            "efficiency": {**rig.efficiency, **record.efficiency},
+            "response": record.response,
+            "white_scale": record.white_scale,
+            "white_scale_rel_std": record.white_scale_rel_std,
+            "projector_response": response,
+        }
+    )
