@@ -119,6 +119,7 @@ def _signals(
 ) -> PlaneSignals:
     """Frames (frames, rows, columns) at the chosen pixels of the plane."""
     from dsl_core.calibration.light_drift import PlaneSignals
+    from dsl_core.optics.flat_field import relative_gain
     from dsl_core.optics.sensor import bayer_channels
     from dsl_core.optics.shading import plane_shading
 
@@ -126,7 +127,7 @@ def _signals(
         pixels=chosen.astype(np.int64),
         colours=bayer_channels(rig.sensor.bayer, *fit.on_plane.shape).ravel()[chosen],
         depth_mm=fit.plane.depth_mm(rig).ravel()[chosen],
-        shading=plane_shading(rig, fit.plane).ravel()[chosen],
+        shading=(plane_shading(rig, fit.plane) * relative_gain(rig)).ravel()[chosen],
         profiles=profiles,
         radiance=radiance.reshape(len(radiance), -1)[:, chosen].astype(float),
         std=std.reshape(len(std), -1)[:, chosen].astype(float),

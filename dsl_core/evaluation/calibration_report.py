@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from dsl_core.evaluation.charts import Chart, wavelength_chart
 from dsl_core.evaluation.cost import StageCost
 from dsl_core.evaluation.curves import HEIGHT, WIDTH
+from dsl_core.evaluation.rig_maps import rig_maps
 from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.figure import Figure, failures
@@ -64,6 +65,7 @@ def render_calibration_report(content: CalibrationContent) -> str:
         sections=sections,
         missed=[f"{s.title}: {figure}" for s in sections for figure in failures(s.figures)],
         charts=_charts(rig),
+        maps=rig_maps(rig),
         film=_film(rig),
         geometry=_geometry(rig),
         conditions=_conditions(rig.conditions),

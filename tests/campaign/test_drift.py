@@ -13,6 +13,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import failures
 from dsl_core.model.geometry import Pose
 from dsl_core.model.rig import Rig
+from dsl_core.simulation.sim_devices import SimCamera
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 #: Pixels whose light is compared: enough to see, few enough to be quick.
@@ -22,9 +23,11 @@ Change = Callable[[Rig], Rig]
 
 @pytest.fixture(scope="module")
 def shot() -> tuple[Rig, MemoryScan]:
-    devices, scan = twin_scan(quick_plan(), size="160x104", scene="plane", tilt_x_deg="5", tilt_y_deg="-8")
-    assert devices.calibration is not None
-    return devices.calibration, scan
+    """A rig drawn at random, vignetting included, and its quick shot."""
+    plane = {"size": "160x104", "scene": "plane", "tilt_x_deg": "5", "tilt_y_deg": "-8"}
+    devices, scan = twin_scan(quick_plan(), truth="7", **plane)
+    assert isinstance(devices.camera, SimCamera)
+    return devices.camera.world.rig, scan
 
 
 def turned(rig: Rig, angle_deg: float) -> Rig:

@@ -12,8 +12,10 @@ from dsl_core.evaluation.calibration_report import CalibrationContent, render_ca
 from dsl_core.evaluation.cost import StageCost
 from dsl_core.evaluation.curves import HEIGHT
 from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import CameraConditions, CaptureConditions, ProjectorConditions
 from dsl_core.model.figure import Figure
+from dsl_core.model.flat_field import FlatField
 from dsl_core.model.rig import Rig
 from tests.cases.small_rig import small_rig
 
@@ -72,6 +74,20 @@ def test_bands_show_the_standard_deviation() -> None:
     # The axis ends at 0.3; 1.96 standard deviations of 0.02 either side of the last value.
     np.testing.assert_allclose((lower - upper)[2], 2 * 1.96 * 0.02 / 0.3 * HEIGHT, rtol=0.01)
     assert "All key figures are within their limits." in page
+
+
+def test_maps_show_evenness_and_what_the_grating_leaves() -> None:
+    even = FlatField(rows_px=(0, 579), columns_px=(0, 889), gain=((1.0, 0.9), (0.9, 0.8)))
+    left = ColumnResidual(
+        orders=(-1, 1), column_range_px=(0, 889), row_range_px=(0, 579), depth_range_mm=(500, 1000),
+        wavelength_range_nm=(430, 660), degrees=((1, 0, 0, 0), (0, 0, 0, 2)),
+        coefficients_px=((0.5, 0.0), (0.25, 0.1)),
+    )  # fmt: skip
+    rig = calibrated().model_copy(update={"flat_field": even, "residual": left})
+    page = render_calibration_report(CalibrationContent(rig, [accepted("geometry", GOOD)]))
+    assert page.count("data:image/png;base64,") == 3
+    for words in ("Flat field", "Residual of order +1", "at 545 nm and 667 mm", "-0.49"):
+        assert words in page, words
 
 
 def test_it_is_written_whole_over_an_older_one(tmp_path: Path) -> None:
