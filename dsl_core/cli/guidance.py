@@ -107,13 +107,16 @@ def opened_campaign(
     from dsl_core.io.campaign_folder import CampaignFolder
     from dsl_core.io.session_lock import SessionLock
 
-    campaign = CampaignFolder.begin(folder, rig, options, settings)
-    lock = SessionLock(folder / "lock")
-    try:
-        with open_rig(campaign.info.rig, campaign.info.options) as devices:
+    campaign = CampaignFolder.prepare(folder, rig, options, settings)
+    # Devices that do not open must not leave a campaign of theirs behind.
+    with open_rig(campaign.info.rig, campaign.info.options) as devices:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = SessionLock(folder / "lock")
+        try:
+            campaign.save()
             yield campaign, devices
-    finally:
-        lock.release()
+        finally:
+            lock.release()
 
 
 @contextmanager

@@ -44,7 +44,7 @@ class CampaignFolder:
     """The files of a campaign by what they mean."""
 
     def __init__(self, path: Path, info: CampaignInfo) -> None:
-        """Used by `begin` and `open`."""
+        """Used by `begin`, `prepare` and `open`."""
         self.path, self.info = path, info
 
     @classmethod
@@ -62,28 +62,39 @@ class CampaignFolder:
         options: Mapping[str, str],
         settings: Mapping[str, Mapping[str, str]] | None = None,
     ) -> Self:
-        """Begin a campaign or go on with it.
+        """Begin a campaign or go on with it: `prepare` and `save`."""
+        campaign = cls.prepare(path, rig, options, settings)
+        campaign.save()
+        return campaign
+
+    @classmethod
+    def prepare(
+        cls,
+        path: Path,
+        rig: str | None,
+        options: Mapping[str, str],
+        settings: Mapping[str, Mapping[str, str]] | None = None,
+    ) -> Self:
+        """A campaign, new or begun, as it would be; nothing is written before `save`.
 
         ``rig`` None means the rig the campaign was begun with, for a new one the twin. ``settings`` add to
         those the campaign has. Raises `StoreError` when the campaign was begun with another rig or options,
         or when the folder holds something else.
         """
         if not (path / CAMPAIGN_NAME).exists():
-            if path.is_dir() and any(path.iterdir()):
+            if path.is_dir() and not all(_is_unborn(each) for each in path.iterdir()):
                 raise StoreError(f"{path} is neither empty nor a campaign. Choose a new folder.")
             info = CampaignInfo(created=now(), rig=rig or "twin", options=dict(options))
         else:
             info = cls.open(path).info
             _refuse_other_rig(path, info, rig, options)
-        campaign = cls(path, info)
-        campaign._remember(settings or {})
-        return campaign
-
-    def _remember(self, settings: Mapping[str, Mapping[str, str]]) -> None:
-        merged = {name: dict(values) for name, values in self.info.settings.items()}
-        for name, values in settings.items():
+        merged = {name: dict(values) for name, values in info.settings.items()}
+        for name, values in (settings or {}).items():
             merged[name] = {**merged.get(name, {}), **values}
-        self.info = self.info.model_copy(update={"settings": merged})
+        return cls(path, info.model_copy(update={"settings": merged}))
+
+    def save(self) -> None:
+        """Write down with what the campaign was begun; raises `StoreError`."""
         _make(self.path)
         _write(self.path / CAMPAIGN_NAME, self.info)
 
@@ -137,6 +148,11 @@ class CampaignFolder:
 
     def _calibration(self, path: Path) -> AcceptedCalibration | None:
         return read_record(path, AcceptedCalibration) if path.exists() else None
+
+
+def _is_unborn(path: Path) -> bool:
+    """Whether a file is what a campaign that was killed at its birth leaves."""
+    return path.name == "lock" or path.name.startswith(CAMPAIGN_NAME)
 
 
 def now() -> str:

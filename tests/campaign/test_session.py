@@ -296,6 +296,9 @@ def test_a_damaged_record_and_a_foreign_folder_are_named(
     path.write_text(path.read_text()[:50])
     with pytest.raises(StoreError, match=r"first\.json is damaged"):
         CalibrationSession(recipes[1], devices, campaign, recipes)
+    (tmp_path / "unborn").mkdir()
+    (tmp_path / "unborn" / "lock").touch()
+    assert CampaignFolder.begin(tmp_path / "unborn", None, {}).info.rig == "twin"
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thing").touch()
     with pytest.raises(StoreError, match="neither empty nor a campaign"):

@@ -164,7 +164,8 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
     [
         (["selftest", "--set", "colour=1"], "selftest has no setting colour; it has"),
         (["selftest", "--set", "good_look=many"], "The setting good_look of selftest is wrong"),
-        (["selftest", "--rig", "nothing"], "There is no rig 'nothing'"),
+        (["selftest", "c", "--rig", "nothing"], "There is no rig 'nothing'"),
+        (["selftest", "c", "-o", "size=1x1"], "The twin's size must be"),
         (["calibrate", "geometry", "c", "--output", "x.json"], "--output and --xml go with --pictures"),
         (["calibrate", "geometry", "c", "--board", "9x7"], "A board needs both"),
         (["calibrate", "all", "c", "--set", "scale=3"], "a calibration's name first, not scale=3"),
