@@ -60,7 +60,7 @@ def assemble(
         flags |= _spectral_flags(spectra)
         arrays.update(
             reflectance=spectra.reflectance,
-            reflectance_std=spectra.std,
+            reflectance_std=with_calibration(rig, grid, spectra),
             data_share=spectra.data_share,
             reach=spectra.reach,
             rgb=reflectance_to_srgb(spectra.reflectance, grid.centres_nm).astype(np.float32),
@@ -68,6 +68,19 @@ def assemble(
     arrays["flags"] = flags
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
     return build_result(arrays, grid.centres_nm, attributes)
+
+
+def with_calibration(rig: Rig, grid: WavelengthGrid, spectra: SpectralMaps) -> NDArray[np.float32]:
+    """Deviation of the reflectance (bands, rows, columns), calibration included.
+
+    What the calibration leaves open is a share of the reflectance: one for all wavelengths
+    (``white_scale_rel_std``) and one for each (``chain_rel_std``).
+    """
+    chain = 0.0 if rig.chain_rel_std is None else rig.chain_rel_std.at(grid.centres_nm)
+    share = np.broadcast_to(np.hypot(chain, rig.white_scale_rel_std), grid.count).astype(np.float32)
+    if not share.any():
+        return spectra.std
+    return np.asarray(np.hypot(spectra.std, share[:, None, None] * spectra.reflectance), np.float32)
 
 
 def _spectral_flags(spectra: SpectralMaps) -> NDArray[np.uint16]:
