@@ -1,0 +1,63 @@
+"""The plane of a flat target from depths of single pixels, each known to a projector column only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.shading import Plane
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Pixels farther from the plane than this many robust deviations, or relative to their depth, are not on it.
+OUTLIER_SIGMAS, LEAST_RELATIVE = 4.0, 0.012
+ROUNDS = 8
+MIN_PIXELS = 200
+
+
+@dataclass(frozen=True)
+class PlaneFit:
+    """A plane, the pixels that lie on it (rows, columns) and the rms of their depths about it, mm."""
+
+    plane: Plane
+    on_plane: Mask
+    rms_mm: float
+
+
+def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = None) -> PlaneFit:
+    """The plane through most of the depths (rows, columns); ``start`` marks pixels that surely lie on it.
+
+    A plane's inverse depth is affine in the image coordinates, and inverse depth is nearly linear in the
+    projector column, so that the rounding of columns averages out without a bias. Raises `CalibrationError`
+    when too few pixels agree.
+    """
+    rays = pixel_rays(rig.camera)
+    usable = usable & np.isfinite(depth_mm)
+    inverse = 1 / np.where(usable, depth_mm, 1.0)
+    on_plane = usable if start is None else usable & start
+    for _ in range(ROUNDS):
+        if on_plane.sum() < MIN_PIXELS:
+            raise CalibrationError(
+                f"Only {int(on_plane.sum())} pixels lie on one plane. Check that a flat target fills the"
+                " middle of the picture, that the projector lights it, and that the code is readable."
+            )
+        plane = Plane(_least_squares(rays[:, on_plane], inverse[on_plane]))
+        miss = np.tensordot(plane.inverse, rays, 1) / inverse - 1
+        spread = 1.4826 * float(np.median(np.abs(miss[on_plane])))
+        before = on_plane
+        on_plane = usable & (np.abs(miss) < max(OUTLIER_SIGMAS * spread, LEAST_RELATIVE))
+        if (on_plane == before).all():
+            break
+    off = (miss * depth_mm)[on_plane]
+    return PlaneFit(plane, on_plane, float(np.sqrt(np.mean(off**2))))
+
+
+def _least_squares(rays: Floats, inverse: Floats) -> Floats:
+    """Coefficients (3,) of inverse depth over rays (3, pixels)."""
+    return np.asarray(np.linalg.solve(rays @ rays.T, rays @ inverse))
