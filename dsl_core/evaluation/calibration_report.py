@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from dsl_core.evaluation.charts import Chart, wavelength_chart
 from dsl_core.evaluation.cost import StageCost
 from dsl_core.evaluation.curves import HEIGHT, WIDTH
+from dsl_core.evaluation.pages import render_page
 from dsl_core.evaluation.rig_maps import rig_maps
 from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.conditions import CaptureConditions
@@ -19,7 +20,6 @@ from dsl_core.model.geometry import Lens
 from dsl_core.model.geometry_calibration import GeometryCalibration
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.resources import resource_path
 
 #: Channels and LEDs, and orders, in colours that the common kinds of colour blindness tell apart (P. Tol).
 _RGB = (("red", "#cc3311"), ("green", "#228833"), ("blue", "#4477aa"))
@@ -49,18 +49,10 @@ class _Section:
 
 def render_calibration_report(content: CalibrationContent) -> str:
     """The page, without references to other files; raises `StoreError` when its template is missing."""
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(resource_path("report")),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
     rig = content.rig
     sections = [_section(each) for each in content.accepted]
-    return environment.get_template("calibration.html.j2").render(
+    return render_page(
+        "calibration.html.j2",
         rig=rig,
         sections=sections,
         missed=[f"{s.title}: {figure}" for s in sections for figure in failures(s.figures)],

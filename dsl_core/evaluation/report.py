@@ -18,11 +18,11 @@ from dsl_core.evaluation.curves import (
     share_curve,
     spectrum_curve,
 )
+from dsl_core.evaluation.pages import render_page
 from dsl_core.evaluation.pictures import Picture, colour_picture, flag_picture, value_picture
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.model.plan import CapturePlan
-from dsl_core.resources import resource_path
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,19 +56,11 @@ def render_report(content: ReportContent) -> str:
     Raises `StoreError` when the page's template is not installed, ``IndexError`` for a chosen pixel outside
     the image.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(resource_path("report")),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
     evaluation = content.evaluation
     pixels = _pixels(content)
     has_spectra = "reflectance" in content.result
-    return environment.get_template("report.html.j2").render(
+    return render_page(
+        "report.html.j2",
         title=content.title,
         summary=content.summary,
         verdicts=content.verdicts,
