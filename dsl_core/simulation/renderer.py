@@ -11,7 +11,7 @@ import copy
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -36,10 +36,24 @@ from dsl_core.simulation.truth import SceneTruth
 ORDERS = (1, -1, 2, -2)
 THREADS = 2
 NM = np.arange(400.0, 701.0)
-#: Spectral slices of patterns that are not lines, nm; wider where the pattern also varies along rows.
-SLICE_NM, SLICE_ROWS_NM = 10, 25
-#: Patterns with more runs of lit columns than this are summed over slices.
-MAX_RUNS = 8
+
+
+class Slicing(NamedTuple):
+    """Width of the spectral slices of patterns that are not lines, nm; wider where they also vary along rows.
+
+    Slices whose signal is below the share ``floor`` of the strongest are left out.
+    """
+
+    nm: int
+    rows_nm: int
+    floor: float
+
+
+#: A bandpass filter passes so few slices that they can be narrow.
+BROAD, NARROW = Slicing(10, 25, 1e-3), Slicing(2, 5, 1e-5)
+#: Patterns with more runs of lit columns than this are summed over slices; behind a filter, slices would blur
+#: the narrow images of the lines.
+MAX_RUNS, MAX_RUNS_FILTERED = 8, 64
 #: Degree of the polynomial from column to wavelength; error below 0.01 nm over the film's range.
 DEGREE = 6
 
@@ -80,6 +94,7 @@ class Renderer:
         inside = (self.row > -0.5) & (self.row < h - 0.5) & (self.column > -1.5) & (self.column < w + 0.5)
         self.shading = self.shading * inside
         self._reflectance = truth.materials.at(NM)
+        self.slicing = BROAD
         self.zero_table = self._zero_table()
         self.orders = [self._order(m, depth) for m in ORDERS] if film else []
         halo = (
@@ -93,12 +108,12 @@ class Renderer:
     def through(self, transmission: SpectralCurve | None) -> Renderer:
         """The same view through a filter before the camera (None: without); the geometry is shared."""
         other = copy.copy(self)
-        other.rig, other._white = self._bare, None
+        other.rig, other.slicing, other._white = self._bare, BROAD, None
         if transmission is not None:
             passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
             # On the renderer's own grid, as the rig's may be too coarse for a narrow band.
             response = tuple(SpectralCurve.of(NM, curve.at(NM) * passed) for curve in self._bare.response)
-            other.rig = self._bare.model_copy(update={"response": response})
+            other.rig, other.slicing = self._bare.model_copy(update={"response": response}), NARROW
         other.zero_table = other._zero_table()
         other.orders = [replace(t, **other._spectra(t.order, t.sigma_nm)) for t in self.orders]
         return other
@@ -112,7 +127,7 @@ class Renderer:
         """The parts of an order's tables that depend on spectra."""
         return {
             "cumulative": self._cumulative(order, sigma_nm),
-            "slices": {step: self._slices(order, step) for step in (SLICE_NM, SLICE_ROWS_NM)},
+            "slices": {step: self._slices(order, step) for step in self.slicing[:2]},
         }
 
     def _tensor(self, array: NDArray[Any], dtype: torch.dtype = torch.float32) -> Tensor:
@@ -195,7 +210,8 @@ class Renderer:
         """Signal (rows, columns), DN per ms, of drive levels (height, width, 3) or (height, width)."""
         colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
         runs = _white_runs(colour)
-        signal = self._any(colour) if runs is None or len(runs) > MAX_RUNS else self._lines(runs)
+        most = MAX_RUNS if self.slicing is BROAD else MAX_RUNS_FILTERED
+        signal = self._any(colour) if runs is None or len(runs) > most else self._lines(runs)
         out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
         out.index_add_(0, self.pixels, signal * self.shading)
         return out.reshape(self.shape).cpu().numpy()
@@ -272,7 +288,7 @@ class Renderer:
         return signal
 
     def _sliced_order(self, tables: OrderTables, table: PatternTable, led: int, of_led: slice) -> Tensor:
-        step = SLICE_ROWS_NM if table.has_rows else SLICE_NM
+        step = self.slicing.rows_nm if table.has_rows else self.slicing.nm
         weights = tables.slices[step][:, of_led].sum(1)
         nodes = chebyshev_nodes(NM[0], NM[-1])
         edges = np.arange(NM[0], NM[-1] + 1, step)
@@ -282,7 +298,7 @@ class Renderer:
         material = self.material_channel[tables.active]
         total = torch.zeros(len(tables.active), device=self.device)
         strongest = weights.amax(1)
-        used = torch.nonzero(strongest >= 1e-3 * strongest.max()).ravel().tolist()
+        used = torch.nonzero(strongest >= self.slicing.floor * strongest.max()).ravel().tolist()
         low, high = float(tables.limits_nm[0].max()), float(tables.limits_nm[1].min())
         stop, last = None, -2
         for i in used:

@@ -82,7 +82,8 @@ def test_a_view_through_a_filter_equals_one_made_for_it() -> None:
     pattern = np.zeros((360, 640, 3), np.uint8)
     pattern[:, 300:305] = 204
     seen = world.renderer.through(transmission).expected(pattern)
-    assert seen == pytest.approx(made.expected(pattern), rel=2e-3, abs=1e-7)
+    # The light of a dark projector is summed over slices, which are narrower behind a filter.
+    assert seen == pytest.approx(made.expected(pattern), rel=2e-3, abs=1e-4 * float(seen.max()))
 
 
 def test_an_unknown_filter_is_told() -> None:

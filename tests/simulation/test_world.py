@@ -15,6 +15,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.pattern_table import PatternTable
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.renderer import NM, Renderer
@@ -129,6 +130,32 @@ def test_expected_light_moves_with_the_pattern_of_each_led(chart: Renderer) -> N
     seen = chart.expected(red)
     channels = bayer_channels(chart.rig.sensor.bayer, *seen.shape)
     assert seen[channels == 0].mean() > 5 * seen[channels == 2].mean()
+
+
+def test_many_lines_behind_a_filter_are_the_sum_of_each(chart: Renderer) -> None:
+    filtered = chart.through(true_transmission(540.0))
+    bands = [(start, start + 5) for start in range(20, 640, 52)]
+    dark = filtered.expected(bands_of_columns())
+    comb = filtered.expected(bands_of_columns(*bands)) - dark
+    singly = np.sum([filtered.expected(bands_of_columns(band)) - dark for band in bands], axis=0)
+    assert len(bands) > 8
+    assert comb == pytest.approx(singly, abs=1e-4 * float(comb.max()))
+
+
+def test_slices_behind_a_filter_are_as_narrow_as_its_images(chart: Renderer) -> None:
+    filtered = chart.through(true_transmission(540.0))
+    line = bands_of_columns((300, 308))
+    dark = filtered.expected(bands_of_columns())
+    white = filtered.expected(line) - dark
+    # Each LED alone is no grey image, so that it goes through the slices.
+    alone = [line * (np.arange(3) == led).astype(np.uint8) for led in range(3)]
+    leds = np.sum([filtered.expected(image) - dark for image in alone], axis=0)
+    # Beside the zero order only dispersed light is left.
+    far = filtered.pixels[(filtered.column - 302).abs() > 20].numpy()
+    lines, sliced = white.ravel()[far], leds.ravel()[far]
+    assert (lines > 0.002 * white.max()).sum() > 50
+    assert np.sqrt(((sliced - lines) ** 2).mean()) < 0.02 * np.sqrt((lines**2).mean())
+    assert sliced.sum() == pytest.approx(lines.sum(), rel=3e-3)
 
 
 def world(seed: int = 0) -> World:
