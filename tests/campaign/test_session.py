@@ -121,6 +121,9 @@ def test_a_fit_may_be_discarded_and_one_that_is_refused_waits(
     assert one.candidate() is None
     with pytest.raises(StoreError, match="No fit of fake"):
         one.accept()
+    one.fit()
+    one.redo(one.steps[0])
+    assert one.candidate() is None, "a fit of captures that are gone still waits"
 
 
 def test_a_failing_step_is_refused_and_leaves_the_others(
