@@ -9,6 +9,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.evaluation.quality import FLAG_COLOURS, GRAVITY
 from dsl_core.model.result import REASONS, Flag
 
 Floats = NDArray[np.float64] | NDArray[np.float32]
@@ -17,12 +18,6 @@ Rgba = NDArray[np.uint8]
 #: Larger pictures are thinned by whole steps to at most this width, px.
 _MAX_WIDTH_PX = 1000
 _STOPS = 17
-#: One colour per flag, in the order of `Flag`; told apart by the common kinds of colour blindness
-#: (after P. Tol, "Colour schemes", 2021, bright and muted).
-_FLAG_COLOURS = (
-    "#332288", "#cc3311", "#aa4499", "#882255", "#ddcc77",
-    "#999933", "#88ccee", "#44aa99", "#ee7733", "#555555",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -94,17 +89,11 @@ def flag_picture(flags: NDArray[np.integer], title: str, caption: str) -> Pictur
     """The flags (h, w), each pixel in the colour of its gravest flag, with words for those that occur."""
     rgba = np.zeros((*flags.shape, 4), np.uint8)
     keys = []
-    # Flags are declared from the gravest to the mildest, except for the last, which outranks all.
-    order = [Flag.NON_FINITE, *(flag for flag in Flag if flag is not Flag.NON_FINITE)]
-    for flag in reversed(order):
-        rgba[(flags & int(flag)) != 0] = (*bytes.fromhex(_colour(flag)[1:]), 255)
+    for flag in reversed(GRAVITY):
+        rgba[(flags & int(flag)) != 0] = (*bytes.fromhex(FLAG_COLOURS[flag][1:]), 255)
     for flag in Flag:
         share = float(np.mean((flags & int(flag)) != 0))
         if share > 0:
-            keys.append(Key(_colour(flag), REASONS[flag], share))
+            keys.append(Key(FLAG_COLOURS[flag], REASONS[flag], share))
     keys.append(Key("transparent", "nothing to remark", float(np.mean(flags == 0))))
     return Picture(title, caption, png_uri(rgba), keys=tuple(keys))
-
-
-def _colour(flag: Flag) -> str:
-    return _FLAG_COLOURS[list(Flag).index(flag)]

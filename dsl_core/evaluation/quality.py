@@ -1,0 +1,32 @@
+"""Flags as a map of classes with one colour each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.result import Flag
+
+#: One colour per flag, in the order of `Flag`; told apart by the common kinds of colour blindness
+#: (after P. Tol, "Colour schemes", 2021, bright and muted).
+FLAG_COLOURS: dict[Flag, str] = dict(
+    zip(
+        Flag,
+        (
+            "#332288", "#cc3311", "#aa4499", "#882255", "#ddcc77",
+            "#999933", "#88ccee", "#44aa99", "#ee7733", "#555555",
+        ),
+        strict=True,
+    )
+)  # fmt: skip
+#: From the gravest to the mildest: as declared, except for the last, which outranks all.
+GRAVITY = (Flag.NON_FINITE, *(flag for flag in Flag if flag is not Flag.NON_FINITE))
+
+
+def gravest_flag(flags: NDArray[np.integer]) -> NDArray[np.uint8]:
+    """1 + index in `Flag` of each pixel's gravest flag, 0 where nothing is wrong."""
+    order = list(Flag)
+    classes = np.zeros(flags.shape, np.uint8)
+    for flag in reversed(GRAVITY):
+        classes[(flags & int(flag)) != 0] = 1 + order.index(flag)
+    return classes

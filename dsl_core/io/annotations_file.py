@@ -1,0 +1,78 @@
+"""What a person marked on a result: pins, regions and references, kept beside it as ``NAME.marks.json``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.model.base import Record
+
+
+class PinRecord(Record):
+    """A pixel that was pinned."""
+
+    name: str
+    pixel: tuple[int, int]
+    colour: int = 0
+    shown: bool = True
+
+
+class RegionRecord(Record):
+    """A region: a closed outline of (x, y) corners, or runs of pixels where it was marked in 3D.
+
+    Each run is (row, first column, columns).
+    """
+
+    name: str
+    outline_px: tuple[tuple[float, float], ...] = ()
+    runs: tuple[tuple[int, int, int], ...] = ()
+    colour: int = 0
+    shown: bool = True
+
+
+class ReferenceRecord(Record):
+    """A file with a spectrum to compare with."""
+
+    name: str
+    file: str
+    colour: int = 0
+    shown: bool = True
+
+
+class Annotations(Record):
+    """All marks of a result."""
+
+    schema_version: Literal[1] = 1
+    pins: tuple[PinRecord, ...] = ()
+    regions: tuple[RegionRecord, ...] = ()
+    references: tuple[ReferenceRecord, ...] = ()
+
+
+def annotations_path(result: Path) -> Path:
+    """Where the marks of a result lie."""
+    return result.with_suffix(".marks.json")
+
+
+def save_annotations(annotations: Annotations, result: Path) -> Path:
+    """Store the marks beside a result, whole or not at all; raises `StoreError`."""
+    path = annotations_path(result)
+    write_atomic(path, annotations.model_dump_json(indent=1).encode())
+    return path
+
+
+def load_annotations(result: Path) -> Annotations:
+    """The marks beside a result, none where there is no file; raises `StoreError` for a damaged one."""
+    path = annotations_path(result)
+    if not path.exists():
+        return Annotations()
+    try:
+        return Annotations.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise StoreError(
+            f"The marks in {path} cannot be read ({type(error).__name__}). The result is opened without them;"
+            " move the file away to mark anew."
+        ) from error
