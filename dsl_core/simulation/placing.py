@@ -6,7 +6,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dsl_core.errors import DeviceError
+from dsl_core.errors import DeviceError, PlanError
 from dsl_core.model.placement import Placement
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.scenes import make_scene
@@ -68,17 +68,31 @@ class TwinHand:
             case "nothing":
                 return lambda position_mm: make_scene("plane", depth_mm=5000.0, reflectance=0.0), STAGE_MM
             case "spectralon":
-                position = float(options.pop("depth_mm", STAGE_MM))
+                position = _position_mm(options)
                 return lambda position_mm: self._diffuser(position_mm, options), position
             case "color-checker":
                 turn = (float(options.pop("roll_deg", 0.0)) + self.mishaps.roll_deg + 180) % 360 - 180
                 return lambda position_mm: make_scene("color-checker", roll_deg=turn, **options), STAGE_MM
             case "board":
-                return lambda position_mm: make_scene("board", **options), STAGE_MM
+                position = _position_mm(options)
+                return lambda mm: make_scene("board", depth_mm=self._carried_to(mm), **options), position
         raise DeviceError(f"The twin has no target {placement.target!r}.")
 
     def _diffuser(self, position_mm: float, options: dict[str, float | str]) -> Scene:
-        depth = STAGE_MM + (position_mm - STAGE_MM) * self.mishaps.stage_scale
+        depth = self._carried_to(position_mm)
         if self.mishaps.bow_mm:
-            return make_scene("bowed", depth_mm=depth, bow_mm=self.mishaps.bow_mm)
+            return make_scene("bowed", depth_mm=depth, bow_mm=self.mishaps.bow_mm, **options)
         return make_scene("plane", depth_mm=depth, **options)
+
+    def _carried_to(self, position_mm: float) -> float:
+        """Where a stage that says it is at a position really carries its target, mm."""
+        return STAGE_MM + (position_mm - STAGE_MM) * self.mishaps.stage_scale
+
+
+def _position_mm(options: dict[str, float | str]) -> float:
+    """Take the depth out of a target's options: where the stage stands at first, mm."""
+    depth = options.pop("depth_mm", STAGE_MM)
+    try:
+        return float(depth)
+    except ValueError as error:
+        raise PlanError(f"Option depth_mm must be a number of mm, not {depth!r}.") from error

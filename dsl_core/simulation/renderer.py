@@ -223,21 +223,26 @@ class Renderer:
             return 0.0
         if self._white is None:
             h, w = self.rig.projector.height_px, self.rig.projector.width_px
-            self._white = self._sliced(PatternTable.of(np.ones((h, w, 1)), self.response, self.device))
+            if self.slicing is BROAD:
+                self._white = self._sliced(PatternTable.of(np.ones((h, w, 1)), self.response, self.device))
+            else:
+                self._white = torch.zeros_like(self.column)
+                self._add_band(self._white, -0.5, w - 0.5, 1.0)
         return black * self._white
 
     def _lines(self, runs: list[tuple[float, float, float]]) -> Tensor:
         signal = torch.zeros_like(self.column) + self._black()
-        zero = self.zero_table.sum(0)[self.material_channel]
+        response = self.rig.projector_response
         for start, stop, level in runs:
-            radiance = (
-                float(self.rig.projector_response.radiance(level))
-                - self.rig.projector_response.black_fraction
-            )
-            signal += radiance * zero * zero_order_profile(self.column, start, stop, self.response)
-            for tables in self.orders:
-                self._add_order(signal, tables, start, stop, radiance)
+            self._add_band(signal, start, stop, float(response.radiance(level)) - response.black_fraction)
         return signal
+
+    def _add_band(self, signal: Tensor, start: float, stop: float, radiance: float) -> None:
+        """Add the light of white columns between two edges (px)."""
+        zero = self.zero_table.sum(0)[self.material_channel]
+        signal += radiance * zero * zero_order_profile(self.column, start, stop, self.response)
+        for tables in self.orders:
+            self._add_order(signal, tables, start, stop, radiance)
 
     def _add_order(
         self, signal: Tensor, tables: OrderTables, start: float, stop: float, radiance: float

@@ -28,12 +28,21 @@ def plane(
     return Scene("plane", f"flat white diffuser at {depth_mm:g} mm", (surface,), palette)
 
 
-def bowed(depth_mm: float = 700.0, bow_mm: float = 1.0, reflectance: float = 0.99) -> Scene:
+def bowed(
+    depth_mm: float = 700.0,
+    bow_mm: float = 1.0,
+    tilt_x_deg: float = 0.0,
+    tilt_y_deg: float = 0.0,
+    reflectance: float = 0.99,
+) -> Scene:
     """A white diffuser that should be flat and bulges towards the camera, by ``bow_mm`` over 300 mm."""
     check_range("depth_mm", depth_mm, 100, 5000, "mm")
     check_range("bow_mm", bow_mm, 0.01, 50, "mm")
+    check_range("tilt_x_deg", tilt_x_deg, -75, 75, "degrees")
+    check_range("tilt_y_deg", tilt_y_deg, -75, 75, "degrees")
     radius = 150.0**2 / (2 * bow_mm) + bow_mm / 2
-    ball = Sphere(np.array([0.0, 0.0, depth_mm + radius]), radius, uniform(0))
+    middle = tilted((0.0, 0.0, depth_mm), tilt_x_deg, tilt_y_deg, ENDLESS, uniform(0))
+    ball = Sphere(middle.centre_mm + radius * middle.normal, radius, uniform(0))
     palette = Materials.of({"diffuser": spectra.flat(reflectance)})
     return Scene("bowed", f"diffuser at {depth_mm:g} mm, bowed by {bow_mm:g} mm", (ball,), palette)
 

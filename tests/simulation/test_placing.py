@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DeviceError
+from dsl_core.errors import DeviceError, PlanError
 from dsl_core.model.placement import Placement
 from dsl_core.patterns.trial_pictures import trial_picture
 from dsl_core.simulation.bandpass_filters import LABELS_NM, true_transmission
@@ -40,7 +40,7 @@ def test_targets_stand_where_they_are_asked() -> None:
     place(rig, PLANE)
     assert world.truth.depth_mm == pytest.approx(650.0)
     place(rig, Placement(target="board", options={"depth_mm": 720.0, "roll_deg": 20.0}))
-    assert "board" in world.scene_at(0).name
+    assert "board" in world.scene_at(720.0).name
     place(rig, Placement(target="nothing"))
     assert shine(rig).max() < 5
 
@@ -53,6 +53,36 @@ def test_the_stage_moves_a_diffuser_that_was_placed() -> None:
     assert world.truth.depth_mm == pytest.approx(800.0)
     place(rig, PLANE)
     assert world.truth.depth_mm == pytest.approx(650.0)
+
+
+def test_the_stage_moves_a_board_that_was_placed() -> None:
+    rig, world = twin()
+    place(rig, Placement(target="board", options={"depth_mm": 720.0}))
+    near = world.truth.depth_mm.min()
+    assert rig.stage is not None
+    assert rig.stage.position_mm == 720.0
+    rig.stage.move_to(800.0)
+    assert near == pytest.approx(720.0)
+    assert world.truth.depth_mm.min() == pytest.approx(800.0)
+
+
+def test_a_depth_that_is_no_number_is_told() -> None:
+    rig, _ = twin()
+    with pytest.raises(PlanError, match="depth_mm must be a number"):
+        place(rig, PLANE.model_copy(update={"options": {"depth_mm": "near"}}))
+
+
+def test_a_bowed_diffuser_leans_as_asked() -> None:
+    leaning = Placement(target="spectralon", options={"tilt_y_deg": 20.0, "reflectance": 0.5})
+    depths = {}
+    for bow in ("0", "2"):
+        rig, world = twin(bow_mm=bow)
+        place(rig, leaning)
+        depths[bow] = world.truth.depth_mm
+        assert world.truth.materials.reflectance.max() == 0.5
+    assert np.ptp(depths["0"]) > 60
+    assert 1 < np.abs(depths["2"] - depths["0"]).max() < 8
+    assert np.abs(depths["2"] - depths["0"]).min() < 0.05
 
 
 def test_a_filter_passes_its_band_only() -> None:
