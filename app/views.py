@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Literal, Protocol
 
+from app.state.rig import RigChoice
+from dsl_core.patterns.trial_pictures import PictureKind
+
 Level = Literal["info", "warning", "error"]
 
 
@@ -12,6 +15,31 @@ class Notifier(Protocol):
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence; ``details`` are there for who asks."""
+
+
+class RigCommands(Protocol):
+    """What the Rig page asks for."""
+
+    def connect(self, choice: RigChoice) -> None:
+        """Open a rig."""
+
+    def disconnect(self) -> None:
+        """Close it."""
+
+    def start_live(self) -> None:
+        """Show frames as they come."""
+
+    def stop_live(self) -> None:
+        """Stop that."""
+
+    def take_frame(self) -> None:
+        """Hand over the newest frame."""
+
+    def set_exposure(self, exposure_ms: float) -> None:
+        """Expose live frames so long."""
+
+    def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
+        """Project a picture."""
 
 
 class RecordingNotifier:

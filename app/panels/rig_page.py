@@ -1,0 +1,176 @@
+"""The Rig page: devices at the left, the live picture in the middle, the projector at the right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import (
+    QFormLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.panels.live_view import LiveView
+from app.panels.projector_panel import ProjectorPanel
+from app.state.rig import Link, RigChoice, RigState
+from app.theme import Theme
+from app.views import RigCommands
+from app.widgets.forms import ChoiceBox, NumberBox, label, set_role
+from app.widgets.page import PageWidget
+from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
+
+#: How often the newest live frame is fetched, ms.
+FETCH_MS = 15
+SIDE_PX = 300
+_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
+
+
+class RigPage(PageWidget):
+    """Follows a `RigState` and asks a controller."""
+
+    def __init__(self, state: RigState, commands: RigCommands, rigs: list[tuple[str, str]]) -> None:
+        """``rigs`` are names and descriptions of the rigs that are installed."""
+        super().__init__()
+        self._state, self._commands = state, commands
+        self._stops: list[Callable[[], None]] = []
+        self.live = LiveView()
+        self.projector = ProjectorPanel()
+        self._rig = ChoiceBox("Rig", "The rig to connect")
+        for name, description in rigs:
+            self._rig.addItem(f"{name} – {description}" if description else name, name)
+        self._options = QLineEdit(" ".join(f"{key}={value}" for key, value in state.choice.value.options))
+        self._options.setAccessibleName("Options of the rig")
+        self._options.setPlaceholderText("scene=color-checker size=445x290")
+        self._options.setToolTip("Options as key=value, separated by spaces; see Help on this page")
+        self._connect_button = QPushButton("Connect")
+        self._connect_button.setProperty("role", "primary")
+        self._light = label("")
+        self._trouble = label("")
+        self._trouble.setProperty("role", "bad")
+        self._trouble.setWordWrap(True)
+        self._camera_text, self._projector_text = label("–"), label("–")
+        self._live_button = QPushButton("Start live view")
+        self._live_button.setToolTip("Look through the camera until it is needed for something else")
+        low, high = 0.01, 30_000.0
+        self._exposure = NumberBox(
+            "Exposure", low, high, state.exposure_ms.value, "ms", 2, "Exposure of live frames"
+        )
+        self._timer = QTimer(self)
+        self._timer.setInterval(FETCH_MS)
+        self._timer.timeout.connect(commands.take_frame)
+        self._lay_out()
+        self._connect()
+        index = self._rig.findData(state.choice.value.name)
+        self._rig.setCurrentIndex(max(index, 0))
+
+    def _lay_out(self) -> None:
+        devices = QGroupBox("Devices")
+        form = QFormLayout(devices)
+        form.addRow("Rig", self._rig)
+        form.addRow("Options", self._options)
+        form.addRow("", self._connect_button)
+        form.addRow("State", self._light)
+        form.addRow(self._trouble)
+        form.addRow("Camera", self._camera_text)
+        form.addRow("Projector", self._projector_text)
+        camera = QGroupBox("Camera")
+        camera_form = QFormLayout(camera)
+        camera_form.addRow("Exposure", self._exposure)
+        camera_form.addRow("", self._live_button)
+        left, right = QWidget(), QWidget()
+        for side, boxes in ((left, (devices, camera)), (right, (self.projector,))):
+            side.setFixedWidth(SIDE_PX)
+            column = QVBoxLayout(side)
+            column.setContentsMargins(0, 0, 0, 0)
+            for box in boxes:
+                column.addWidget(box)
+            column.addStretch(1)
+        row = QHBoxLayout(self)
+        row.addWidget(left)
+        row.addWidget(self.live, 1)
+        row.addWidget(right)
+
+    def _connect(self) -> None:
+        state, commands = self._state, self._commands
+        self._connect_button.clicked.connect(self._toggle_link)
+        self._live_button.clicked.connect(self._toggle_live)
+        self._exposure.valueChanged.connect(commands.set_exposure)
+        self.projector.wanted.connect(commands.show)
+        self._stops = [
+            state.link.follow(self._show_link),
+            state.devices.follow(self._show_devices),
+            state.trouble.follow(self._show_trouble),
+            state.live.follow(self._show_live),
+            state.frame.follow(self.live.show_frame),
+            state.exposure_ms.follow(self._exposure.setValue),
+        ]
+
+    def _toggle_link(self) -> None:
+        if self._state.link.value is Link.OPEN:
+            self._commands.disconnect()
+            return
+        self._commands.connect(RigChoice(str(self._rig.currentData()), parse_options(self._options.text())))
+
+    def _toggle_live(self) -> None:
+        if self._state.live.value:
+            self._commands.stop_live()
+        else:
+            self._commands.start_live()
+
+    def _show_link(self, link: Link) -> None:
+        self._light.setText(f"● {link.value}")
+        set_role(self._light, _ROLES[link])
+        self._connect_button.setText("Disconnect" if link is Link.OPEN else "Connect")
+        self._connect_button.setEnabled(link is not Link.OPENING)
+
+    def _show_devices(self, devices: DeviceRig | None) -> None:
+        camera, projector = self._state.camera, self._state.projector
+        self._camera_text.setText("–" if camera is None else _describe(camera))
+        self._projector_text.setText("–" if projector is None else _describe(projector))
+        self.live.set_camera(camera)
+        self.projector.set_projector(projector)
+        self._live_button.setEnabled(devices is not None)
+        self._exposure.setEnabled(devices is not None)
+        if camera is not None:
+            self._exposure.setRange(*camera.exposure_range_ms)
+
+    def _show_trouble(self, text: str) -> None:
+        self._trouble.setText(text)
+        self._trouble.setVisible(bool(text))
+
+    def _show_live(self, on: bool) -> None:
+        self._live_button.setText("Stop live view" if on else "Start live view")
+        if on:
+            self._timer.start()
+        else:
+            self._timer.stop()
+
+    def command_line(self) -> str:
+        """How the command line tests this rig."""
+        return f"dsl-scan selftest {self._state.choice.value.command}"
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.live.apply_theme(theme)
+
+    def release(self) -> None:
+        """Stop looking and let the devices go."""
+        for stop in self._stops:
+            stop()
+        self._timer.stop()
+        self._commands.stop_live()
+
+
+def _describe(info: CameraInfo | ProjectorInfo) -> str:
+    return f"{info.model}\n{info.width_px} × {info.height_px} px"
+
+
+def parse_options(text: str) -> tuple[tuple[str, str], ...]:
+    """Options from ``key=value`` texts separated by spaces; a word without ``=`` is switched on."""
+    pairs = [part.partition("=") for part in text.split()]
+    return tuple((key, value if sign else "on") for key, sign, value in pairs)

@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QPushButton
+from pytestqt.qtbot import QtBot
+
+from app.controllers.rig import RigController
+from app.jobs.qt_runner import QtRunner
+from app.panels.rig_page import RigPage, parse_options
+from app.state.rig import Link, RigChoice, RigState
+from app.theme import LIGHT
+from app.views import RecordingNotifier
+
+Bench = tuple[RigPage, RigState, QtRunner, RecordingNotifier]
+
+
+@pytest.fixture
+def bench(qtbot: QtBot) -> Iterator[Bench]:
+    state = RigState(RigChoice("twin", (("scene", "plane"), ("size", "64x48"))))
+    runner, notifier = QtRunner(), RecordingNotifier()
+    page = RigPage(state, RigController(state, runner, notifier), [("replay", ""), ("twin", "the twin")])
+    qtbot.addWidget(page)
+    page.apply_theme(LIGHT)
+    page.show()
+    yield page, state, runner, notifier
+    page.release()
+    runner.shut_down()
+
+
+def click(button: QPushButton) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def connect(qtbot: QtBot, page: RigPage, state: RigState) -> None:
+    click(page._connect_button)
+    qtbot.waitUntil(lambda: state.link.value is Link.OPEN, timeout=20_000)
+
+
+def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
+    page, state, runner, _ = bench
+    assert not page._live_button.isEnabled()
+    connect(qtbot, page, state)
+    assert "64 × 48" in page._camera_text.text()
+    click(page._live_button)
+    qtbot.waitUntil(lambda: page.live.frames_per_second > 0, timeout=20_000)
+    assert page._live_button.text() == "Stop live view"
+    click(page._live_button)
+    qtbot.waitUntil(lambda: not state.live.value)
+    click(page._connect_button)
+    qtbot.waitUntil(lambda: runner.active == ())
+    assert page._camera_text.text() == "–"
+
+
+def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
+    page, _, _, notifier = bench
+    page._options.setText("scene=moon")
+    click(page._connect_button)
+    qtbot.waitUntil(lambda: bool(notifier.told))
+    assert "moon" in page._trouble.text()
+    assert page._trouble.isVisible()
+    assert page._connect_button.text() == "Connect"
+
+
+def test_pictures_reach_the_projector(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    panel = page.projector
+    panel._kind.setCurrentIndex(panel._kind.findData("line"))
+    panel._column.setValue(100)
+    devices = state.devices.value
+    assert devices is not None
+    shown = devices.projector.world.image  # type: ignore[attr-defined]
+    assert shown[0, 99:106, 0].tolist() == [0, 204, 204, 204, 204, 204, 0]
+
+
+def test_the_line_wanders_and_stops(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    page.projector._column.setValue(page.projector._column.maximum())
+    page.projector._step()
+    assert page.projector._column.value() == 0
+
+
+def test_the_wheel_changes_nothing_without_focus(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    before = page._exposure.value()
+    page._options.setFocus()
+    spot = QPointF(5, 5)
+    wheel = QWheelEvent(
+        spot, page._exposure.mapToGlobal(spot), QPoint(0, 0), QPoint(0, 120), Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(page._exposure, wheel)
+    assert page._exposure.value() == before
+
+
+def test_the_page_names_its_command(bench: Bench) -> None:
+    page, _, _, _ = bench
+    assert page.command_line() == "dsl-scan selftest --rig twin --option scene=plane --option size=64x48"
+
+
+def test_options_as_people_type_them() -> None:
+    assert parse_options(" scene=box  film=off noise ") == (
+        ("scene", "box"),
+        ("film", "off"),
+        ("noise", "on"),
+    )
