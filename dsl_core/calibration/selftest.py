@@ -51,8 +51,9 @@ def analyse(capture: SelfTestCapture) -> SelfTest:
     dark = fit_dark(parts["dark"], sizes)
     black_dn = dark.level_dn.value
     transfer = fit_transfer(joined(parts["dark"], parts["series"]), black_dn, sizes)
-    noise_dn = float(transfer.mean_std(np.zeros(1), np.ones(1, np.int64))[0])
     first, second = capture.dark_frames
+    glow = np.array([np.median(first) - black_dn])
+    noise_dn = float(transfer.mean_std(glow, np.ones(1, np.int64))[0])
     projector, ambient = check_projector(parts["ramps"], dark, transfer, sizes)
     cycle, method = cycle_of(parts["cycle"], parts.get("spread"), black_dn)
     period = cycle.period_ms

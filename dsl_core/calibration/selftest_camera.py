@@ -131,7 +131,7 @@ def count_hot_pixels(first: NDArray[np.uint16], second: NDArray[np.uint16], nois
         for column in (0, 1):
             plane = frame[row::2, column::2]
             # Beyond every neighbour, so that the edge of a faint picture is no hot pixel.
-            excess = plane - maximum_filter(plane, footprint=around)
+            excess = plane - maximum_filter(plane, footprint=around, mode="mirror")
             # Far beyond what noise does; dim pixels that merely glow belong to the noise figures.
             count += int((excess > max(6 * noise_dn, 5.0)).sum())
     return count

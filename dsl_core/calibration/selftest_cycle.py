@@ -98,22 +98,42 @@ def _fine(time_s: Floats, signal: Floats, hz: float, step: float) -> tuple[float
     """Frequency with standard deviation, and the amplitude of the channel that varies most.
 
     Steep edges leave residuals that repeat with the phase and are no noise, so the spread comes from fits
-    that leave out every ``_GROUPS``-th frame in turn (the jackknife).
+    that leave out every ``_GROUPS``-th frame in turn (the jackknife); a handful of them may agree by chance,
+    so it is at least what the residuals say as noise.
     """
-    best, amplitude = _nearest(time_s, signal, hz, step)
+    harmonics = _worthwhile(time_s, signal, _nearest(time_s, signal, hz, step, _HARMONICS)[0])
+    best, amplitude = _nearest(time_s, signal, hz, step, harmonics)
     parts = []
     for i in range(_GROUPS):
         kept = np.arange(len(time_s)) % _GROUPS != i
-        parts.append(_nearest(time_s[kept], signal[kept], best, step / 2))
+        parts.append(_nearest(time_s[kept], signal[kept], best, step / 2, harmonics))
     varied = np.array([*parts]).std(0) * np.sqrt(_GROUPS - 1)
-    return best, float(varied[0]), Measured(value=amplitude, std=float(varied[1]))
+    width = step / 10
+    low, least, high = _residual(time_s, signal, best + width * np.arange(-1.0, 2.0), harmonics)
+    spare = signal.size - _parameters(harmonics)
+    noise = np.sqrt(2 * least / spare * width**2 / max(low + high - 2 * least, 1e-300))
+    return best, float(max(varied[0], noise)), Measured(value=amplitude, std=float(varied[1]))
 
 
-def _nearest(time_s: Floats, signal: Floats, hz: float, step: float) -> tuple[float, float]:
+def _worthwhile(time_s: Floats, signal: Floats, hz: float) -> int:
+    """The number of harmonics that the light justifies (Bayesian information criterion)."""
+    most = max(1, min(_FINE_HARMONICS, len(time_s) // 7))
+    scores = [
+        signal.size * np.log(max(float(_residual(time_s, signal, np.array([hz]), count)[0]), 1e-12))
+        + _parameters(count) * np.log(signal.size)
+        for count in range(1, most + 1)
+    ]
+    return int(np.argmin(scores)) + 1
+
+
+def _parameters(harmonics: int) -> int:
+    """Of a wave in three channels, and its frequency."""
+    return 3 * (2 * harmonics + 1) + 1
+
+
+def _nearest(time_s: Floats, signal: Floats, hz: float, step: float, harmonics: int) -> tuple[float, float]:
     """Frequency of least residual within ``step`` of a start, and half the height of its wave."""
     from scipy.optimize import minimize_scalar
-
-    harmonics = max(1, min(_FINE_HARMONICS, len(time_s) // 7))
 
     def cost(trial: float) -> float:
         return float(_residual(time_s, signal, np.array([trial]), harmonics)[0])
@@ -121,11 +141,8 @@ def _nearest(time_s: Floats, signal: Floats, hz: float, step: float) -> tuple[fl
     grid = hz + np.linspace(-step, step, 4 * harmonics + 1)
     near = grid[np.argmin(_residual(time_s, signal, grid, harmonics))]
     width = 2 * step / (4 * harmonics)
-    best = float(
-        minimize_scalar(
-            cost, bounds=(near - width, near + width), method="bounded", options={"xatol": 1e-7}
-        ).x
-    )
+    bounds = (near - width, near + width)
+    best = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-7}).x)
     design = _design(time_s, np.array([best]), harmonics)[0]
     wave = design @ np.linalg.lstsq(design, signal, rcond=None)[0]
     return best, float(np.ptp(wave, axis=0).max()) / 2

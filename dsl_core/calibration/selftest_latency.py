@@ -70,16 +70,17 @@ def _trials(
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], int]:
     """Rows that are judged, the wait before each, and how many stale frames there were.
 
-    A frame is stale when it shows the picture before even after the longest wait and the next does not. A
-    camera that mostly delivers stale frames is judged by the second frame of each trial.
+    A frame is stale when it shows the picture before even after the longest wait and the next does not; that
+    says nothing of the wait, so it is not judged.
     """
     # The rows of the sure pictures come first and are no trials.
     trial = np.arange(len(readings)) > np.flatnonzero(readings.since_show >= REFERENCE).max()
     first = np.flatnonzero(trial & (readings.since_show == 0))
-    of_long = first[readings.gap_ms[first] == readings.gap_ms[first].max()]
-    stale = int((~right[of_long] & right[of_long + 1]).sum())
-    judged = first + 1 if stale > len(of_long) / 2 else first
-    return judged, readings.gap_ms[first], stale
+    is_long = readings.gap_ms[first] == readings.gap_ms[first].max()
+    is_stale = is_long & ~right[first] & right[first + 1]
+    # When all are late at the longest wait, it is the wait.
+    is_stale &= not is_stale[is_long].all()
+    return first[~is_stale], readings.gap_ms[first[~is_stale]], int(is_stale.sum())
 
 
 def _blocking(readings: Readings) -> Measured:

@@ -98,7 +98,6 @@ class SelfTestRun:
         self._parts["latency"] = readings
         found = check_latency(readings, 0.0, has_trusted_times(self._parts["cycle"]), 0.0)
         eye.settle_ms = found.wait_ms.value + _MARGIN_MS
-        eye.discard = 1 if found.stale_frames else 0
 
     def _exposures(self, cycle: Cycle) -> tuple[float, ...]:
         """Exposures whose beat is measured: the published and the advised ones."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field, fields
 
@@ -59,12 +60,16 @@ class _Row:
 
 @dataclass
 class Eye:
-    """Camera and projector together; ``attempt`` tells the frames of a look from those that are kept."""
+    """Camera and projector together.
+
+    ``attempt`` tells the frames of a look from those that are kept; ``ceiling_dn`` is where signals end if
+    that is below the end of the scale.
+    """
 
     devices: DeviceRig
     attempt: int = 0
     settle_ms: float = _FIRST_SETTLE_MS
-    discard: int = 0
+    ceiling_dn: float = math.inf
     frames: int = 0
     show_s: list[float] = field(default_factory=list)
     times_s: list[float] = field(default_factory=list)
@@ -78,8 +83,8 @@ class Eye:
 
     @property
     def full_scale_dn(self) -> float:
-        """The largest number the camera can say."""
-        return float(2**self.devices.camera.info.bit_depth - 1)
+        """The largest number that light can reach: the end of the scale, or of the sensor before it."""
+        return min(2.0**self.devices.camera.info.bit_depth - 1, self.ceiling_dn)
 
     @property
     def last_mean_dn(self) -> float:
@@ -110,8 +115,6 @@ class Eye:
         self.show_s.append(time.perf_counter() - start)
         self._drive, self._since_show = drive, 0
         self.wait(self.settle_ms if settle_ms is None else settle_ms)
-        for _ in range(self.discard if settle_ms is None else 0):
-            self.snap(self._exposure_ms)
 
     def snap(self, exposure_ms: float) -> Frame:
         """One frame; raises `DeviceError` when the camera fails again and again or exposes otherwise."""

@@ -49,8 +49,8 @@ def find_level(
         level = min(level * ratio ** (1 / _GUESSED_GAMMA), 1.0)
     if clips:
         raise CalibrationError(
-            f"The picture clips at {exposure_ms:.3g} ms even when the projector is nearly black: the ambient"
-            " light is too strong. Switch lamps off and keep daylight out."
+            f"The picture clips at {exposure_ms:.3g} ms even when the projector is nearly black: ambient"
+            " light or the projector's black is too bright. Switch lamps off, then close the aperture."
         )
     return drive
 

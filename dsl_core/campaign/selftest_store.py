@@ -48,7 +48,7 @@ def load_capture(folder: Path) -> SelfTestCapture:
     """Read the archive of a folder; raises `StoreError` when it is missing, damaged or of another version."""
     path = folder / ARCHIVE_NAME
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             about = json.loads(str(stored["about"]))
             if about["version"] != _VERSION:
                 raise ValueError(f"version {about['version']} instead of {_VERSION}")

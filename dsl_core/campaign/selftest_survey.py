@@ -14,6 +14,8 @@ from dsl_core.optics.sensor import bayer_channels
 
 #: White is exposed until it reaches this share of the scale, or this long.
 _AIM, _LONGEST_MS = 0.4, 200.0
+#: So many times that exposure, at most so long, shows where signals end.
+_BRIGHTER, _LONG_MS = 40.0, 2000.0
 #: Frames that catch every LED of a colour cycle at least once, and their random waits.
 _GLANCES, _MAP_FRAMES, _MAX_GAP_MS = 6, 16, 40.0
 #: A difference between white and black that is no light.
@@ -48,6 +50,8 @@ def survey(eye: Eye, rng: np.random.Generator) -> Survey:
     Raises `CalibrationError` when there is no light, too much of it, or too little of the picture in view,
     and `DeviceError` when the projector does not follow or the camera ignores its exposure.
     """
+    from scipy.ndimage import uniform_filter
+
     info = eye.devices.camera.info
     shortest = info.exposure_range_ms[0]
     eye.show(BLACK)
@@ -60,12 +64,16 @@ def survey(eye: Eye, rng: np.random.Generator) -> Survey:
     eye.show(grey(1.0))
     white_ms = _expose(eye, black_dn, rng)
     _require_obedience(eye, white_ms, black_dn, rng)
+    eye.ceiling_dn = _ceiling(eye, white_ms)
+    _require_fresh_frames(eye, white_ms)
+    eye.show(grey(1.0))
     white = _mean(eye, white_ms, rng)
     eye.show(BLACK)
     dark = _mean(eye, white_ms, rng)
-    if float(np.percentile(white - dark, 99)) < _NO_LIGHT_DN:
+    # Means over neighbours, so that the noise of bright ambient light is no light of the projector.
+    if float(np.percentile(uniform_filter(white - dark, 9), 99)) < _NO_LIGHT_DN:
         raise _no_light(float(np.percentile(dark, 99)) - black_dn, white_ms)
-    region, lit_share = _find_region(white - dark, bayer_channels(info.bayer, *white.shape))
+    region, lit_share = _find_region(white, dark, bayer_channels(info.bayer, *white.shape))
     sizes = RegionSizes(
         np.array([len(each) for each in region.lit]),
         np.array([len(each) for each in region.beside]),
@@ -115,6 +123,29 @@ def _require_obedience(eye: Eye, white_ms: float, black_dn: float, rng: np.rando
         )
 
 
+def _ceiling(eye: Eye, white_ms: float) -> float:
+    """Where signals end, DN: twice the light gives no more; infinite where the scale ends first."""
+    longest = min(eye.devices.camera.info.exposure_range_ms[1], _LONG_MS)
+    exposure_ms = min(_BRIGHTER * white_ms, longest / 2)
+    once, twice = (float(np.median(eye.snap(k * exposure_ms).pixels)) for k in (1, 2))
+    return twice if twice < 1.1 * once and exposure_ms > 2 * white_ms else float("inf")
+
+
+def _require_fresh_frames(eye: Eye, white_ms: float) -> None:
+    """Raise `DeviceError` when the frame after a change of the picture still shows the picture before."""
+    for _ in range(2):
+        eye.show(grey(1.0))
+        bright = max(float(eye.snap(white_ms).pixels.mean()) for _ in range(_GLANCES))
+        eye.show(BLACK)
+        first, second = (float(eye.snap(white_ms).pixels.mean()) for _ in range(2))
+        if first - second < 0.2 * (bright - second) or bright - second < 0.1 * _NO_LIGHT_DN:
+            return
+    raise DeviceError(
+        "The camera delivers stale frames: after a new picture its first frame shows the one before, the next"
+        " one does not. Have its driver expose on request, or empty its buffer before each frame."
+    )
+
+
 def _glance(eye: Eye, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
     """The brightest value of each pixel over a few frames at random times."""
     brightest = eye.snap(exposure_ms).pixels
@@ -145,10 +176,14 @@ def _no_light(ambient_dn: float, exposure_ms: float) -> CalibrationError | Devic
     )
 
 
-def _find_region(white: NDArray[np.float64], channels: NDArray[np.int64]) -> tuple[Region, float]:
-    """Lit pixels and pixels beside the picture of each channel, and the share of lit ones."""
+def _find_region(
+    bright: NDArray[np.float64], black: NDArray[np.float64], channels: NDArray[np.int64]
+) -> tuple[Region, float]:
+    """Lit pixels and pixels beside the picture of each channel, without hot ones; the share of lit ones."""
     from scipy.ndimage import maximum_filter
 
+    white = bright - black
+    sound = np.abs(black - np.median(black)) < max(_NO_LIGHT_DN, 0.1 * float(np.percentile(white, 99)))
     lit, beside = [], []
     noise = np.median(np.abs(np.diff(white[::2], axis=0))) + 0.1
     brightest = np.array([np.percentile(white[channels == c], 99) for c in range(3)])
@@ -157,7 +192,7 @@ def _find_region(white: NDArray[np.float64], channels: NDArray[np.int64]) -> tup
     near = maximum_filter(share, 2 * _DISTANCE_PX + 1)
     dark = (near < _BESIDE + 6 * noise / np.maximum(brightest.min(), _NO_LIGHT_DN)) & (share < _BESIDE * 2)
     for c in range(3):
-        own = channels == c
+        own = (channels == c) & sound
         lit.append(np.flatnonzero(own & (share > _LIT)))
         beside.append(np.flatnonzero(own & dark))
     if min(len(each) for each in lit) < _FEWEST_PIXELS:

@@ -9,6 +9,7 @@ from dsl_core.calibration.selftest_readings import Readings, joined
 from dsl_core.campaign.selftest_eye import BLACK, Drive, Eye, grey
 from dsl_core.campaign.selftest_light import find_level
 from dsl_core.campaign.selftest_survey import Survey
+from dsl_core.errors import CalibrationError
 
 _FRAMES, _SHORT_MS, _GAPS_MS = 96, 1.5, (5.0, 45.0)
 #: Halvings of the short exposure until no moment of the cycle clips.
@@ -48,8 +49,13 @@ def capture_spread(eye: Eye, seen: Survey, rate: float, rng: np.random.Generator
 
 
 def white_rate(cycle: Readings, black_dn: float) -> float:
-    """Mean signal of white in the strongest channel, DN per ms."""
-    return float((cycle.mean_dn - black_dn).mean(0).max() / cycle.exposure_ms[0])
+    """Mean signal of white in the strongest channel, DN per ms; raises `CalibrationError` without any."""
+    rate = float((cycle.mean_dn - black_dn).mean(0).max() / cycle.exposure_ms[0])
+    if rate <= 0:
+        raise CalibrationError(
+            "The light went out. Check that the projector stays on and the target in view."
+        )
+    return rate
 
 
 def capture_latency(eye: Eye, exposure_ms: float, drive: Drive) -> Readings:

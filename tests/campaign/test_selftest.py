@@ -1,0 +1,224 @@
+"""The self-test finds what is true of a rig, says what is wrong with a bad one, and fits from disk alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.campaign.recipe import Bench
+from dsl_core.campaign.recipes import load_recipe
+from dsl_core.campaign.selftest import SelfTestRecipe, run_selftest
+from dsl_core.campaign.selftest_store import ARCHIVE_NAME
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError, Cancelled, DeviceError, StoreError
+from dsl_core.model.figure import Figure, failures
+from dsl_core.model.selftest import Measured, SelfTest
+from dsl_core.progress import CallbackProgress, CancelToken, NoProgress
+from dsl_core.simulation.faults import FaultPlan, with_faults
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.light_rig import LightWorld, light_rig
+
+RECIPE = SelfTestRecipe()
+
+
+def bench(devices: DeviceRig, folder: Path) -> Bench:
+    return Bench(devices, folder, published_rig())
+
+
+def score(measured: Measured, truth: float) -> float:
+    return (measured.value - truth) / measured.std
+
+
+def failed(figures: tuple[Figure, ...]) -> list[str]:
+    return [figure.name.split(",")[0] for figure in failures(figures)]
+
+
+@pytest.fixture(scope="module")
+def found() -> SelfTest:
+    return run_selftest(light_rig(LightWorld(cycle_hz=60.0, jitter_ms=0.5)))[0]
+
+
+def test_all_is_found_within_its_uncertainty(found: SelfTest) -> None:
+    camera, projector = found.camera, found.projector
+    scores = {
+        "black level": score(camera.black_level_dn, 260.0),
+        "intercept": score(camera.intercept_dn, 260.0),
+        "electrons per DN": score(camera.electrons_per_dn, 10.0),
+        "read noise": score(camera.read_noise_dn, 1.0),
+        "gamma": score(projector.gamma, 2.2),
+        "black": score(projector.black_fraction, 0.0005),
+    }
+    assert {name: z for name, z in scores.items() if abs(z) > 3.5} == {}
+    assert camera.black_level_dn.std < 0.03
+    assert camera.electrons_per_dn.std < 0.1
+    assert camera.read_noise_dn.std < 0.03
+    assert projector.gamma.std < 0.001
+    assert found.latency.blocking_ms.value == pytest.approx(30.0, abs=0.5)
+    assert found.frames > 400
+
+
+def test_a_good_rig_passes_and_its_rig_is_updated(found: SelfTest) -> None:
+    assert failed(RECIPE.figures(found)) == []
+    rig = RECIPE.apply(found, published_rig())
+    assert rig.sensor.black_level_dn == found.camera.black_level_dn.value
+    assert rig.projector_response.gamma == pytest.approx(2.2, abs=0.003)
+    assert rig.projector_response.halo_decay_px == published_rig().projector_response.halo_decay_px
+    assert rig.frame_period_ms == pytest.approx(1000 / 60, rel=1e-3)
+    assert SelfTest.model_validate_json(found.model_dump_json()) == found
+
+
+def test_advised_exposures_remove_the_beat(found: SelfTest) -> None:
+    at = {round(beat.exposure_ms, 1): beat for beat in found.cycle.beats}
+    assert sorted(at) == [160.0, 166.7, 320.0, 333.3]
+    assert at[160.0].ratio_percent.value > 2.0
+    assert at[320.0].ratio_percent.value > 0.5
+    assert at[166.7].ratio_percent.value < 0.1
+    assert at[333.3].ratio_percent.value < 0.1
+
+
+@pytest.mark.parametrize("hz", [50, 60, 120])
+def test_the_twins_cycle_is_found_and_its_beat_removed(hz: int) -> None:
+    rig = open_twin({"scene": "plane", "film": "off", "size": "160x104", "led_cycle_hz": str(hz)})
+    found, figures = run_selftest(replace(rig, place=None))
+    assert failed(figures) == []
+    assert found.cycle.period_ms is not None
+    assert found.cycle.period_ms.value == pytest.approx(1000 / hz, rel=1e-3)
+    assert found.cycle.shortest_ms == pytest.approx(1000 / hz, rel=1e-3)
+    advised = [
+        b for b in found.cycle.beats if any(abs(b.exposure_ms - a) < 1e-6 for a in found.cycle.advised_ms)
+    ]
+    assert len(advised) == 2
+    assert max(beat.ratio_percent.value for beat in advised) < 0.15
+    assert rig.calibration is not None
+    assert abs(score(found.projector.gamma, rig.calibration.projector_response.gamma)) < 4
+    assert found.latency.blocking_ms.value == pytest.approx(50.0, abs=1.5)
+
+
+def test_without_time_stamps_the_spread_finds_the_cycle() -> None:
+    found, figures = run_selftest(light_rig(LightWorld(cycle_hz=60.0, stamps=False)))
+    assert found.cycle.method == "spread"
+    assert found.cycle.period_ms is not None
+    assert found.cycle.period_ms.value == pytest.approx(1000 / 60, rel=5e-3)
+    assert failed(figures) == []
+
+
+def test_steady_light_has_no_cycle_and_keeps_the_exposures_wanted() -> None:
+    recipe = SelfTestRecipe(wanted_ms=(100.0,))
+    found, figures = run_selftest(light_rig(LightWorld()), recipe=recipe)
+    assert found.cycle.period_ms is None
+    assert found.cycle.modulation.value < 0.01
+    assert found.cycle.advised_ms == (100.0,)
+    assert recipe.apply(found, published_rig()).frame_period_ms == published_rig().frame_period_ms
+    assert failed(figures) == []
+
+
+@pytest.mark.parametrize(
+    ("world", "names"),
+    [
+        (LightWorld(bend=0.05), ["linearity"]),
+        (LightWorld(clip_dn=3000.0), ["saturation"]),
+        (LightWorld(hot=40), ["hot pixels"]),
+        (LightWorld(late_ms=37.0), ["latency not waited for"]),
+        (LightWorld(ambient=5.0), ["light with the projector black"]),
+        (LightWorld(gamma=(2.2, 2.3, 2.2)), ["gamma", "ramps"]),
+        (LightWorld(drop=230), ["gamma", "ramps", "ramps"]),
+    ],
+    ids=["bent", "clipped", "hot", "late", "ambient", "gamma", "falling"],
+)
+def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str]) -> None:
+    found, figures = run_selftest(light_rig(world))
+    assert failed(figures) == names
+    assert all(figure.advice for figure in failures(figures))
+    # Whatever else is wrong, the noise of the camera is still measured.
+    assert found.camera.electrons_per_dn.value == pytest.approx(10.0, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("world", "kind", "message"),
+    [
+        (LightWorld(brightness=0.0), CalibrationError, "sees nothing"),
+        (
+            LightWorld(connected=False, ambient=20.0),
+            DeviceError,
+            "white and black of the projector look the same",
+        ),
+        (
+            LightWorld(brightness=3000.0),
+            CalibrationError,
+            r"White is saturated at the shortest exposure \(0.02 ms\)",
+        ),
+        (LightWorld(ambient=1e6), CalibrationError, "although the projector shows black"),
+        (LightWorld(ambient=400.0), CalibrationError, "ambient light"),
+        (LightWorld(ignores_exposure=True, brightness=0.1), DeviceError, "ignores the exposure"),
+        (LightWorld(stale=True), DeviceError, "stale frames"),
+        (LightWorld(late_ms=600.0), DeviceError, "does not always see a new picture 400 ms"),
+    ],
+    ids=["dark", "unplugged", "bright", "black saturated", "ambient", "exposure", "stale", "slow"],
+)
+def test_hopeless_rigs_are_refused_with_what_to_do(
+    world: LightWorld, kind: type[Exception], message: str
+) -> None:
+    with pytest.raises(kind, match=f"Self-test, .*{message}"):
+        run_selftest(light_rig(world))
+
+
+def test_lost_frames_are_taken_again_and_a_dead_camera_is_named() -> None:
+    rig = open_twin({"scene": "plane", "film": "off", "size": "96x64"})
+    found, _ = run_selftest(replace(with_faults(rig, FaultPlan(seed=1, lost=0.02)), place=None))
+    assert found.camera.black_level_dn.value == pytest.approx(260.0, abs=0.1)
+    with pytest.raises(DeviceError, match=r"Self-test, colour cycle: .*does not answer"):
+        run_selftest(replace(with_faults(rig, FaultPlan(camera_gone_at=160)), place=None))
+
+
+def test_captures_survive_on_disk_and_fit_needs_no_devices(tmp_path: Path, found: SelfTest) -> None:
+    here = bench(light_rig(LightWorld(cycle_hz=60.0, jitter_ms=0.5)), tmp_path)
+    (step,) = RECIPE.steps(here)
+    assert not RECIPE.is_captured(here, step)
+    RECIPE.capture(here, step, NoProgress())
+    assert RECIPE.is_captured(here, step)
+    assert [path.name for path in (tmp_path / step.key).iterdir()] == [ARCHIVE_NAME]
+    again = RECIPE.fit(bench(light_rig(LightWorld(connected=False)), tmp_path), NoProgress())
+    # The clock of the computer is no part of what is simulated.
+    assert again.model_dump(exclude={"latency"}) == found.model_dump(exclude={"latency"})
+
+
+def test_an_interrupted_self_test_leaves_nothing_behind(tmp_path: Path) -> None:
+    token = CancelToken()
+    here = bench(light_rig(LightWorld()), tmp_path)
+    (step,) = RECIPE.steps(here)
+
+    def stop(stage: str, done: int, total: int) -> None:
+        if done == 2:
+            token.cancel()
+
+    with pytest.raises(Cancelled):
+        RECIPE.capture(here, step, CallbackProgress(stop, token))
+    assert not RECIPE.is_captured(here, step)
+    with pytest.raises(StoreError, match="Capture the self-test again"):
+        RECIPE.fit(here, NoProgress())
+    (tmp_path / step.key).mkdir()
+    (tmp_path / step.key / ARCHIVE_NAME).write_bytes(b"PK\x03\x04 broken")
+    with pytest.raises(StoreError, match="damaged"):
+        RECIPE.fit(here, NoProgress())
+
+
+def test_a_look_says_whether_the_target_is_right(tmp_path: Path) -> None:
+    here = bench(light_rig(LightWorld()), tmp_path)
+    (step,) = RECIPE.steps(here)
+    assert failed(RECIPE.look(here, step)) == []
+    bright = bench(light_rig(LightWorld(ambient=20.0)), tmp_path)
+    assert failed(RECIPE.look(bright, step)) == ["ambient light"]
+    with pytest.raises(CalibrationError, match=r"Step Self-test: .*lens cap"):
+        RECIPE.look(bench(light_rig(LightWorld(brightness=0.0)), tmp_path), step)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_recipe_is_found_by_its_name() -> None:
+    recipe = load_recipe("selftest", {"wanted_ms": "100,200"})
+    assert isinstance(recipe, SelfTestRecipe)
+    assert np.allclose(recipe.wanted_ms, (100.0, 200.0))
+    assert recipe.needs == ()

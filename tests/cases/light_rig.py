@@ -1,0 +1,132 @@
+"""A small camera that looks straight at a projector's picture, both with faults to switch on.
+
+Formulas only, so that the self-test is held against something that shares no code with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
+from dsl_core.model.frames import Frame
+from dsl_core.simulation.published_rig import published_rig
+
+WIDTH, HEIGHT, SCALE = 160, 96, 4
+#: Colour of each LED (rows) in the camera's channels, DN per ms.
+MIX = np.array([[165.0, 44.0, 6.0], [40.0, 307.0, 73.0], [8.0, 32.0, 206.0]])
+
+
+@dataclass
+class LightWorld:
+    """What is true; times in ms. ``cycle_hz`` None is steady light."""
+
+    seed: int = 0
+    cycle_hz: float | None = None
+    gamma: tuple[float, float, float] = (2.2, 2.2, 2.2)
+    black: float = 0.0005
+    ambient: float = 0.002
+    brightness: float = 1.0
+    blocking_ms: float = 30.0
+    late_ms: float = 0.0
+    stamps: bool = True
+    stale: bool = False
+    ignores_exposure: bool = False
+    connected: bool = True
+    bend: float = 0.0
+    drop: int = 256
+    clip_dn: float = 4095.0
+    hot: int = 0
+    jitter_ms: float = 0.0
+    now_ms: float = 0.0
+    shown: list[tuple[float, NDArray[np.uint8]]] = field(default_factory=list)
+
+    def drive(self, start_ms: float, stop_ms: float) -> NDArray[np.float64]:
+        """Mean light of each LED over an exposure, (rows, columns, LEDs), relative to full drive."""
+        edges = [*(time for time, _ in self.shown if start_ms < time < stop_ms), stop_ms]
+        total = np.zeros((HEIGHT, WIDTH, 3))
+        for edge in edges:
+            before = [image for time, image in self.shown if time <= start_ms]
+            picture = before[-1] if before and self.connected else np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+            level = np.where(picture >= self.drop, 0.8, 1.0) * picture / 255
+            light = self.black + (1 - self.black) * level ** np.array(self.gamma)
+            total += light * self.on(start_ms, edge)
+            start_ms = edge
+        return total
+
+    def on(self, start_ms: float, stop_ms: float) -> NDArray[np.float64]:
+        """For how long each LED was on, times three."""
+        if self.cycle_hz is None:
+            return np.full(3, stop_ms - start_ms)
+        x = np.array([start_ms, stop_ms])[:, None] * self.cycle_hz / 1000 - np.arange(3) / 3
+        done = np.floor(x) + np.clip(3 * (x - np.floor(x)), 0, 1)
+        return np.asarray((done[1] - done[0]) * 1000 / self.cycle_hz)
+
+
+class LightCamera(Camera):
+    """Adds noise, rounding and clipping; unannounced faults come from the world."""
+
+    def __init__(self, world: LightWorld) -> None:
+        self.world, self.exposure_ms, self.number = world, 1.0, 0
+        self.shot, self.attempt = 0, 0
+        self.before: NDArray[np.uint16] | None = None
+
+    @property
+    def info(self) -> CameraInfo:
+        return CameraInfo("light", "L-C", WIDTH, HEIGHT, "RGGB", 12, (0.02, 10_000.0))
+
+    def configure(self, exposure_ms: float) -> float:
+        self.exposure_ms = 10.0 if self.world.ignores_exposure else exposure_ms
+        return exposure_ms
+
+    def prepare(self, shot_index: int, attempt: int = 0) -> None:
+        self.shot, self.attempt = shot_index, attempt
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        world, sensor = self.world, published_rig().sensor
+        rng = np.random.default_rng((world.seed, self.shot, self.attempt))
+        start = world.now_ms + world.jitter_ms * rng.random()
+        light = world.drive(start, start + self.exposure_ms) @ MIX * world.brightness
+        # The last rows see beside the picture.
+        light[-16:] = 0
+        channel = np.array([[0, 1], [1, 2]])[np.arange(HEIGHT)[:, None] % 2, np.arange(WIDTH) % 2]
+        signal = np.take_along_axis(light, channel[..., None], 2)[..., 0]
+        signal = signal - world.bend * np.minimum(signal, 4095) ** 2 / 4095 + world.ambient * self.exposure_ms
+        signal = signal + rng.standard_normal(signal.shape) * np.sqrt(
+            np.maximum(signal, 0) / sensor.electrons_per_dn + 1
+        )
+        signal.flat[: world.hot * 7 : 7] += 300
+        pixels = np.clip(np.rint(signal + sensor.black_level_dn), 0, world.clip_dn).astype(np.uint16)
+        delivered = self.before if world.stale and self.before is not None else pixels
+        self.before = pixels
+        world.now_ms += self.exposure_ms
+        self.number += 1
+        return Frame(delivered, self.exposure_ms, world.now_ms / 1000 if world.stamps else 0.0, self.number)
+
+
+class LightProjector(Projector):
+    """Returns after the blocking time; the picture comes later still by ``late_ms``."""
+
+    def __init__(self, world: LightWorld) -> None:
+        self.world = world
+
+    @property
+    def info(self) -> ProjectorInfo:
+        return ProjectorInfo("light", "L-P", WIDTH * SCALE, HEIGHT * SCALE, 30.0, 1000 / 60)
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
+        self.world.now_ms += self.world.blocking_ms
+        small = colour[::SCALE, ::SCALE].copy()
+        self.world.shown = [*self.world.shown[-3:], (self.world.now_ms + self.world.late_ms, small)]
+
+
+def light_rig(world: LightWorld) -> DeviceRig:
+    """The devices of a world, on its clock."""
+
+    def sleep(seconds: float) -> None:
+        world.now_ms += 1000 * seconds
+
+    return DeviceRig("light", LightCamera(world), LightProjector(world), nominal=published_rig(), sleep=sleep)
