@@ -79,7 +79,7 @@ def test_what_ldconfig_does_not_list_is_missing() -> None:
     )
     assert run.missing_packages(listing, with_tests=False) == ["libegl1"]
     absent = run.missing_packages(listing, with_tests=True, which=lambda program: None)
-    assert absent == ["libegl1", "xvfb", "xauth"]
+    assert absent == ["libegl1", "xvfb", "xauth", "x11-xserver-utils"]
 
 
 def test_a_later_setting_of_pip_wins_and_others_are_left_out() -> None:
