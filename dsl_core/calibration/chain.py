@@ -57,6 +57,8 @@ ROUNDS = 2
 #: Parts of the image (down, across) between which the scatter is taken.
 PARTS = (3, 4)
 MIN_PIXELS = 50
+#: What bands of finite width and straight lines between nodes leave, relative.
+MODEL_STD = 5e-4
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ def _chain_std(rig: Rig, order: int, solution: SmoothSolution, without: Floats) 
     count = len(without)
     jackknife = (without @ product.T).var(0) * (count - 1)
     between = (jackknife * count - posterior * count).clip(min=0)
-    return np.asarray(np.sqrt(posterior + jackknife + between))
+    return np.asarray(np.sqrt(posterior + jackknife + between + MODEL_STD**2))
 
 
 def _product(rig: Rig, order: int) -> Floats:

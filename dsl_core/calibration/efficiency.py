@@ -31,7 +31,7 @@ AMPLITUDES, LENGTHS, NOISE_FACTORS = (
 )
 MIN_SAMPLES, ROUNDS = 2, 4
 #: Least relative deviation of a ratio: nonlinearity of a camera and what scatters inside it.
-LEAST_STD = 3e-4
+LEAST_STD = 8e-4
 
 
 @dataclass(frozen=True)
