@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from dsl_core.calibration.selftest_camera import count_hot_pixels
+from dsl_core.calibration.selftest_camera import Dark, Transfer, check_camera, count_hot_pixels
 from dsl_core.calibration.selftest_focus import BAR_PX, BarFrames, bar_levels, check_focus
 from dsl_core.calibration.selftest_latency import check_latency
-from dsl_core.calibration.selftest_readings import Readings
+from dsl_core.calibration.selftest_readings import Readings, RegionSizes
 from dsl_core.errors import CalibrationError, DeviceError
+from dsl_core.model.selftest import Measured
 from tests.cases.cycle_readings import table
 
 BLACK_DN = 260.0
@@ -109,3 +110,21 @@ def test_hot_pixels_are_those_that_stand_out_twice() -> None:
     first[0, 5] = second[0, 5] = first[20, 41] = second[20, 41] = 900
     first[40, 40] = 900
     assert count_hot_pixels(first, second, 1.0) == 2
+
+
+def test_exposures_that_clip_bend_no_line() -> None:
+    exposure = np.arange(1.0, 13.0)
+    signal = 300 * exposure[:, None] * np.ones(3)
+    # One pixel in a hundred clips in the last two frames, which pulls their means down.
+    clipped = np.where(signal > 3200, 0.01, 0.0)
+    series = replace(table(exposure, BLACK_DN + signal - 8e3 * clipped), clipped=clipped)
+    sizes = RegionSizes(np.full(3, 5000), np.zeros(3, np.int64), 12)
+    none = np.zeros(3)
+    dark = Dark(Measured(value=BLACK_DN, std=0.01), none, none, none, none)
+    transfer = Transfer(Measured(value=10.0, std=0.01), Measured(value=1.0, std=0.01))
+    end = replace(series[-1:], mean_dn=np.full((1, 3), 4000.0), clipped=np.ones((1, 3)))
+    found = check_camera(dark, transfer, series, end, (0, 100), sizes)
+    assert max(each.value for each in found.linearity_percent) < 1e-6
+    assert (found.useful_dn, found.saturation_dn.value) == (BLACK_DN + 3000, 4000.0)
+    with pytest.raises(CalibrationError, match="red channel clips at all but 4 exposures"):
+        check_camera(dark, transfer, series[np.array([0, 1, 2, 3, 10, 11])], end, (0, 100), sizes)
