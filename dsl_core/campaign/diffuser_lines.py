@@ -10,6 +10,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
+from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.shading import plane_shading
 from dsl_core.progress import Progress
 
@@ -53,7 +54,7 @@ def diffuser_lines(
             f"Only {share:.0%} of the lit pixels lie on one plane. Let the flat white target fill the"
             " picture, and capture the step again."
         )
-    depth_mm, shading = flat.plane.depth_mm(rig), plane_shading(rig, flat.plane)
+    depth_mm, shading = flat.plane.depth_mm(rig), plane_shading(rig, flat.plane) * relative_gain(rig)
     valid = np.flatnonzero(flat.on_plane)
     # At random, since any regular step would meet the colours of the mosaic unevenly.
     chosen = np.sort(np.random.default_rng(0).permutation(valid)[:pixels])
