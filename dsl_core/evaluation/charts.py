@@ -64,8 +64,8 @@ def _trace(name: str, colour: str, curve: SpectralCurve, span: Floats, top: floa
 
 
 def _nice_top(largest: float) -> float:
-    """The smallest of 1, 2, 3, 4, 5, 6, 8, 10 times a power of ten that holds the data."""
+    """The smallest of 1, 1.2, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that holds the data."""
     if not largest > 0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(largest))
-    return next(factor * power for factor in (1, 2, 3, 4, 5, 6, 8, 10) if largest <= factor * power)
+    return next(factor * power for factor in (1, 1.2, 1.5, 2, 3, 4, 5, 6, 8, 10) if largest <= factor * power)
