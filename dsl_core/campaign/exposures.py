@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,13 +35,15 @@ class WhiteLevel:
     """White above black at full drive, DN per ms: brightest pixel, and means of R, G, B.
 
     ``ambient`` is what black shows above the sensor's black level, as a share of the brightest white;
-    ``saturated`` says that even the darkest picture was.
+    ``saturated`` says that even the darkest picture was. ``picture`` (rows, columns) is the mosaic itself, DN
+    per ms at full drive.
     """
 
     brightest: float
     mean: NDArray[np.float64]
     ambient: float
     saturated: bool
+    picture: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
 
 def measure_white(devices: DeviceRig, rig: Rig) -> WhiteLevel:
@@ -69,6 +71,7 @@ def measure_white(devices: DeviceRig, rig: Rig) -> WhiteLevel:
         np.array([rate[colours == colour].mean() for colour in range(3)]),
         max(dark, 0.0) / max(peak, 1.0),
         peak > MOST_FILL * range_dn,
+        rate,
     )
 
 

@@ -22,6 +22,11 @@ def _tables(name: str) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float6
     }
 
 
+def chart_names() -> tuple[str, ...]:
+    """Names of the tables that hold the classic 24 patches over 400 to 700 nm."""
+    return ("BabelColor Average", "ISO 17321-1")
+
+
 def chart_reflectance(
     wavelengths_nm: NDArray[np.float64], name: str = "BabelColor Average"
 ) -> dict[str, NDArray[np.float64]]:

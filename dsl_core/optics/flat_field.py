@@ -17,11 +17,11 @@ def relative_gain(rig: Rig) -> Floats:
     """Gain by which the camera multiplies all light, (rows, columns); (1, 1) of one without a flat field."""
     if rig.flat_field is None:
         return np.ones((1, 1))
-    return _at_pixels(rig.flat_field, rig.camera.height_px, rig.camera.width_px)
+    return gain_at_pixels(rig.flat_field, rig.camera.height_px, rig.camera.width_px)
 
 
 @lru_cache(maxsize=4)
-def _at_pixels(flat_field: FlatField, height_px: int, width_px: int) -> Floats:
+def gain_at_pixels(flat_field: FlatField, height_px: int, width_px: int) -> Floats:
     """Bilinear interpolation at every pixel, shape (rows, columns), read-only."""
     down = _shares(np.arange(height_px, dtype=np.float64), flat_field.rows_px)
     across = _shares(np.arange(width_px, dtype=np.float64), flat_field.columns_px)

@@ -44,7 +44,7 @@ class Plane:
 
 
 def shading(rig: Rig, points_mm: Floats, normals: Floats) -> Floats:
-    """``cos(incidence) (reference distance / distance)^2`` of points (3, ...) with unit normals, broadcast."""
+    """``cos(incidence) (reference distance / distance)^2`` of points and unit normals, each (3, ...)."""
     shape = (3,) + (1,) * (points_mm.ndim - 1)
     to_light = rig.pose.projector_centre_mm.reshape(shape) - points_mm
     distance = np.linalg.norm(to_light, axis=0)

@@ -1,0 +1,77 @@
+"""What a classic chart tells of a rig: camera response and LED emission, refined, and how well they fit."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from dsl_core.model.base import Record
+from dsl_core.model.rig import Rgb
+
+Point = tuple[float, float]
+Row3 = tuple[float, float, float]
+
+
+class PatchResult(Record):
+    """One patch: its signals at unit shading and how far the model is from them.
+
+    ``signal`` and ``std`` are ``[camera channel][light]`` in DN per ms at full drive; lights are red, green,
+    blue, white. ``residual`` is the rms over channels and lights of measured minus modelled signals, as a
+    share of the patch's white; ``held_out`` is the same with curves that never saw the patch, ``start`` with
+    those before the refinement.
+    """
+
+    name: str
+    pixels: int
+    saturated: float
+    signal: tuple[tuple[float, ...], ...]
+    std: tuple[tuple[float, ...], ...]
+    residual: float
+    held_out: float
+    start: float
+
+
+class ColorCheckerCalibration(Record):
+    """Response and emission refined on a chart by seed Eq. 1, film off.
+
+    ``corners_px`` are column and row of the outer corners of the patches: at dark skin, bluish green, black
+    and white; ``quarter_turns`` says how far the chart was turned clockwise. ``weight`` of Eq. 1 and the
+    relative ``reflectance_error`` of the patches are those the data chose; ``published_held_out`` is the
+    held-out residual (rms over patches) with the published weight. ``chart_level`` is the light on the chart
+    over that on the Spectralon, minus one.
+    """
+
+    schema_version: Literal[1] = 1
+    chart: str
+    corners_px: tuple[Point, Point, Point, Point]
+    quarter_turns: int
+    patches: tuple[PatchResult, ...]
+    response: Rgb
+    emission: Rgb
+    white_scale: float = Field(gt=0)
+    weight: float
+    reflectance_error: float
+    chart_level: float
+    published_held_out: float
+    tilt_deg: float
+    distance_mm: float
+
+    @property
+    def residual(self) -> float:
+        """Rms of the patches' residuals."""
+        return _rms([patch.residual for patch in self.patches])
+
+    @property
+    def held_out(self) -> float:
+        """Rms of the patches' held-out residuals."""
+        return _rms([patch.held_out for patch in self.patches])
+
+    @property
+    def start(self) -> float:
+        """Rms of the patches' residuals before the refinement."""
+        return _rms([patch.start for patch in self.patches])
+
+
+def _rms(values: list[float]) -> float:
+    return float((sum(value**2 for value in values) / len(values)) ** 0.5)

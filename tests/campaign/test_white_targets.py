@@ -1,0 +1,213 @@
+"""Spectralon and Color Checker on twins that nobody knows: what is found is true, what is wrong is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.campaign.color_checker import ColorCheckerRecipe
+from dsl_core.campaign.emission_readings import DRIVE
+from dsl_core.campaign.recipe import Bench, Recipe
+from dsl_core.campaign.spectralon import SpectralonRecipe
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
+from dsl_core.model.base import Record
+from dsl_core.model.color_checker import ColorCheckerCalibration
+from dsl_core.model.figure import failures
+from dsl_core.model.placement import Placement
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectralon import SpectralonCalibration
+from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.spectra import chain_response
+from dsl_core.progress import NoProgress
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
+from dsl_core.simulation.sim_devices import open_twin
+
+SIZE = (222, 145)
+NM = np.arange(400.0, 701.0)
+NONE = NoProgress()
+
+
+def twin(truth: int | None = 1, **options: str) -> DeviceRig:
+    text = {} if truth is None else {"truth": str(truth)}
+    return open_twin({"size": f"{SIZE[0]}x{SIZE[1]}", **text, **options})
+
+
+@cache
+def true_rig(truth: int) -> Rig:
+    published = published_rig()
+    return random_rig(truth, published.model_copy(update={"camera": published.camera.resized(*SIZE)}))
+
+
+def known(truth: int, devices: DeviceRig) -> Rig:
+    """What self-test and geometry leave open: curves, white scale, evenness."""
+    true = true_rig(truth)
+    assert devices.nominal is not None
+    parts = ("camera", "projector", "pose", "sensor", "projector_response")
+    return devices.nominal.model_copy(update={part: getattr(true, part) for part in parts})
+
+
+def calibrate(recipe: Recipe, devices: DeviceRig, rig: Rig, folder: Path) -> Record:
+    bench = Bench(devices, folder, rig)
+    for step in recipe.steps(bench):
+        assert devices.place is not None
+        devices.place(step.placement)
+        assert not recipe.is_captured(bench, step)
+        recipe.capture(bench, step, NONE)
+        assert recipe.is_captured(bench, step)
+    record = recipe.fit(bench, NONE)
+    return recipe.record_type.model_validate_json(record.model_dump_json())
+
+
+def whites(rig: Rig) -> np.ndarray:
+    """Signals of white (channels, LEDs), at the mean gain of the camera."""
+    return np.asarray(chain_response(rig, 0, NM).sum(-1) * relative_gain(rig).mean())
+
+
+@cache
+def spectralon(truth: int, folder: Path) -> tuple[Rig, Rig, SpectralonCalibration]:
+    devices = twin(truth)
+    start = known(truth, devices)
+    record = calibrate(SpectralonRecipe(), devices, start, folder)
+    assert isinstance(record, SpectralonCalibration)
+    return start, SpectralonRecipe().apply(record, start), record
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("white")
+
+
+@pytest.mark.parametrize("truth", [1, 2])
+def test_spectralon_finds_light_white_and_evenness(truth: int, folder: Path) -> None:
+    _, rig, record = spectralon(truth, folder / f"spectralon-{truth}")
+    true = true_rig(truth)
+    assert not failures(SpectralonRecipe().figures(record))
+    np.testing.assert_allclose(whites(rig).sum(1), whites(true).sum(1), rtol=6e-4)
+    np.testing.assert_allclose(whites(rig), whites(true), rtol=3e-3)
+    found, truth_led = (np.stack([c.at(NM) for c in r.emission]) for r in (rig, true))
+    error = found / found.sum() * truth_led.sum() - truth_led
+    assert np.sqrt((error**2).mean()) < 0.0005 * truth_led.max()
+    gain = relative_gain(rig) / relative_gain(true)
+    assert (gain / gain.mean()).std() < 6e-4
+
+
+def test_spectralon_is_applied_once_and_for_all(folder: Path) -> None:
+    _, rig, record = spectralon(1, folder / "spectralon-1")
+    again = SpectralonRecipe().apply(record, rig)
+    assert again.white_scale == pytest.approx(rig.white_scale, rel=1e-12)
+    np.testing.assert_allclose(again.response[0].values, rig.response[0].values, rtol=1e-9)
+
+
+def test_color_checker_refines_what_the_spectralon_left(folder: Path) -> None:
+    _, start, _ = spectralon(1, folder / "spectralon-1")
+    # Upside down, as a person might place it.
+    devices = twin(1, chart_roll_deg="180")
+    recipe = ColorCheckerRecipe()
+    record = calibrate(recipe, devices, start, folder / "color-checker")
+    assert isinstance(record, ColorCheckerCalibration)
+    assert record.quarter_turns == 2
+    assert len(record.patches) == 24
+    assert not failures(recipe.figures(record))
+    assert record.held_out < 0.7 * record.start
+    assert record.held_out < 0.002
+    rig, true = recipe.apply(record, start), true_rig(1)
+    assert recipe.apply(record, rig) == rig
+    bands = (NM >= 430) & (NM <= 660)
+
+    def error(of: Rig) -> float:
+        given, truth = (np.stack([c.at(NM) for c in r.response]) for r in (of, true))
+        off = (given / given.sum() * truth.sum() - truth) / truth.max(1, keepdims=True)
+        return float(np.sqrt((off[:, bands] ** 2).mean()))
+
+    assert error(rig) < 0.5 * error(start)
+    np.testing.assert_allclose(whites(rig).sum(1), whites(true).sum(1), rtol=1e-3)
+
+
+def test_look_tells_a_bright_even_middle_from_a_chart() -> None:
+    devices = twin(1)
+    recipe = SpectralonRecipe()
+    bench = Bench(devices, Path(), known(1, devices))
+    assert devices.place is not None
+    devices.place(Placement(target="spectralon", film=False))
+    assert not failures(recipe.look(bench, recipe.steps(bench)[0]))
+    devices.place(Placement(target="color-checker", film=False))
+    assert [f.name for f in failures(recipe.look(bench, recipe.steps(bench)[0]))] == [
+        "unevenness of the middle"
+    ]
+
+
+def test_an_uneven_spectralon_is_told(folder: Path) -> None:
+    """A chart in the place of the Spectralon: its patches differ, most are far from the median."""
+    devices = twin(1)
+    recipe = SpectralonRecipe()
+    bench = Bench(devices, folder / "uneven", known(1, devices))
+    assert devices.place is not None
+    for step in recipe.steps(bench):
+        devices.place(Placement(target="color-checker", film=False))
+        recipe.capture(bench, step, NONE)
+    record = recipe.fit(bench, NONE)
+    assert "middle filled by the Spectralon" in [f.name for f in failures(recipe.figures(record))]
+
+
+def test_a_saturated_spectralon_is_told(folder: Path) -> None:
+    start, _, _ = spectralon(1, folder / "spectralon-1")
+    too_small = start.sensor.model_copy(update={"bit_depth": 10, "black_level_dn": 100.0})
+    bright = start.model_copy(update={"sensor": too_small})
+    recipe = SpectralonRecipe()
+    with pytest.raises(CalibrationError, match=r"Step White, red, green and blue: Only \d+ pixels"):
+        recipe.fit(Bench(twin(1), folder / "spectralon-1", bright), NONE)
+
+
+def test_a_missing_chart_is_told(folder: Path) -> None:
+    start, _, _ = spectralon(1, folder / "spectralon-1")
+    devices = twin(1)
+    recipe = ColorCheckerRecipe()
+    bench = Bench(devices, folder / "no-chart", start)
+    (step,) = recipe.steps(bench)
+    assert devices.place is not None
+    devices.place(Placement(target="spectralon", film=False))
+    with pytest.raises(CalibrationError, match="No Color Checker was found in the test shot"):
+        recipe.look(bench, step)
+    recipe.capture(bench, step, NONE)
+    with pytest.raises(CalibrationError, match="Step Color Checker: No Color Checker was found"):
+        recipe.fit(bench, NONE)
+
+
+def test_spectra_may_come_from_files(tmp_path: Path) -> None:
+    devices = twin(1)
+    assert devices.place is not None
+    assert devices.spectroradiometer is not None
+    devices.place(Placement(target="spectralon", film=False))
+    info, spectra = devices.projector.info, tmp_path / "spectra"
+    spectra.mkdir()
+    for colour, drive in DRIVE.items():
+        devices.projector.show(np.full((info.height_px, info.width_px, 3), drive, np.uint8))
+        curve = devices.spectroradiometer.measure()
+        rows = [f"{nm:g};{1e3 * v:.8g}" for nm, v in zip(curve.wavelengths_nm, curve.values, strict=True)]
+        (spectra / f"{colour}.csv").write_text("\n".join(["nm;mW/(sr m2 nm)", *rows]), encoding="utf-8")
+    alone = replace(devices, spectroradiometer=None)
+    recipe = SpectralonRecipe(emission_folder=str(spectra))
+    bench = Bench(alone, tmp_path / "spectralon", known(1, devices))
+    first = recipe.steps(bench)[0]
+    recipe.capture(bench, first, NONE)
+    assert recipe.is_captured(bench, first)
+    with pytest.raises(CalibrationError, match="has no spectroradiometer"):
+        SpectralonRecipe().capture(Bench(alone, tmp_path / "b", bench.rig), first, NONE)
+    (spectra / "black.csv").unlink()
+    with pytest.raises(CalibrationError, match="no spectrum of black"):
+        recipe.capture(bench, first, NONE)
+
+
+def test_an_impossible_reflectance_and_chart_are_told(folder: Path) -> None:
+    start, _, _ = spectralon(1, folder / "spectralon-1")
+    bench = Bench(twin(1), folder / "spectralon-1", start)
+    with pytest.raises(CalibrationError, match="cannot be 99"):
+        SpectralonRecipe(reflectance=99.0).fit(bench, NONE)
+    with pytest.raises(CalibrationError, match="choose BabelColor Average"):
+        ColorCheckerRecipe(chart="SG").steps(bench)
