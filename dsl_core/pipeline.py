@@ -7,6 +7,8 @@ command line starts at once.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,11 +18,13 @@ from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.progress import NoProgress, Progress
+from dsl_core.progress import CancelToken, NoProgress, Progress
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from dsl_core.capture.runner import Runner
+    from dsl_core.capture.sink import Watch
     from dsl_core.capture.status import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
@@ -53,6 +57,32 @@ def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
     )
 
 
+@contextmanager
+def open_scan(
+    rig: DeviceRig,
+    plan: CapturePlan,
+    folder: Path,
+    progress: Progress | None = None,
+    notes: dict[str, str] | None = None,
+    token: CancelToken | None = None,
+    watch: Watch | None = None,
+) -> Iterator[Runner]:
+    """A runner over a session folder, for who wants to pause, cancel or listen; ``watch`` sees every frame.
+
+    An interrupted session goes on at its next missing frame.
+    """
+    from dsl_core.capture.preflight import require_possible
+    from dsl_core.capture.runner import Runner
+    from dsl_core.capture.sink import WatchedSink
+    from dsl_core.io.session import SessionWriter
+    from dsl_core.patterns.images import pattern_image
+
+    require_possible(rig, plan)
+    with SessionWriter.open(folder, plan, rig, notes) as writer:
+        sink = WatchedSink(writer, watch) if watch else writer
+        yield Runner(rig, plan, sink, pattern_image, progress=progress, token=token)
+
+
 def scan(
     rig: DeviceRig,
     plan: CapturePlan,
@@ -61,20 +91,19 @@ def scan(
     notes: dict[str, str] | None = None,
 ) -> Status:
     """Capture a plan into a session folder; an interrupted one goes on at its next missing frame."""
-    from dsl_core.capture.preflight import require_possible
-    from dsl_core.capture.runner import Runner
-    from dsl_core.io.session import SessionWriter
-    from dsl_core.patterns.images import pattern_image
-
-    require_possible(rig, plan)
-    with SessionWriter.open(folder, plan, rig, notes) as sink:
-        return Runner(rig, plan, sink, pattern_image, progress=progress).run()
+    with open_scan(rig, plan, folder, progress, notes) as runner:
+        return runner.run()
 
 
 def resume(
     rig: DeviceRig, folder: Path, progress: Progress | None = None, check_drift: bool = True
 ) -> Status:
-    """Go on with a session after a look at whether anything moved; raises `DeviceError` if it did.
+    """Go on with a session after a look at whether anything moved; raises `DeviceError` if it did."""
+    return scan(rig, prepare_resume(rig, folder, check_drift), folder, progress)
+
+
+def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> CapturePlan:
+    """The plan of a session to go on with; raises `DeviceError` if anything moved since it stopped.
 
     The session's own calibration counts, whatever the rig says of itself now.
     """
@@ -90,7 +119,7 @@ def resume(
         report = drift.check_drift(rig, reader, drift.pick_reference_shots(done), pattern_image)
         if not report.is_stable:
             raise DeviceError(report.message)
-    return scan(rig, reader.plan, folder, progress)
+    return reader.plan
 
 
 def reconstruct(

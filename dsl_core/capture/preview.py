@@ -77,6 +77,14 @@ def statistics(mosaic: NDArray[np.uint16], bayer: BayerPattern, full_scale_dn: i
     return Statistics(histogram, (red, green, blue), (means[0], means[1], means[2]), _focus(sites[1]))
 
 
+def channels(mosaic: NDArray[np.uint16], bayer: BayerPattern) -> tuple[NDArray[np.uint16], ...]:
+    """Red, green (the mean of its two) and blue of every Bayer cell; raises `DecodeError` below 2 x 2."""
+    sites = _cells(mosaic, bayer)
+    # The mean of two counts may not overflow on its way.
+    green = ((sites[1].astype(np.uint32) + sites[2]) >> 1).astype(np.uint16)
+    return sites[0], green, sites[3]
+
+
 def _cells(mosaic: NDArray[np.uint16], bayer: BayerPattern) -> tuple[NDArray[np.uint16], ...]:
     rows, columns = (size // 2 * 2 for size in mosaic.shape)
     if mosaic.ndim != 2 or min(rows, columns) < 2:

@@ -1,16 +1,21 @@
-"""A scan in memory, for previews and tests."""
+"""A scan in memory, for previews and tests, and a sink that lets someone watch."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import logging
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.model.describe import describe_shot
-from dsl_core.model.frames import Frame
+from dsl_core.model.frames import Frame, FrameSink
 from dsl_core.model.plan import CapturePlan, Shot
+
+#: Sees every frame after it is stored.
+Watch = Callable[[Shot, Frame], object]
+_log = logging.getLogger(__name__)
 
 
 class MemorySink:
@@ -45,3 +50,27 @@ class MemorySink:
 
     def close(self) -> None:
         """Nothing to finish."""
+
+
+class WatchedSink:
+    """A `FrameSink` that shows each frame to someone once it is stored; their failure is only logged."""
+
+    def __init__(self, sink: FrameSink, watch: Watch) -> None:
+        """The sink stays the caller's."""
+        self._sink, self._watch = sink, watch
+
+    def missing(self) -> Iterator[Shot]:
+        """Shots of the plan that are not stored yet, in order."""
+        return self._sink.missing()
+
+    def write(self, shot: Shot, frame: Frame) -> None:
+        """Store a frame, then show it; raises `StoreError`."""
+        self._sink.write(shot, frame)
+        try:
+            self._watch(shot, frame)
+        except Exception:
+            _log.exception("who watches the scan failed; the scan goes on")
+
+    def close(self) -> None:
+        """Finish the sink."""
+        self._sink.close()

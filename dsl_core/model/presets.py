@@ -1,0 +1,104 @@
+"""Plans by name, from a quick look to what was published, and their exposures on a rig's projector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting
+
+#: Frame period of the published projector, ms: its exposures are whole multiples, so that every exposure
+#: holds all of its coloured light.
+PUBLISHED_PERIOD_MS = 1000.0 / 60.0
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A plan with a name; ``purpose`` says in a sentence what it is for."""
+
+    key: str
+    title: str
+    purpose: str
+    plan: CapturePlan
+
+
+def _setting(cycles: int, level: float) -> Setting:
+    return Setting(exposure_ms=cycles * PUBLISHED_PERIOD_MS, level=level)
+
+
+_DARK, _BRIGHT = _setting(10, 0.2), _setting(20, 0.8)
+_COLUMNS = GrayCode(rows=False)
+
+
+def _plan(name: str, spectral: ScanLines | LineComb, *settings: Setting) -> CapturePlan:
+    return CapturePlan(
+        name=name,
+        code=_COLUMNS,
+        spectral=spectral,
+        settings=settings,
+        code_settings=tuple(range(len(settings))),
+    )
+
+
+PRESETS: tuple[Preset, ...] = (
+    Preset(
+        "preview",
+        "Preview",
+        "Combs of lines at one setting: a first look at depth and colours in less than half a minute.",
+        _plan("preview", LineComb(), _DARK),
+    ),
+    Preset(
+        "comb",
+        "Comb",
+        "Combs of lines at both settings: many lines at once.",
+        _plan("comb", LineComb(), _DARK, _BRIGHT),
+    ),
+    Preset(
+        "wide-comb",
+        "Wide comb",
+        "Combs with half as many lines: orders of neighbouring lines overlap less.",
+        _plan("wide-comb", LineComb(period_px=212), _DARK, _BRIGHT),
+    ),
+    Preset(
+        "quick",
+        "Quick",
+        "Single lines at one setting, each beside the last.",
+        _plan("quick", ScanLines(step_px=5), _setting(20, 0.4)),
+    ),
+    Preset(
+        "coarse",
+        "Coarse",
+        "Single lines, each beside the last, at both settings.",
+        _plan("coarse", ScanLines(step_px=5), _DARK, _BRIGHT),
+    ),
+    Preset(
+        "balanced",
+        "Balanced",
+        "Half as many lines as published, and no row code.",
+        _plan("balanced", ScanLines(step_px=4), _DARK, _BRIGHT),
+    ),
+    Preset(
+        "columns",
+        "Published lines",
+        "All lines as published, without the row code that rectified rigs do not need.",
+        _plan("columns", ScanLines(), _DARK, _BRIGHT),
+    ),
+    Preset("reference", "Reference", "As published: row and column code, 318 lines.", CapturePlan()),
+)
+
+
+def whole_cycles(exposure_ms: float, period_ms: float) -> int:
+    """Whole LED cycles nearest to an exposure, at least one.
+
+    >>> whole_cycles(166.7, 1000 / 60)
+    10
+    """
+    return max(round(exposure_ms / period_ms), 1)
+
+
+def on_cycles(plan: CapturePlan, period_ms: float) -> CapturePlan:
+    """The plan with every exposure at whole cycles of a projector's frame period."""
+    settings = tuple(
+        Setting(exposure_ms=whole_cycles(s.exposure_ms, period_ms) * period_ms, level=s.level)
+        for s in plan.settings
+    )
+    return plan.model_copy(update={"settings": settings})
