@@ -84,6 +84,12 @@ QFrame#rail QToolButton:hover {{ background: {t.window}; color: {t.text}; }}
 QFrame#rail QToolButton:checked {{ color: {t.text}; border-left: 3px solid {t.accent};
   background: {t.window}; }}
 QFrame#rail QToolButton:focus {{ color: {t.text}; text-decoration: underline; }}
+QToolButton[role="choice"] {{ padding: 3px 8px; border: 1px solid {t.line}; border-radius: 4px;
+  background: {t.raised}; }}
+QToolButton[role="choice"]:hover {{ border-color: {t.muted}; }}
+QToolButton[role="choice"]:focus {{ border-color: {t.text}; }}
+QToolButton[role="choice"]:checked {{ background: {t.accent}; color: {t.on_accent};
+  border-color: {t.accent}; }}
 QPushButton[role="primary"] {{ background: {t.accent}; color: {t.on_accent}; border: 1px solid {t.accent};
   border-radius: 4px; padding: 5px 14px; font-weight: 600; }}
 QPushButton[role="primary"]:disabled {{ background: {t.raised}; color: {t.muted}; border-color: {t.line}; }}
