@@ -19,7 +19,6 @@ from dsl_core.calibration.stage_planes import (
     DISTANCE,
     SLOPES,
     STEPS,
-    Plane,
     StageProblem,
     columns_at,
     plane_of,
@@ -28,6 +27,7 @@ from dsl_core.calibration.stage_planes import (
 from dsl_core.calibration.tiles import ColumnSamples
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
+from dsl_core.optics.shading import Plane
 
 Floats = NDArray[np.float64]
 

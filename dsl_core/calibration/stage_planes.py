@@ -9,7 +9,6 @@ distance``; a step ``s`` of the stage along the axis moves it by ``s / sqrt(1 + 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from dsl_core.calibration.tiles import ColumnSamples
 from dsl_core.model.geometry import Lens
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import distort, undistort
+from dsl_core.optics.shading import Plane
 
 Floats = NDArray[np.float64]
 
@@ -26,18 +26,6 @@ Floats = NDArray[np.float64]
 SLOPES, DISTANCE, GAIN, STEPS = slice(SHARED, SHARED + 2), SHARED + 2, SHARED + 3, SHARED + 4
 #: A stage askew to the camera axis by 0.8 degrees moves a plane by this share too little.
 GAIN_STD = 1e-4
-
-
-@dataclass(frozen=True)
-class Plane:
-    """A plane in camera coordinates: unit normal away from the camera, and distance along it (mm)."""
-
-    normal: tuple[float, float, float]
-    distance_mm: float
-
-    def depth_mm(self, rays: Floats) -> Floats:
-        """Depth (mm) along rays of z = 1 and shape (3, ...)."""
-        return np.asarray(self.distance_mm / np.tensordot(np.array(self.normal), rays, 1))
 
 
 def shared_parameters(rig: Rig) -> Floats:
@@ -51,9 +39,8 @@ def shared_parameters(rig: Rig) -> Floats:
 
 
 def plane_of(slopes: Floats, distance_mm: float) -> Plane:
-    """The plane of two slopes and a distance."""
-    normal = np.array([*slopes, 1.0]) / np.sqrt(1 + slopes @ slopes)
-    return Plane(tuple(normal.tolist()), float(distance_mm))
+    """The plane of two slopes and a distance along its normal (mm)."""
+    return Plane(np.array([*slopes, 1.0]) / np.sqrt(1 + slopes @ slopes) / distance_mm)
 
 
 def rays_at(camera: Floats, pixels: Floats) -> Floats:
