@@ -48,6 +48,8 @@ FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
 COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
 #: White without a filter is so many times brighter than through one, at least.
 OPEN_FACTOR = 3.0
+#: The longer exposure of the scan without filter, which shows the halo, over the shorter one.
+LONG_RATIO = 6.0
 
 
 class FilterNote(Record):
@@ -232,7 +234,7 @@ class BandpassRecipe:
 
     def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
         if step.placement.filter_nm is None:
-            settings = bracket(rig, white, 6.0)
+            settings = bracket(rig, white, step.title, LONG_RATIO)
             return CapturePlan(
                 name="white target without filter",
                 code=GrayCode(),

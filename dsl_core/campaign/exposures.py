@@ -75,26 +75,35 @@ def measure_white(devices: DeviceRig, rig: Rig) -> WhiteLevel:
     )
 
 
-def bright_setting(rig: Rig, white: WhiteLevel, what: str) -> Setting:
-    """Full drive, and as many LED cycles as white allows; raises `CalibrationError` where it is too dark."""
-    range_dn = rig.sensor.full_scale_dn - rig.sensor.black_level_dn
-    longest = LONGEST_MS * white.brightest / range_dn
+def require_bright(rig: Rig, white: WhiteLevel, what: str) -> None:
+    """Raise `CalibrationError` where even the longest exposure sees next to nothing of white."""
+    longest = LONGEST_MS * white.brightest / (rig.sensor.full_scale_dn - rig.sensor.black_level_dn)
     if longest < TOO_DARK:
         raise CalibrationError(
             f"{what} is too dark: in {LONGEST_MS / 1000:g} s white reaches {longest:.1%} of the camera's"
             " range. Check lens cap, aperture, projector and filter."
         )
+
+
+def bright_setting(rig: Rig, white: WhiteLevel, what: str) -> Setting:
+    """Full drive, and as many LED cycles as white allows; raises `CalibrationError` where it is too dark."""
+    range_dn = rig.sensor.full_scale_dn - rig.sensor.black_level_dn
+    require_bright(rig, white, what)
     cycles = int(min(FILL * range_dn / white.brightest, LONGEST_MS) / rig.frame_period_ms)
     if cycles > 0:
         return Setting(exposure_ms=cycles * rig.frame_period_ms, level=1.0)
-    return bracket(rig, white, 1.0, cycles=1)[0]
+    return bracket(rig, white, what, 1.0, cycles=1)[0]
 
 
-def bracket(rig: Rig, white: WhiteLevel, ratio: float, cycles: int = CYCLES) -> tuple[Setting, ...]:
+def bracket(
+    rig: Rig, white: WhiteLevel, what: str, ratio: float, cycles: int = CYCLES
+) -> tuple[Setting, ...]:
     """Two settings of one drive level: whole LED cycles that white does not saturate, and ``ratio`` as long.
 
     One level, so that no error of the projector's gamma comes between them. One setting where the ratio is 1.
+    Raises `CalibrationError` where it is too dark.
     """
+    require_bright(rig, white, what)
     range_dn = rig.sensor.full_scale_dn - rig.sensor.black_level_dn
     response = rig.projector_response
     for level in LEVELS:

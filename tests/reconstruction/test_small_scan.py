@@ -14,7 +14,7 @@ from dsl_core.evaluation.summary import Evaluation
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.result import build_result
 from dsl_core.model.rig import Rig
-from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectra import SpectralReconstruction
@@ -84,3 +84,17 @@ def test_published_objective_refuses_several_lines_a_frame(scanned: tuple[Device
     plan = scan.plan.model_copy(update={"spectral": LineComb()})
     with pytest.raises(PlanError, match="one line per frame"):
         PublishedReconstruction(rig, plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
+
+
+def test_calibration_widens_the_deviation_and_nothing_else(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    devices, scan = scanned
+    rig = devices.calibration
+    assert rig is not None
+    chain = SpectralCurve.of([430.0, 660.0], [0.01, 0.05])
+    unsure = rig.model_copy(update={"chain_rel_std": chain, "white_scale_rel_std": 0.02})
+    sure, wide = (pipeline.reconstruct(scan, r, pipeline.Options(grid=GRID)) for r in (rig, unsure))
+    np.testing.assert_array_equal(sure["reflectance"].values, wide["reflectance"].values)
+    share = np.hypot(chain.at(GRID.centres_nm), 0.02)[:, None, None]
+    wanted = np.hypot(sure["reflectance_std"].values, share * sure["reflectance"].values)
+    np.testing.assert_allclose(wide["reflectance_std"].values, wanted, rtol=1e-5)
+    assert np.nanmedian(wide["reflectance_std"].values - sure["reflectance_std"].values) > 0
