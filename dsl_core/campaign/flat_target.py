@@ -69,7 +69,7 @@ def capture_flat_target(bench: Bench, folder: Path, name: str, ratio: float, pro
             name=name,
             code=GrayCode(rows=False),
             spectral=Columns(levels=tuple((light,) * width for light in LIGHTS)),
-            settings=bracket(bench.rig, measure_white(bench.devices, bench.rig), ratio),
+            settings=bracket(bench.rig, measure_white(bench.devices, bench.rig), name, ratio),
             code_settings=(0,),
         )
         plan = pipeline.fit_plan(plan, bench.devices)
