@@ -1,0 +1,258 @@
+"""What the Scan page decides: start, pause, resume, cancel, reconstruct. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from app.controllers.rig import RIG, RigController
+from app.controllers.scan_facts import sentence_of
+from app.controllers.scan_job import Order, ScanJob
+from app.controllers.scan_plan import ScanPlanController
+from app.controllers.scan_words import fresh_target, rig_words, scan_command
+from app.jobs.base import Job, JobRunner, JobState
+from app.state.scan import Interrupted, Phase, ScanState
+from app.state.undo import UndoStack
+from app.views import Notifier
+from dsl_core.capture.status import State, Status
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DslError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.origin import rig_notes
+from dsl_core.progress import Progress
+
+_PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
+_BUSY = "A scan is running. Wait for its end, or cancel it first; frames taken so far are kept."
+
+
+class ScanController:
+    """Plans and runs one scan at a time; `take_news` brings what happened in the job to the state."""
+
+    def __init__(
+        self,
+        state: ScanState,
+        rig: RigController,
+        runner: JobRunner,
+        notifier: Notifier,
+        undo: UndoStack,
+        library: CalibrationLibrary | None = None,
+        clock: Callable[[], datetime] = datetime.now,
+    ) -> None:
+        self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._clock = clock
+        self.plans = ScanPlanController(
+            state, rig.state, runner, notifier, undo, library or CalibrationLibrary()
+        )
+        self._scan: ScanJob | None = None
+        self._job: Job[Status] | None = None
+
+    # Run -------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the planned scan, or go on with the interrupted one."""
+        state, devices = self.state, self._rig.state.devices.value
+        if state.phase.value.is_busy:
+            self._notifier.tell("info", _BUSY)
+            return
+        self.plans.refresh()
+        facts = state.facts.value
+        if devices is None or facts is None or facts.obstacles:
+            self._notifier.tell("warning", facts.obstacles[0] if facts is not None else "")
+            return
+        self._run(devices, state.interrupted.value)
+
+    def _run(self, devices: DeviceRig, session: Interrupted | None) -> None:
+        state, choice = self.state, self._rig.state.choice.value
+        order = Order(
+            devices,
+            state.plan.value,
+            state.target.value if session is None else session.folder,
+            rig_notes(choice.name, dict(choice.options)),
+            self.plans.calibration,
+            state.override.value,
+            is_resumed=session is not None,
+        )
+        self._scan = scan = ScanJob(order)
+        for text in (state.trouble, state.note):
+            text.set("")
+        state.phase.set(Phase.STARTING)
+        self._job = Job(
+            f"Scan {order.folder.stem}",
+            scan.work,
+            self._finished,
+            self._failed,
+            self._cancelled,
+            exclusive=RIG,
+        )
+        scan.token = self._job.token
+        if not self._rig.run(self._job):
+            self._ended(Phase.PLANNING)
+
+    def pause(self) -> None:
+        """Wait before the next frame."""
+        if self._scan is not None:
+            self._scan.pause()
+
+    def go_on(self) -> None:
+        """Go on after `pause`."""
+        if self._scan is not None:
+            self._scan.go_on()
+
+    def cancel(self) -> None:
+        """End before the next frame; what is stored stays stored."""
+        if self._job is not None and self.state.phase.value.is_busy:
+            self.state.phase.set(Phase.STOPPING)
+            self._job.cancel()
+
+    def take_news(self) -> None:
+        """Hand what the job told since last time to who follows; called by the window's clock."""
+        scan = self._scan
+        if scan is None:
+            return
+        if self._was_refused():
+            self._ended(Phase.PLANNING)
+        status, picture = scan.take_news()
+        if status is not None:
+            self.state.status.set(status)
+            if self.state.phase.value.is_busy and self.state.phase.value is not Phase.STOPPING:
+                self.state.phase.set(_PHASES.get(status.state, self.state.phase.value))
+        if picture is not None:
+            self.state.picture.set(picture)
+            self._draw_graph()
+
+    def _was_refused(self) -> bool:
+        """Whether the scan waited for the live view and then found the rig taken."""
+        job = self._job
+        if job is None or job.state is not JobState.WAITING or self._rig.state.live.value:
+            return False
+        return job not in self._runner.active
+
+    def point_at(self, pixel: tuple[int, int] | None) -> None:
+        """Show the intensity graph of a pixel ``(x, y)``."""
+        self.state.cursor.set(pixel)
+        self._draw_graph()
+
+    def _draw_graph(self) -> None:
+        pixel = self.state.cursor.value
+        if self._scan is not None and pixel is not None:
+            self.state.graph.set(self._scan.graph(pixel))
+
+    # End -------------------------------------------------------------------------------------------
+
+    def _finished(self, status: Status) -> None:
+        folder = self._end(Phase.DONE)
+        self.state.interrupted.set(None)
+        self.state.note.set(f"All {status.total} frames are stored in {folder}.")
+        self.state.target.set(fresh_target(folder.parent, self._clock()))
+        self.plans.refresh()
+        if self.state.then_reconstruct.value:
+            self.reconstruct(folder)
+
+    def _failed(self, error: Exception) -> None:
+        folder = self._end(Phase.LOST)
+        self._remember(folder)
+        session = self.state.interrupted.value
+        safe = f" {session.done} of {session.total} frames are safe in {folder}." if session else ""
+        self.state.trouble.set(f"The scan stopped: {sentence_of(error)}{safe}")
+        self._notifier.tell("error", self.state.trouble.value)
+
+    def _cancelled(self) -> None:
+        folder = self._end(Phase.STOPPED)
+        self._remember(folder)
+        session = self.state.interrupted.value
+        if session is not None:
+            self.state.note.set(f"Stopped after {session.done} of {session.total} frames; they are stored.")
+
+    def _end(self, phase: Phase) -> Path:
+        assert self._scan is not None
+        self.take_news()
+        folder = self._scan.order.folder
+        self._ended(phase)
+        return folder
+
+    def _ended(self, phase: Phase) -> None:
+        self._job = None
+        self.state.phase.set(phase)
+
+    def reconstruct(self, session: Path) -> None:
+        """Make the result of a complete scan, save it beside the scan and tell of it."""
+        target = session.with_suffix(".zarr")
+
+        def work(progress: Progress) -> Path:
+            from dsl_core.io.result_file import save_result
+            from dsl_core.sessions import reconstruct_session
+
+            save_result(reconstruct_session(session, progress=progress), target)
+            return target
+
+        def done(path: Path) -> None:
+            self.state.note.set(f"The result lies in {path}.")
+            self.state.result.emit(path)
+
+        self.state.note.set(f"{self.state.note.value} Reconstructing…".strip())
+        self._runner.submit(Job(f"Reconstruct {session.stem}", work, done, self._tell))
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+    # Sessions --------------------------------------------------------------------------------------
+
+    def open(self, path: Path) -> bool:
+        """Offer to go on with an interrupted scan; False for anything else, complete scans among it."""
+        from dsl_core.io.session_manifest import MANIFEST_NAME
+
+        if not (path / MANIFEST_NAME).is_file():
+            return False
+        if self.state.phase.value.is_busy:
+            self._notifier.tell("info", _BUSY)
+            return True
+        try:
+            return self._remember(path)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+            return True
+
+    def _remember(self, folder: Path) -> bool:
+        """Offer to go on with a session that lacks frames; False when there is nothing to go on with."""
+        from dsl_core.io.session import SessionReader
+        from dsl_core.io.session_manifest import MANIFEST_NAME
+
+        if not (folder / MANIFEST_NAME).is_file():
+            return False
+        reader = SessionReader(folder)
+        missing, total = len(reader.missing()), reader.plan.shot_count
+        if not missing:
+            return False
+        self.state.plan.set(reader.plan)
+        self.state.target.set(folder)
+        self.state.interrupted.set(
+            Interrupted(folder, total - missing, total, rig_words(reader.manifest.notes))
+        )
+        self.plans.refresh()
+        return True
+
+    def leave_session(self) -> None:
+        """Plan a new scan; the interrupted one stays on disk."""
+        if self.state.phase.value.is_busy:
+            return
+        self.state.interrupted.set(None)
+        self.state.phase.set(Phase.PLANNING)
+        self.state.trouble.set("")
+        self.state.note.set("")
+        self.state.target.set(fresh_target(self.state.target.value.parent, self._clock()))
+        self.plans.take_rig()
+
+    def command_line(self) -> str:
+        """The command that takes this scan, or goes on with it."""
+        state = self.state
+        if state.interrupted.value is not None:
+            return f"dsl-scan resume {state.interrupted.value.folder}"
+        rig = self._rig.state.choice.value.command
+        return scan_command(
+            state.target.value, rig, state.plan.value, state.calibration.value.key, state.override.value
+        )
+
+    def close(self) -> None:
+        """Follow the rig no more."""
+        self.plans.close()

@@ -1,0 +1,174 @@
+"""What is scanned before it is: presets, plan, target, calibration, and what they take. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from app.controllers.scan_facts import find_facts, sentence_of
+from app.jobs.base import Job, JobRunner
+from app.state.rig import RigState
+from app.state.scan import OWN_CALIBRATION, CalibrationChoice, Interrupted, ScanState
+from app.state.undo import Change, UndoStack
+from app.views import Notifier
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DslError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.session import SUFFIX
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import PRESETS, on_cycles
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+
+class ScanPlanController:
+    """Keeps plan, target and calibration of the next scan, and says what they take."""
+
+    def __init__(
+        self,
+        state: ScanState,
+        rig: RigState,
+        runner: JobRunner,
+        notifier: Notifier,
+        undo: UndoStack,
+        library: CalibrationLibrary,
+    ) -> None:
+        self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._undo, self._library = undo, library
+        self._chosen: Rig | None = None
+        self._disconnect = rig.devices.follow(lambda _: self.take_rig())
+
+    # Plan ------------------------------------------------------------------------------------------
+
+    def choose_preset(self, key: str) -> None:
+        """Take the plan of a preset."""
+        plan = next(preset.plan for preset in PRESETS if preset.key == key)
+        self.change_plan(on_cycles(plan, self.state.period_ms.value))
+
+    def change_plan(self, plan: CapturePlan) -> None:
+        """Take a plan of any kind, with the sizes of the rig; can be undone."""
+        old, new = self.state.plan.value, self._fitted(plan)
+        if new != old and not self._is_locked():
+            self._undo.push(
+                Change("change of plan", lambda: self._set_plan(new), lambda: self._set_plan(old))
+            )
+
+    def _set_plan(self, plan: CapturePlan) -> None:
+        if not self._is_locked():
+            self.state.plan.set(plan)
+            self.refresh()
+
+    def _is_locked(self) -> bool:
+        """A plan that was begun stays as it is."""
+        return self.state.phase.value.is_busy or self.state.interrupted.value is not None
+
+    def set_target(self, target: Path) -> None:
+        """Store the scan there."""
+        if not self._is_locked():
+            self.state.target.set(
+                target if target.suffix == SUFFIX else target.with_name(target.name + SUFFIX)
+            )
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Say anew what the plan takes and what keeps it from starting."""
+        state = self.state
+        session = state.interrupted.value
+        facts = find_facts(
+            self._devices, state.plan.value, state.target.value, self.calibration, state.override.value
+        )
+        if session is not None:
+            facts = replace(facts, obstacles=() if self._devices else (connect_first(session),), remarks=())
+        state.facts.set(facts)
+
+    def _fitted(self, plan: CapturePlan) -> CapturePlan:
+        from dsl_core.pipeline import fit_plan
+
+        return plan if self._devices is None else fit_plan(plan, self._devices)
+
+    @property
+    def _devices(self) -> DeviceRig | None:
+        return self._rig.devices.value
+
+    def take_rig(self) -> None:
+        """Fit plan and calibration to the rig at hand."""
+        state, devices = self.state, self._devices
+        if devices is not None:
+            info = devices.projector.info
+            state.period_ms.set(info.frame_period_ms)
+            state.latency_ms.set(info.latency_ms)
+            if not self._is_locked():
+                state.plan.set(on_cycles(self._fitted(state.plan.value), info.frame_period_ms))
+        own = None if devices is None else devices.calibration
+        choice = OWN_CALIBRATION if own is None else CalibrationChoice("", own.name, own.provenance.created)
+        rest = tuple(each for each in state.calibrations.value if each.key)
+        state.calibrations.set((choice, *rest))
+        if not state.calibration.value.key:
+            state.calibration.set(choice)
+        self.refresh()
+
+    # Calibration -----------------------------------------------------------------------------------
+
+    @property
+    def calibration(self) -> Rig | None:
+        """The calibration to scan with; None while there is none."""
+        if self.state.calibration.value.key:
+            return self._chosen
+        return None if self._devices is None else self._devices.calibration
+
+    def load_library(self) -> None:
+        """List what the library has."""
+
+        def work(progress: Progress) -> tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]:
+            found: list[CalibrationChoice] = []
+            troubles: list[str] = []
+            for name in self._library.names():
+                progress.report("read the library", len(found), 0)
+                try:
+                    found.append(CalibrationChoice(name, name, self._library.find(name).stored))
+                except DslError as error:
+                    troubles.append(str(error))
+            return tuple(found), tuple(troubles)
+
+        def done(read: tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]) -> None:
+            self.state.calibrations.set((self.state.calibrations.value[0], *read[0]))
+            for trouble in read[1]:
+                self._notifier.tell("warning", trouble)
+
+        self._runner.submit(Job("Read the calibrations", work, done, self._tell))
+
+    def choose_calibration(self, choice: CalibrationChoice) -> None:
+        """Scan with another calibration."""
+        if self.state.phase.value.is_busy:
+            return
+        if not choice.key:
+            self._chosen = None
+            self.state.calibration.set(choice)
+            self.refresh()
+            return
+
+        def done(rig: Rig) -> None:
+            self._chosen = rig
+            self.state.calibration.set(choice)
+            self.refresh()
+
+        work = lambda progress: self._library.find(choice.key).rig  # noqa: E731
+        self._runner.submit(Job(f"Open the calibration {choice.key}", work, done, self._tell))
+
+    def set_override(self, on: bool) -> None:
+        """Use the calibration although settings differ from it."""
+        self.state.override.set(on)
+        self.refresh()
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+    def close(self) -> None:
+        """Follow the rig no more."""
+        self._disconnect()
+
+
+def connect_first(session: Interrupted) -> str:
+    """Which rig an interrupted session waits for."""
+    which = f" It was taken with {session.rig}." if session.rig else ""
+    return f"Connect the rig of this scan on the Rig page.{which}"

@@ -1,0 +1,54 @@
+"""Names and words of scans: the command line that does the same, the next name, the rig of a session."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+
+from app.state.rig import RigChoice
+from dsl_core.io.origin import rig_of_notes
+from dsl_core.io.session import SUFFIX
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+
+
+def plan_words(plan: CapturePlan) -> list[str]:
+    """Options of ``dsl-scan scan`` that make a plan."""
+    words = []
+    if isinstance(plan.code, GrayCode):
+        words.append(f"--code {'full' if plan.code.rows else 'columns'}")
+    match plan.spectral:
+        case ScanLines(width_px=width, step_px=step):
+            words.append(f"--lines {width}x{step}")
+        case LineComb(width_px=width, step_px=step, period_px=period):
+            words.append(f"--comb {width}x{step}x{period}")
+    # Enough digits that an exposure stays a whole number of LED cycles.
+    words += [f"--setting {setting.exposure_ms:.12g}@{setting.level:g}" for setting in plan.settings]
+    return words
+
+
+def scan_command(target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool) -> str:
+    """The command that takes this scan; ``rig`` as `RigChoice.command` says it."""
+    words = ["dsl-scan scan", shlex.quote(str(target)), rig, *plan_words(plan)]
+    if calibration:
+        words.append(f"--calibration {shlex.quote(calibration)}")
+    if override:
+        words.append("--override-calibration")
+    return " ".join(words)
+
+
+def rig_words(notes: Mapping[str, object]) -> str:
+    """The rig a session was taken with, as the command line says it; empty when it does not say."""
+    origin = rig_of_notes(notes)
+    return "" if origin is None else RigChoice(origin[0], tuple(sorted(origin[1].items()))).command
+
+
+def fresh_target(folder: Path, now: datetime) -> Path:
+    """A session folder named by the minute that does not exist yet."""
+    stem = f"scan-{now:%Y%m%d-%H%M}"
+    target, count = folder / f"{stem}{SUFFIX}", 1
+    while target.exists():
+        count += 1
+        target = folder / f"{stem}-{count}{SUFFIX}"
+    return target

@@ -1,0 +1,230 @@
+from __future__ import annotations
+
+import shutil
+from collections import namedtuple
+from pathlib import Path
+
+import pytest
+
+from app.controllers.scan_plan import connect_first
+from app.state.scan import Phase
+from dsl_core.cli.options import PlanChoice
+from dsl_core.errors import DeviceError
+from dsl_core.io.session import SessionReader
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import LineComb
+from dsl_core.model.presets import PRESETS
+from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.scan_bench import SHORT, TWIN, ScanBench, make_bench
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> ScanBench:
+    made = make_bench(tmp_path)
+    made.rig.connect(TWIN)
+    made.plan()
+    return made
+
+
+def fail_from(monkeypatch: pytest.MonkeyPatch, shot: int) -> None:
+    snap = SimCamera.snap
+
+    def failing(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        if self._shot >= shot:
+            raise DeviceError("The camera sent no frame. Check its cable.")
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", failing)
+
+
+def test_without_a_rig_nothing_starts_and_the_reason_is_told(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path)
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.PLANNING
+    assert "Connect one on the Rig page" in bench.notifier.told[-1][1]
+
+
+def test_a_plan_is_fitted_to_the_rig_and_its_cost_is_known(bench: ScanBench) -> None:
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert bench.state.plan.value.camera_size_px == (64, 48)
+    assert (facts.frames, facts.obstacles, facts.remarks) == (75, (), ())
+    assert facts.seconds == pytest.approx(16.25)
+    assert 0 < facts.needed_bytes < facts.free_bytes
+
+
+def test_presets_can_be_chosen_and_taken_back(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    assert bench.state.preset is PRESETS[-1]
+    bench.undo.undo()
+    assert bench.state.preset is PRESETS[0]
+
+
+def test_an_impossible_plan_says_why(bench: ScanBench) -> None:
+    plan = SHORT.model_copy(update={"spectral": LineComb(period_px=700)})
+    bench.scans.plans.change_plan(plan)
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.PLANNING
+    assert "at most one line" in bench.notifier.told[-1][1]
+
+
+def test_a_scan_is_stored_and_the_next_has_another_name(bench: ScanBench, tmp_path: Path) -> None:
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.DONE
+    assert bench.state.status.value.done == 75
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert bench.state.target.value == tmp_path / "scan-20260301-1020.dsl"
+    assert bench.state.picture.value is not None
+
+
+def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -> None:
+    bench.scans.point_at((30, 20))
+    bench.scans.start()
+    graph = bench.state.graph.value
+    assert graph is not None
+    assert graph.mean_dn.shape == (1, 53, 3)
+    assert (graph.mean_dn[0].max(0) > graph.mean_dn[0].min(0) + 20).all()
+
+
+def test_a_result_follows_and_is_told(bench: ScanBench, tmp_path: Path) -> None:
+    results: list[Path] = []
+    bench.state.result.connect(results.append)
+    bench.scans.plans.choose_preset("quick")
+    bench.state.then_reconstruct.set(True)
+    bench.scans.start()
+    assert results == [tmp_path / "first.zarr"]
+    assert results[0].is_dir()
+
+
+def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 30)
+        bench.scans.start()
+    session = bench.state.interrupted.value
+    assert bench.state.phase.value is Phase.LOST
+    assert session is not None
+    assert (session.done, session.total) == (30, 75)
+    assert "Check its cable" in bench.state.trouble.value
+    assert "30 of 75 frames are safe" in bench.state.trouble.value
+    assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.DONE
+    assert bench.state.trouble.value == ""
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+
+
+def test_a_scene_that_moved_meanwhile_is_refused(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 30)
+        bench.scans.start()
+    bench.rig.connect(TWIN.__class__("twin", (("scene", "box"), ("size", "64x48"))))
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.LOST
+    assert "changed since the scan stopped" in bench.state.trouble.value
+
+
+def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    other = make_bench(tmp_path)
+    assert other.scans.open(tmp_path / "first.dsl")
+    facts, session = other.state.facts.value, other.state.interrupted.value
+    assert session is not None
+    assert facts is not None
+    assert facts.obstacles == (connect_first(session),)
+    assert "--option scene=color-checker" in facts.obstacles[0]
+    other.rig.connect(TWIN)
+    other.state.then_reconstruct.set(False)
+    other.scans.start()
+    assert other.state.phase.value is Phase.DONE
+    assert not other.scans.open(tmp_path / "first.dsl")
+    assert not other.scans.open(tmp_path)
+
+
+def test_a_damaged_session_is_told(bench: ScanBench, tmp_path: Path) -> None:
+    (tmp_path / "odd.dsl").mkdir()
+    (tmp_path / "odd.dsl" / "manifest.json").write_text("{")
+    assert bench.scans.open(tmp_path / "odd.dsl")
+    assert "damaged" in bench.notifier.told[-1][1]
+
+
+def test_leaving_a_session_plans_a_new_one(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    bench.scans.leave_session()
+    assert bench.state.interrupted.value is None
+    assert bench.state.phase.value is Phase.PLANNING
+    assert bench.state.target.value != tmp_path / "first.dsl"
+    assert (tmp_path / "first.dsl").is_dir()
+
+
+def test_a_full_disk_is_said_before_the_start(bench: ScanBench, monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.PLANNING
+    assert "too little room" in bench.notifier.told[-1][1]
+
+
+def test_a_place_that_is_taken_is_refused(bench: ScanBench, tmp_path: Path) -> None:
+    (tmp_path / "taken.dsl").mkdir()
+    bench.scans.plans.set_target(tmp_path / "taken")
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert "exists and is no scan" in facts.obstacles[0]
+
+
+def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp_path: Path) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    from dsl_core.devices.conditions import current_conditions
+
+    now = current_conditions(devices)
+    other = now.model_copy(update={"camera": now.camera.model_copy(update={"gain_db": 6.0})})
+    bench.library.store("bench", devices.calibration.model_copy(update={"conditions": other}))
+    bench.scans.plans.load_library()
+    choice = bench.state.calibrations.value[1]
+    assert choice.name == "bench"
+    bench.scans.plans.choose_calibration(choice)
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert facts.settings_differ
+    assert "gain" in facts.obstacles[0]
+    bench.scans.plans.set_override(True)
+    assert "--calibration bench --override-calibration" in bench.scans.command_line()
+    bench.scans.start()
+    assert bench.state.phase.value is Phase.DONE
+    assert "gain" in SessionReader(tmp_path / "first.dsl").manifest.notes["calibration_overridden"]
+    assert devices.calibration.conditions is None
+
+
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
+def test_the_command_line_makes_the_same_plan(bench: ScanBench, preset: object, tmp_path: Path) -> None:
+    bench.scans.plans.choose_preset(preset.key)  # type: ignore[attr-defined]
+    words = bench.scans.command_line().split()
+    assert words[:3] == ["dsl-scan", "scan", str(tmp_path / "first.dsl")]
+    options = dict(zip(words[3::2], words[4::2], strict=False))
+    settings = [words[i + 1] for i, word in enumerate(words) if word == "--setting"]
+    made = PlanChoice(
+        None, options.get("--code"), options.get("--lines"), options.get("--comb"), settings
+    ).build()
+    wanted = bench.state.plan.value
+    assert (made.code, made.spectral, made.code_settings) == (
+        wanted.code,
+        wanted.spectral,
+        wanted.code_settings,
+    )
+    assert [s.exposure_ms for s in made.settings] == pytest.approx(
+        [s.exposure_ms for s in wanted.settings], rel=1e-11
+    )
