@@ -1,0 +1,162 @@
+"""Where to hold a board: poses that together tell lenses and pose of camera and projector."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.board import Board, Charuco
+from dsl_core.model.geometry import Lens
+from dsl_core.model.placement import Placement
+from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import pixel_rays, project
+
+Floats = NDArray[np.float64]
+
+#: The squares stay this far inside both pictures, as a share of their width.
+CLEARANCE = 0.015
+#: Steps in which a board is moved to the middle until both devices see all of it.
+SHARES = np.linspace(1, 0, 11)
+DEPTHS_MM = (600.0, 850.0)
+
+
+@dataclass(frozen=True)
+class BoardPose:
+    """Middle of the board in camera coordinates (mm), tilts about x and y and roll (degrees)."""
+
+    x_mm: float
+    y_mm: float
+    depth_mm: float
+    tilt_x_deg: float
+    tilt_y_deg: float
+    roll_deg: float
+
+    def placement(self, board: Board) -> Placement:
+        """What the twin's hand is told, film off."""
+        columns, rows = board.corner_grid
+        options: dict[str, float | str] = {
+            "columns": columns,
+            "rows": rows,
+            "square_mm": board.square_mm,
+            **{name: round(value, 1) for name, value in vars(self).items()},
+        }
+        if isinstance(board, Charuco):
+            options |= {"marker_mm": board.marker_mm, "dictionary": board.dictionary}
+        return Placement(target="board", film=False, options=options)
+
+    def instruction(self, rig: Rig) -> str:
+        """The pose in a sentence for a person."""
+        column, row = project(rig.camera, *np.array([[self.x_mm], [self.y_mm], [self.depth_mm]]))
+        place = _place(float(column[0]) / rig.camera.width_px, float(row[0]) / rig.camera.height_px)
+        turns = [
+            f"{what} about {abs(angle):.0f}°"
+            for angle, what in (
+                (self.tilt_x_deg, f"its {'lower' if self.tilt_x_deg > 0 else 'upper'} edge tilted away by"),
+                (self.tilt_y_deg, f"its {'right' if self.tilt_y_deg > 0 else 'left'} edge turned away by"),
+                (self.roll_deg, f"rolled {'clockwise' if self.roll_deg > 0 else 'anticlockwise'} by"),
+            )
+            if abs(angle) >= 1
+        ]
+        how = ", ".join(turns) or "facing the camera"
+        return (
+            f"Film off. Hold the board still about {self.depth_mm:.0f} mm before the camera, {place},"
+            f" {how}. All of it must be in view and lit by the projector; nothing may move while it is captured."
+        )
+
+
+def _place(across: float, down: float) -> str:
+    words = [
+        low if share < 0.45 else high if share > 0.55 else ""
+        for share, low, high in ((down, "upper", "lower"), (across, "left", "right"))
+    ]
+    named = " ".join(word for word in words if word)
+    return f"in the {named} part of the picture" if named else "in the middle of the picture"
+
+
+#: Place in what is free of the view (-1 to 1 each way), depth (0 near, 1 far), tilt x, tilt y, roll (degrees).
+#: Tilts in all directions tell focal lengths, corners of the view tell distortion, rolls even out the print.
+_WISHES = (
+    (0.0, 0.0, 0.1, 0.0, 0.0, 3.0),
+    (-1.0, -1.0, 0.6, 25.0, -20.0, 8.0),
+    (1.0, -1.0, 0.6, 25.0, 20.0, -6.0),
+    (-1.0, 1.0, 0.5, -28.0, -22.0, -10.0),
+    (1.0, 1.0, 0.5, -28.0, 22.0, 12.0),
+    (0.0, -1.0, 0.3, 30.0, 0.0, 0.0),
+    (0.0, 1.0, 0.3, -30.0, 5.0, 180.0),
+    (-1.0, 0.0, 0.4, 4.0, -30.0, 4.0),
+    (1.0, 0.0, 0.4, -4.0, 30.0, -4.0),
+    (0.3, 0.3, 1.0, 12.0, 12.0, 90.0),
+    (-1.0, 1.0, 1.0, 12.0, -12.0, 174.0),
+    (1.0, -1.0, 1.0, -12.0, 14.0, -7.0),
+)
+MOST_POSES = len(_WISHES)
+
+
+def default_poses(board: Board, rig: Rig, count: int) -> tuple[BoardPose, ...]:
+    """The first ``count`` poses, moved to where camera and projector of ``rig`` see the whole board.
+
+    ``rig`` may be nominal. Raises `CalibrationError` when the board is too large to be seen as a whole.
+    """
+    if not 3 <= count <= MOST_POSES:
+        raise CalibrationError(f"The geometry takes 3 to {MOST_POSES} poses of the board, not {count}.")
+    poses = tuple(_fitted(board, rig, wish) for wish in _WISHES[:count])
+    if None in poses:
+        width, height = ((n + 1) * board.square_mm for n in board.corner_grid)
+        raise CalibrationError(
+            f"A board of {width:.0f} x {height:.0f} mm is too large: camera and projector do not see all of"
+            f" it at {DEPTHS_MM[0]:.0f} to {DEPTHS_MM[1]:.0f} mm. Print smaller squares."
+        )
+    return tuple(pose for pose in poses if pose is not None)
+
+
+def _fitted(board: Board, rig: Rig, wish: tuple[float, ...]) -> BoardPose | None:
+    """The pose nearest to a wish whose squares are all in view, if need be farther away; None for none."""
+    across, down, far, *turns = wish
+    for depth in np.linspace(DEPTHS_MM[0] + far * np.ptp(DEPTHS_MM), DEPTHS_MM[1], 6):
+        low, high = _view_mm(rig.camera, float(depth))
+        middle, half = (low + high) / 2, (high - low) / 2
+        for shares in sorted(product(SHARES, SHARES), key=sum, reverse=True):
+            x, y = middle + np.array(shares) * half * (across, down)
+            pose = BoardPose(float(x), float(y), float(depth), *turns)
+            if in_view(pose, board, rig):
+                return pose
+    return None
+
+
+def _view_mm(lens: Lens, depth_mm: float) -> tuple[Floats, Floats]:
+    """Least and largest x and y that a camera sees at a depth."""
+    rays = pixel_rays(lens)[:2].reshape(2, -1) * depth_mm
+    return rays.min(1), rays.max(1)
+
+
+def in_view(pose: BoardPose, board: Board, rig: Rig) -> bool:
+    """Whether both devices see all squares."""
+    points = outline_mm(pose, board)
+    in_projector = rig.pose.matrix @ points + rig.pose.vector_mm[:, None]
+    return _inside(rig.camera, points) and _inside(rig.projector, in_projector)
+
+
+def _inside(lens: Lens, points: Floats) -> bool:
+    column, row = project(lens, *points)
+    edge = CLEARANCE * lens.width_px
+    inside = (column > edge) & (column < lens.width_px - 1 - edge)
+    return bool((inside & (row > edge) & (row < lens.height_px - 1 - edge)).all())
+
+
+def outline_mm(pose: BoardPose, board: Board) -> Floats:
+    """The corners of the squared area in camera coordinates, shape (3, 4), mm."""
+    half_x, half_y = (0.5 * (n + 1) * board.square_mm for n in board.corner_grid)
+    u, v = np.array([[-half_x, half_x, half_x, -half_x], [-half_y, -half_y, half_y, half_y]])
+    a, b, c = np.radians([pose.tilt_x_deg, pose.tilt_y_deg, pose.roll_deg])
+    across, down = np.cos(c) * u - np.sin(c) * v, np.sin(c) * u + np.cos(c) * v
+    return np.stack(
+        [
+            pose.x_mm + across * np.cos(b) - down * np.sin(a) * np.sin(b),
+            pose.y_mm + down * np.cos(a),
+            pose.depth_mm + across * np.sin(b) + down * np.sin(a) * np.cos(b),
+        ]
+    )
