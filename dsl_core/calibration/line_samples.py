@@ -13,6 +13,7 @@ from dsl_core.calibration.tiles import tile_of_pixels
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import Correspondence, zero_order
+from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.shading import Plane, plane_shading
 
@@ -99,7 +100,8 @@ def trace_paths(
 ) -> Paths:
     """The paths of an order to pixels of a plane, by a model of the film."""
     width = rig.camera.width_px
-    depth, shade = (image.ravel()[pixels] for image in (plane.depth_mm(rig), plane_shading(rig, plane)))
+    light = plane_shading(rig, plane) * relative_gain(rig)
+    depth, shade = (image.ravel()[pixels] for image in (plane.depth_mm(rig), light))
     z, where = torch.as_tensor(depth), torch.as_tensor(pixels)
     nm = template.centroid_nm
     wavelengths = np.array([nm - NEAR_NM, nm, nm + NEAR_NM, *template.extent_nm])

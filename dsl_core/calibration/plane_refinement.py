@@ -22,7 +22,7 @@ from dsl_core.calibration.stage_planes import (
     StageProblem,
     columns_at,
     plane_of,
-    rays_at,
+    rays_through,
 )
 from dsl_core.calibration.tiles import ColumnSamples
 from dsl_core.errors import CalibrationError
@@ -180,7 +180,7 @@ def systematic_std(rig: Rig, shared: Floats, root: Floats, posterior: Floats) ->
     depths = np.linspace(*rig.depth_range_mm, 5)
 
     def columns(numbers: Floats, more_mm: float = 0.0) -> Floats:
-        rays = rays_at(numbers[CAMERA], pixels)
+        rays = rays_through(numbers[CAMERA], pixels)
         return np.concatenate([columns_at(numbers, rays * (z + more_mm)) for z in depths])
 
     moves = [columns(shared + 1e-3 * root[:, k]) - columns(shared - 1e-3 * root[:, k]) for k in range(SHARED)]

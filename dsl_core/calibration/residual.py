@@ -7,8 +7,7 @@ left out: whole positions, whole filters, and a random third.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.film import FLOOR_PX, HUBER_SIGMAS, OrderSamples, fit_film, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.column_residual import ColumnResidual
+from dsl_core.model.depth_stage import HeldOutError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.column_residual import chebyshev, residual_columns, scaled
 
@@ -33,26 +33,15 @@ ROUNDS = 5
 WAVELENGTH_RANGE_NM = (430.0, 660.0)
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Root mean square errors (px) on samples that a fit never saw, of the film alone and with correction.
-
-    ``kept_out`` says what was left out. The noise of the samples themselves is part of the errors;
-    ``noise_px`` is its size.
-    """
-
-    kept_out: str
-    grating_px: float
-    hybrid_px: float
-    noise_px: float
-
-
-def choose_residual(rig: Rig, samples: OrderSamples) -> tuple[ColumnResidual, tuple[HeldOut, ...]]:
+def choose_residual(
+    rig: Rig, samples: OrderSamples, positions: Sequence[str], filters: Sequence[str]
+) -> tuple[ColumnResidual, tuple[HeldOutError, ...]]:
     """The correction for the film of ``rig``, and the errors on what was left out.
 
-    Film and correction are fitted again without each position, each filter, and a third of the samples.
+    Film and correction are fitted again without each position, each filter, and a third of the samples;
+    ``positions`` and ``filters`` are their names.
     """
-    folds = list(_folds(samples))
+    folds = list(_folds(samples, positions, filters))
     errors = np.empty((MAX_DEGREE + 1, len(folds)))
     noise = np.empty(len(folds))
     for i, (_, out) in enumerate(folds):
@@ -70,7 +59,12 @@ def choose_residual(rig: Rig, samples: OrderSamples) -> tuple[ColumnResidual, tu
         if total[degree] < (1 - MIN_GAIN) * total[best]:
             best = degree
     table = tuple(
-        HeldOut(name, float(errors[0, i]), float(errors[best, i]), float(noise[i]))
+        HeldOutError(
+            kept_out=name,
+            grating_px=float(errors[0, i]),
+            hybrid_px=float(errors[best, i]),
+            noise_px=float(noise[i]),
+        )
         for i, (name, _) in enumerate(folds)
     )
     return fit_residual(rig, samples, best), table
@@ -111,12 +105,14 @@ def correction_px(rig: Rig, residual: ColumnResidual, samples: OrderSamples) -> 
     return found
 
 
-def _folds(samples: OrderSamples) -> Iterator[tuple[str, Flags]]:
+def _folds(
+    samples: OrderSamples, positions: Sequence[str], filters: Sequence[str]
+) -> Iterator[tuple[str, Flags]]:
     """What to leave out, by name; only what leaves two of a kind."""
-    for name, of in (("position", samples.position), ("filter", samples.filter)):
+    for names, of in ((positions, samples.position), (filters, samples.filter)):
         values = np.unique(of)
         if len(values) > 2:
-            yield from ((f"{name} {value}", of == value) for value in values)
+            yield from ((names[value], of == value) for value in values)
     rng = np.random.default_rng(0)
     # Whole tiles: neighbouring orders and filters of a tile share what is wrong there.
     yield (

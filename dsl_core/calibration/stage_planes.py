@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.bundle import CAMERA, PROJECTOR, SHARED, STEREO, rotation_of, vector_of
+from dsl_core.calibration.geometric import lens_of
 from dsl_core.calibration.tiles import ColumnSamples
 from dsl_core.model.geometry import Lens
 from dsl_core.model.rig import Rig
-from dsl_core.optics.pinhole import distort, undistort
+from dsl_core.optics.pinhole import distort, rays_at
 from dsl_core.optics.shading import Plane
 
 Floats = NDArray[np.float64]
@@ -43,12 +44,10 @@ def plane_of(slopes: Floats, distance_mm: float) -> Plane:
     return Plane(np.array([*slopes, 1.0]) / np.sqrt(1 + slopes @ slopes) / distance_mm)
 
 
-def rays_at(camera: Floats, pixels: Floats) -> Floats:
+def rays_through(camera: Floats, pixels: Floats) -> Floats:
     """Rays (3, n) with z = 1 of sub-pixel positions (n, 2) through a lens of nine numbers."""
-    x = (pixels[:, 0] - camera[2]) / camera[0]
-    y = (pixels[:, 1] - camera[3]) / camera[1]
-    u, v = undistort(x, y, tuple(camera[4:].tolist()))
-    return np.stack([u, v, np.ones_like(u)])
+    # The size of the image plays no part in where a ray goes.
+    return rays_at(lens_of(camera, (1, 1)), pixels[:, 0], pixels[:, 1])
 
 
 def columns_at(shared: Floats, points_mm: Floats) -> Floats:
@@ -96,7 +95,7 @@ class StageProblem:
 
     def points_mm(self, numbers: Floats) -> Floats:
         """Points (3, n) of the plane where the samples see it."""
-        rays = rays_at(self.shared(numbers)[CAMERA], self.camera_px)
+        rays = rays_through(self.shared(numbers)[CAMERA], self.camera_px)
         slopes = numbers[SLOPES]
         along = (slopes @ rays[:2] + rays[2]) / np.sqrt(1 + slopes @ slopes)
         return np.asarray(rays * (self.distances_mm(numbers)[self.position_of] / along))

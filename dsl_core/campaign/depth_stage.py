@@ -1,0 +1,264 @@
+"""A flat target at a few positions of a stage: geometry refined, film, residual and chain of the spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+from dsl_core.calibration.depth_stage import StageData, StageFilter, calibrate_depth_stage
+from dsl_core.calibration.line_samples import LineFrames
+from dsl_core.campaign.depth_stage_figures import depth_stage_figures
+from dsl_core.campaign.exposures import LONGEST_MS, WhiteLevel, bracket, bright_setting, measure_white
+from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.stage_scans import lines_on_plane, zero_order_columns
+from dsl_core.errors import CalibrationError, DslError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.io.session_reader import SessionReader
+from dsl_core.model.base import Record
+from dsl_core.model.chain import ChainCorrection
+from dsl_core.model.depth_stage import DepthStageCalibration, apply_depth_stage
+from dsl_core.model.figure import Figure
+from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
+from dsl_core.progress import Progress
+
+SCAN_NAME, NOTE_NAME = "scan.dsl", "stage.json"
+#: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
+LONGER = 3.0
+#: The longer exposure of the scan without filter, which shows the first orders, over the shorter one.
+LONG_RATIO = 6.0
+T = TypeVar("T")
+
+
+class StageNote(Record):
+    """Where the stage said it was, and the filter of a step with its transmission."""
+
+    position_mm: float
+    filter_nm: float | None = None
+    transmission: SpectralCurve | None = None
+    measured: bool = False
+
+
+@dataclass(frozen=True)
+class DepthStageRecipe:
+    """The calibration with a plane on a stage.
+
+    ``positions_mm`` are those of the stage, ``stage_std_mm`` how well it keeps them; ``filters_nm`` are
+    nominal centres of bandpass filters. ``code_step_px`` is the step of the lines without filter, at most 5;
+    ``filter_step_px`` that of the lines through filters, which may lie far apart. ``reflectance`` is the
+    target's; ``chain`` corrects the product of response, emission and efficiency by it.
+    """
+
+    positions_mm: tuple[float, ...] = (600.0, 750.0, 900.0)
+    filters_nm: tuple[float, ...] = (450.0, 540.0, 640.0)
+    code_step_px: int = 4
+    filter_step_px: int = 16
+    stage_std_mm: float = 0.02
+    reflectance: float = 0.99
+    chain: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        return "depth-stage"
+
+    @property
+    def title(self) -> str:
+        """Title of the wizard."""
+        return "Depth stage"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Geometry to refine, and the chain that weighs the wavelengths of a filter."""
+        return ("geometry", "spectralon", "bandpass")
+
+    @property
+    def record_type(self) -> type[Record]:
+        """The record that `fit` makes."""
+        return DepthStageCalibration
+
+    def steps(self, bench: Bench) -> tuple[Step, ...]:
+        """At each position the plane without filter, then through each filter."""
+        positions, filters = sorted(set(self.positions_mm)), sorted(set(self.filters_nm))
+        if len(positions) < 2 or not filters:
+            raise CalibrationError(
+                "Depth stage: at least two different positions and one filter are needed, given"
+                f" {len(positions)} and {len(filters)}. Add some to positions_mm or filters_nm."
+            )
+        return tuple(
+            step for position in positions for step in (_plain_step(position), *_filtered(position, filters))
+        )
+
+    def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
+        """Brightness and other light."""
+        self._move(bench, step)
+        white = measure_white(bench.devices, bench.rig)
+        return (
+            Figure(
+                name="white after one LED cycle",
+                value=white.brightest * bench.rig.frame_period_ms,
+                unit="DN",
+                low=0.5,
+                advice="The picture is dark. Check lens cap, aperture, projector and filter.",
+            ),
+            Figure(
+                name="other light",
+                value=100 * white.ambient,
+                unit="% of white",
+                high=20.0,
+                advice="Darken the room or shade the target.",
+            ),
+        )
+
+    def is_captured(self, bench: Bench, step: Step) -> bool:
+        """Whether the scan of a step is complete."""
+        folder = bench.step_folder(step) / SCAN_NAME
+        return (folder / MANIFEST_NAME).exists() and not SessionReader(folder).missing()
+
+    def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Move the stage, choose exposures by a test shot, and scan; goes on with a scan that was begun."""
+        from dsl_core import pipeline
+
+        folder = bench.step_folder(step)
+        scan = folder / SCAN_NAME
+        note = self._move(bench, step)
+        if (scan / MANIFEST_NAME).exists():
+            plan = SessionReader(scan).plan
+        else:
+            white = measure_white(bench.devices, bench.rig)
+            plan = pipeline.fit_plan(self._plan(bench.rig, step, white), bench.devices)
+            folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(folder / NOTE_NAME, note.model_dump_json(indent=1).encode())
+        pipeline.scan(bench.devices, plan, scan, progress)
+
+    def fit(self, bench: Bench, progress: Progress) -> DepthStageCalibration:
+        """Calibrate from the captures of all steps."""
+        steps = self.steps(bench)
+        plain = [step for step in steps if step.placement.filter_nm is None]
+        filtered = [step for step in steps if step.placement.filter_nm is not None]
+        notes, count = [_note_of(bench, step) for step in plain], len(filtered) // len(plain)
+        data = StageData(
+            positions_mm=tuple(note.position_mm for note in notes),
+            stage_std_mm=self.stage_std_mm,
+            columns=tuple(
+                _named(step, partial(zero_order_columns, _scan(bench, step), bench.rig, progress))
+                for step in plain
+            ),
+            filters=tuple(_filter_of(_note_of(bench, step)) for step in filtered[:count]),
+            frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
+            exposures=sum(_scan(bench, step).plan.shot_count for step in steps),
+        )
+        found = calibrate_depth_stage(bench.rig, data, progress)
+        if not self.chain:
+            return found
+        return found.model_copy(update={"chain": self._chain(bench, plain, found, progress)})
+
+    def figures(self, record: Record) -> tuple[Figure, ...]:
+        """Flatness, steps, held-out error and doubts."""
+        assert isinstance(record, DepthStageCalibration)
+        return depth_stage_figures(record)
+
+    def apply(self, record: Record, rig: Rig) -> Rig:
+        """The rig with refined geometry, film, residual and chain."""
+        assert isinstance(record, DepthStageCalibration)
+        return apply_depth_stage(record, rig)
+
+    def _move(self, bench: Bench, step: Step) -> StageNote:
+        """Move the stage to a step's position; what is to be noted of the step."""
+        position, nm = float(step.placement.options["depth_mm"]), step.placement.filter_nm
+        if bench.devices.stage is not None:
+            position = bench.devices.stage.move_to(position)
+        if nm is None:
+            return StageNote(position_mm=position)
+        curve = bench.devices.filters.get(nm)
+        return StageNote(
+            position_mm=position,
+            filter_nm=nm,
+            transmission=curve or nominal_filter(nm),
+            measured=curve is not None,
+        )
+
+    def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
+        if step.placement.filter_nm is None:
+            return CapturePlan(
+                name=step.title,
+                code=GrayCode(rows=False),
+                spectral=ScanLines(step_px=self.code_step_px),
+                settings=bracket(rig, white, step.title, LONG_RATIO),
+                code_settings=(0,),
+            )
+        bright = bright_setting(rig, white, step.title)
+        cycles = int(min(LONGER * bright.exposure_ms, LONGEST_MS) / rig.frame_period_ms)
+        return CapturePlan(
+            name=step.title,
+            code=NoCode(),
+            spectral=ScanLines(step_px=self.filter_step_px, sparse=True),
+            settings=(Setting(exposure_ms=max(cycles, 1) * rig.frame_period_ms, level=bright.level),),
+            code_settings=(0,),
+        )
+
+    def _lines(self, bench: Bench, step: Step) -> LineFrames:
+        return _named(step, partial(lines_on_plane, _scan(bench, step), bench.rig))
+
+    def _chain(
+        self, bench: Bench, plain: list[Step], found: DepthStageCalibration, progress: Progress
+    ) -> ChainCorrection:
+        """What the lines without filter say of the chain, once it is known where the light goes."""
+        from dsl_core.calibration.chain import chain_correction
+        from dsl_core.campaign.diffuser_lines import diffuser_lines
+
+        rig = apply_depth_stage(found, bench.rig)
+        scans = [_named(step, partial(diffuser_lines, _scan(bench, step), rig, progress)) for step in plain]
+        progress.report("chain", 0, 1)
+        return chain_correction(rig, scans, reflectance=self.reflectance)
+
+
+def _plain_step(position_mm: float) -> Step:
+    return Step(
+        f"position-{position_mm:g}",
+        f"Plane at {position_mm:g} mm",
+        f"Mount the film before the projector and put the flat white target on the stage at {position_mm:g}"
+        " mm, facing the camera and filling its view. No filter before the camera.",
+        Placement(target="spectralon", film=True, options={"depth_mm": position_mm}),
+    )
+
+
+def _filtered(position_mm: float, filters_nm: list[float]) -> list[Step]:
+    return [
+        Step(
+            f"position-{position_mm:g}-filter-{nm:g}",
+            f"Plane at {position_mm:g} mm, filter of {nm:g} nm",
+            f"Put the bandpass filter of {nm:g} nm flat before the camera's lens. Move nothing else.",
+            Placement(target="spectralon", film=True, filter_nm=nm, options={"depth_mm": position_mm}),
+        )
+        for nm in filters_nm
+    ]
+
+
+def _scan(bench: Bench, step: Step) -> SessionReader:
+    return SessionReader(bench.step_folder(step) / SCAN_NAME)
+
+
+def _note_of(bench: Bench, step: Step) -> StageNote:
+    return read_record(bench.step_folder(step) / NOTE_NAME, StageNote)
+
+
+def _filter_of(note: StageNote) -> StageFilter:
+    assert note.filter_nm is not None
+    assert note.transmission is not None
+    return StageFilter(note.filter_nm, note.transmission, note.measured)
+
+
+def _named(step: Step, task: Callable[[], T]) -> T:
+    """Do a task of a step, whose errors then name it."""
+    try:
+        return task()
+    except DslError as error:
+        raise CalibrationError(f"{step.title}: {error}") from error

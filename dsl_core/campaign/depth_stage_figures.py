@@ -1,0 +1,71 @@
+"""What a person judges the depth-stage calibration by."""
+
+from __future__ import annotations
+
+from dsl_core.model.depth_stage import DepthStageCalibration
+from dsl_core.model.figure import Figure
+
+#: Flatness of a plane and error of a stage's step, mm; error of columns that a fit never saw, px.
+MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
+
+
+def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    """Flatness, steps, what depth leaves open, held-out error, the film, and doubts."""
+    flat = max(record.positions, key=lambda each: each.plane_rms_mm)
+    step = max(record.positions, key=lambda each: abs(each.step_error_mm))
+    film = [
+        Figure(name=name, value=getattr(record.film, field), unit=unit, std=record.film_std[field])
+        for name, field, unit in (
+            ("film's lines", "lines_per_mm", "1/mm"),
+            ("film's distance", "distance_mm", "mm"),
+            ("film's tilt about x", "tilt_x_deg", "degrees"),
+            ("film's tilt about y", "tilt_y_deg", "degrees"),
+            ("film's roll", "roll_deg", "degrees"),
+            ("film's bend", "bend_per_mm", "1/mm"),
+        )
+    ]
+    chain = []
+    if record.chain is not None:
+        chain = [
+            Figure(
+                name="largest correction of the chain",
+                value=100 * record.chain.largest_correction,
+                unit="%",
+                high=15.0,
+                advice="Calibrate Spectralon, Color Checker and bandpass filters again.",
+            )
+        ]
+    return (
+        Figure(
+            name="scatter about the plane",
+            value=flat.plane_rms_mm,
+            unit="mm",
+            high=MAX_PLANE_MM,
+            advice=f"Use a flatter target, or check the lenses; worst at {flat.position_mm:g} mm.",
+        ),
+        Figure(
+            name="error of the stage's steps",
+            value=abs(step.step_error_mm),
+            unit="mm",
+            std=step.step_std_mm,
+            high=MAX_STEP_MM,
+            advice=f"Check the stage at {step.position_mm:g} mm; repeat the geometry with more poses.",
+        ),
+        Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),
+        Figure(
+            name="held-out error of first orders",
+            value=record.held_out_px,
+            unit="px",
+            high=MAX_HELD_OUT_PX,
+            advice="Use more filters or positions, lines closer together, or longer exposures.",
+        ),
+        *film,
+        *chain,
+        Figure(
+            name="captures in doubt",
+            value=float(len(record.warnings)),
+            unit="",
+            high=0.0,
+            advice=". ".join(record.warnings),
+        ),
+    )
