@@ -54,9 +54,7 @@ PAGES: tuple[Page, ...] = (
 
 ACTIONS: tuple[Action, ...] = (
     Action("open", "&Open…", "File", "Ctrl+O", "Open a scan, a result, a reference or a calibration"),
-    Action(
-        "export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs", "results"
-    ),
+    Action("export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs"),
     Action(
         "show_command",
         "Show &command line",
@@ -84,6 +82,21 @@ ACTIONS: tuple[Action, ...] = (
         "Ctrl+.",
         "Stop everything that runs, at the next safe point",
     ),
+    *(
+        Action(f"view_{key}", text, "Results", str(i), tip, page="results")
+        for i, (key, text, tip) in enumerate(
+            (
+                ("colour", "&sRGB", "Colours as the eye sees them under a light"),
+                ("band", "&Band", "Reflectance of one band"),
+                ("depth", "&Depth", "Depth along the camera axis"),
+                ("quality", "&Quality and orders", "Why pixels are limited, and which order measured a band"),
+                ("cloud", "3D &cloud", "The points in space"),
+            ),
+            1,
+        )
+    ),
+    Action("band_down", "Band d&own", "Results", ",", "The next shorter wavelength", "results", separator=True),
+    Action("band_up", "Band &up", "Results", ".", "The next longer wavelength", "results"),
     Action("help_page", "&Help on this page", "Help", "F1", "What this page does and what its numbers mean"),
     Action("shortcuts", "&Keyboard shortcuts", "Help", "Ctrl+/", "Every action and its keys"),
     Action("report_bundle", "Save a &report bundle…", "Help", "", "Log, settings and versions in one file"),

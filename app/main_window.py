@@ -132,6 +132,9 @@ class MainWindow(QMainWindow):
         self.stack.setCurrentWidget(self._made[key])
         self.rail.mark(key)
         self.parts.settings.page = key
+        for action in ACTIONS:
+            if action.page:
+                self.actions_by_key[action.key].setEnabled(action.page == key)
         title = next(page.title for page in PAGES if page.key == key)
         self.setWindowTitle(f"{title} – dsl-scan")
         return self._made[key]

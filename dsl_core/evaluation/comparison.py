@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.evaluation.spectral import spectral_errors
 from dsl_core.model.spectral import SpectralCurve
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
 #: Fewer common bands than this say nothing about a spectrum.
 MIN_BANDS = 5
 
@@ -47,7 +48,7 @@ def compare(spectrum: Floats, wavelengths_nm: Floats, reference: SpectralCurve) 
             f"Spectrum and reference ({nm[0]:g} to {nm[-1]:g} nm) share {count} bands;"
             f" {MIN_BANDS} are needed."
         )
-    bands = wavelengths_nm[shared]
+    bands = np.asarray(wavelengths_nm[shared], np.float64)
     wanted = np.interp(bands, nm, np.asarray(reference.values))
     found = spectral_errors(np.asarray(spectrum[shared], np.float64)[:, None], wanted[:, None], bands)
     return Comparison(

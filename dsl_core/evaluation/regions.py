@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +28,37 @@ def mask_of_outline(outline_px: Sequence[tuple[float, float]], shape: tuple[int,
     left, right = max(int(np.ceil(x0)), 0), min(int(np.floor(x1)), columns - 1)
     if top > bottom or left > right:
         return mask
-    x = np.arange(left, right + 1)[None, :]
-    y = np.arange(top, bottom + 1)[:, None]
-    inside = np.zeros((bottom - top + 1, right - left + 1), bool)
+    x, y = np.arange(left, right + 1)[None, :], np.arange(top, bottom + 1)[:, None]
+    mask[top : bottom + 1, left : right + 1] = inside_outline(x, y, corners)
+    return mask
+
+
+def inside_outline(
+    x: NDArray[Any], y: NDArray[Any], outline: NDArray[np.float64] | Sequence[tuple[float, float]]
+) -> Mask:
+    """Whether points lie in a closed outline of (x, y) corners, even-odd rule; NaN lies outside."""
+    corners = np.asarray(outline, np.float64).reshape(-1, 2)
+    inside = np.zeros(np.broadcast_shapes(x.shape, y.shape), bool)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if ay != by:
             crosses = (ay > y) != (by > y)
             inside ^= crosses & (x < (bx - ax) * (y - ay) / (by - ay) + ax)
-    mask[top : bottom + 1, left : right + 1] = inside
+    return inside
+
+
+def runs_of(mask: Mask) -> tuple[tuple[int, int, int], ...]:
+    """A mask (rows, columns) as runs of (row, first column, columns), to be kept in a file."""
+    edges = np.diff(np.pad(mask.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    starts, stops = np.argwhere(edges == 1), np.argwhere(edges == -1)
+    return tuple((int(y), int(x), int(end - x)) for (y, x), (_, end) in zip(starts, stops, strict=True))
+
+
+def mask_of_runs(runs: Iterable[tuple[int, int, int]], shape: tuple[int, int]) -> Mask:
+    """The mask of `runs_of`; what lies outside the image is left out."""
+    mask = np.zeros(shape, bool)
+    for y, x, count in runs:
+        if 0 <= y < shape[0]:
+            mask[y, max(x, 0) : max(x + count, 0)] = True
     return mask
 
 

@@ -12,7 +12,7 @@ from dsl_core.evaluation.comparison import compare
 from dsl_core.evaluation.distance import distance_between, nearest_on_screen, on_screen
 from dsl_core.evaluation.explanation import explain_pixel, undecided_ranges
 from dsl_core.evaluation.quality import gravest_flag
-from dsl_core.evaluation.regions import mask_of_outline, region_spectrum
+from dsl_core.evaluation.regions import mask_of_outline, mask_of_runs, region_spectrum, runs_of
 from dsl_core.evaluation.relighting import LIGHTS, relight
 from dsl_core.evaluation.similarity import angle_map, likeness
 from dsl_core.model.result import Flag
@@ -40,6 +40,13 @@ def test_a_triangle_holds_what_lies_on_the_inner_side_of_its_edges(
     )
     assert mask[(sides > 1e-6).all(0) | (sides < -1e-6).all(0)].all()
     assert not mask[(sides > 1e-6).any(0) & (sides < -1e-6).any(0)].any()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_mask_comes_back_from_its_runs(seed: int) -> None:
+    mask = np.random.default_rng(seed).random((7, 9)) > 0.5
+    assert (mask_of_runs(runs_of(mask), mask.shape) == mask).all()
+    assert not mask_of_runs([(99, 0, 3), (0, -5, 2)], mask.shape).any()
 
 
 def test_a_region_leaves_pixels_without_spectrum_out() -> None:

@@ -1,0 +1,84 @@
+"""Marks as they are kept on disk, and the spectra that they stand for. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from app.state.results import Mark, Spectrum, spectrum_of_pixel
+from dsl_core.errors import DslError
+from dsl_core.io.annotations_file import Annotations, PinRecord, ReferenceRecord, RegionRecord
+from dsl_core.io.result_arrays import ResultArrays
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.progress import Progress
+
+#: The spectrum of a region whose mean is not computed yet.
+NOTHING = Spectrum(np.empty(0), np.empty(0))
+
+
+def read_reference(path: Path) -> SpectralCurve:
+    """The spectrum of a file, whatever range it covers; raises `DslError`."""
+    from dsl_core.io.spectrum_file import read_spectrum
+
+    return read_spectrum(path, covers_nm=(float("inf"), float("-inf")), radiance=False)
+
+
+def mark_of_reference(name: str, colour: int, path: Path, curve: SpectralCurve) -> Mark:
+    """A reference with its spectrum."""
+    spectrum = Spectrum(np.array(curve.wavelengths_nm), np.array(curve.values))
+    return Mark("reference", name, colour, spectrum, file=path, curve=curve)
+
+
+def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
+    """A region with the mean and deviation of its pixels."""
+    from dsl_core.evaluation.regions import mask_of_outline, mask_of_runs, region_spectrum
+
+    progress.report("mean of a region", 0, 1)
+    shape = result.shape
+    mask = mask_of_runs(draft.runs, shape) if draft.runs else mask_of_outline(draft.outline_px, shape)
+    found = region_spectrum(result["reflectance"], result["reflectance_std"], result["data_share"], mask)
+    spectrum = Spectrum(result.wavelengths_nm, found.mean, found.deviation, found.data_share, sigmas=1.0)
+    return replace(draft, spectrum=spectrum, pixels=found.pixels, used=found.used)
+
+
+def marks_of(kept: Annotations, result: ResultArrays, progress: Progress) -> tuple[Mark, ...]:
+    """Kept marks with their spectra; those that the result or a moved file no longer has are left out."""
+    marks: list[Mark] = []
+    for pin in kept.pins:
+        spectrum = spectrum_of_pixel(result, pin.pixel)
+        if spectrum is not None:
+            marks.append(Mark("pin", pin.name, pin.colour, spectrum, pin.shown, pixel=pin.pixel))
+    for region in kept.regions if result.has_spectra else ():
+        draft = Mark("region", region.name, region.colour, NOTHING, region.shown)
+        marks.append(
+            fill_region(replace(draft, outline_px=region.outline_px, runs=region.runs), result, progress)
+        )
+    for reference in kept.references:
+        path = Path(reference.file)
+        try:
+            made = mark_of_reference(reference.name, reference.colour, path, read_reference(path))
+        except DslError:
+            continue
+        marks.append(replace(made, shown=reference.shown))
+    return tuple(marks)
+
+
+def annotations_of(marks: Iterable[Mark]) -> Annotations:
+    """Marks as they are kept."""
+    pins, regions, references = [], [], []
+    for mark in marks:
+        name, colour, shown = mark.name, mark.colour, mark.shown
+        if mark.kind == "pin" and mark.pixel is not None:
+            pins.append(PinRecord(name=name, pixel=mark.pixel, colour=colour, shown=shown))
+        elif mark.kind == "region":
+            regions.append(
+                RegionRecord(
+                    name=name, outline_px=mark.outline_px, runs=mark.runs, colour=colour, shown=shown
+                )
+            )
+        elif mark.file is not None:
+            references.append(ReferenceRecord(name=name, file=str(mark.file), colour=colour, shown=shown))
+    return Annotations(pins=tuple(pins), regions=tuple(regions), references=tuple(references))

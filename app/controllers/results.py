@@ -1,0 +1,293 @@
+"""What the Results page decides about a whole result: open, reconstruct, light, search, export. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.controllers.marks import MarksController
+from app.jobs.base import Job, JobRunner
+from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
+from app.state.undo import UndoStack
+from app.views import Notifier
+from dsl_core.io.result_arrays import ResultArrays, load_arrays
+from dsl_core.progress import Progress
+
+#: Endings of files that may hold a reference spectrum.
+REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+MANIFEST, RESULT = "manifest.json", "zarr.json"
+
+
+class ResultsController:
+    """Opens results and answers what the page asks of the whole image; ``marks`` has pins and regions."""
+
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+        self.marks = MarksController(state, runner, notifier, undo)
+
+    # Open ------------------------------------------------------------------------------------------
+
+    def open(self, path: Path) -> bool:
+        """Open a result, offer to reconstruct a scan, or take a reference; False for anything else."""
+        if (path / RESULT).is_file():
+            self._load(path)
+        elif (path / MANIFEST).is_file():
+            self.offer(path)
+        elif path.suffix.lower() in REFERENCE_SUFFIXES and self.state.result.value is not None:
+            self.marks.add_reference(path)
+        else:
+            return False
+        return True
+
+    def offer(self, session: Path) -> None:
+        """Open the result beside a scan, or offer to make it."""
+        target = session.with_suffix(".zarr")
+        if (target / RESULT).is_file():
+            self._load(target)
+        else:
+            self.state.offer.set(session)
+
+    def reconstruct(self) -> None:
+        """Make the result of the scan that is offered, save it beside the scan and open it."""
+        session = self.state.offer.value
+        if session is None:
+            return
+        target = session.with_suffix(".zarr")
+
+        def work(progress: Progress) -> ResultArrays:
+            from dsl_core.io.result_file import save_result
+            from dsl_core.sessions import reconstruct_session
+
+            save_result(reconstruct_session(session, progress=progress), target)
+            return load_arrays(target, progress)
+
+        self._start(f"Reconstruct {session.name}", work)
+
+    def _load(self, path: Path) -> None:
+        self._start(f"Open {path.name}", lambda progress: load_arrays(path, progress))
+
+    def _start(self, title: str, work: Callable[[Progress], ResultArrays]) -> None:
+        if self.state.busy.value:
+            self._notifier.tell(
+                "info", f"{self.state.busy.value} is not finished yet. Wait for it or cancel."
+            )
+            return
+        self.state.busy.set(title)
+
+        def both(progress: Progress) -> tuple[ResultArrays, NDArray[np.uint8] | None]:
+            from dsl_core.optics.colour import observer_weights
+
+            arrays = work(progress)
+            if arrays.has_spectra:
+                # Imports what the first comparison of colours would else stop the window for.
+                observer_weights(arrays.wavelengths_nm)
+            return arrays, picture_of(arrays["rgb"]) if "rgb" in arrays.arrays else None
+
+        self._runner.submit(
+            Job(title, both, self._opened, self._failed, lambda: self.state.busy.set(""), exclusive="opening")
+        )
+
+    def _opened(self, opened: tuple[ResultArrays, NDArray[np.uint8] | None]) -> None:
+        arrays, picture = opened
+        state = self.state
+        state.busy.set("")
+        state.offer.set(None)
+        state.search.set(None)
+        state.cursor.set(None)
+        state.light.set("D65")
+        state.picture.set(picture)
+        state.band.set(len(arrays.wavelengths_nm) // 2)
+        state.result.set(arrays)
+        if not arrays.has_spectra and state.view.value in (View.COLOUR, View.BAND):
+            state.view.set(View.DEPTH)
+        self.marks.load()
+
+    def _failed(self, error: Exception) -> None:
+        self.state.busy.set("")
+        self._notifier.tell("error", str(error))
+
+    def command_line(self) -> str:
+        """The command that makes or exports what is open."""
+        if self.state.offer.value is not None:
+            return f"dsl-scan reconstruct {self.state.offer.value}"
+        result = self.state.result.value
+        return (
+            "" if result is None else f"dsl-scan export {result.path} ply {result.path.with_suffix('.ply')}"
+        )
+
+    # Look ------------------------------------------------------------------------------------------
+
+    def show(self, view: View) -> None:
+        """Look at the result in another way; says why where the result has nothing to show."""
+        result = self.state.result.value
+        if result is not None and not result.has_spectra and view in (View.COLOUR, View.BAND):
+            self._notifier.tell(
+                "info", "This result holds depth only. Reconstruct the scan with spectra to see colours."
+            )
+            return
+        self.state.view.set(view)
+
+    def step_band(self, steps: int) -> None:
+        """Go some bands up or down."""
+        result = self.state.result.value
+        if result is not None and result.has_spectra:
+            last = len(result.wavelengths_nm) - 1
+            self.state.band.set(min(max(self.state.band.value + steps, 0), last))
+
+    def move_cursor(self, dx: int, dy: int) -> None:
+        """Move the cursor by pixels, from the middle where there is none."""
+        result = self.state.result.value
+        if result is None:
+            return
+        height, width = result.shape
+        x, y = self.state.cursor.value or (width // 2, height // 2)
+        self.point_at((min(max(x + dx, 0), width - 1), min(max(y + dy, 0), height - 1)))
+
+    def point_at(self, pixel: Pixel | None) -> None:
+        """Put the cursor on a pixel; outside the image it stays where it was."""
+        result = self.state.result.value
+        if pixel is None or (result is not None and result.holds(pixel)):
+            self.state.cursor.set(pixel)
+
+    # Light -----------------------------------------------------------------------------------------
+
+    def relight(self, light: str, adapted: bool) -> None:
+        """Show the colours under another light."""
+        result = self.state.result.value
+        if result is None or not result.has_spectra:
+            return
+
+        def work(progress: Progress) -> NDArray[np.uint8]:
+            from dsl_core.evaluation.relighting import relight
+
+            progress.report("relight", 0, 1)
+            return picture_of(relight(result["reflectance"], result.wavelengths_nm, light, adapted))
+
+        def done(picture: NDArray[np.uint8]) -> None:
+            if self.state.result.value is result:
+                self.state.light.set(light)
+                self.state.adapted.set(adapted)
+                self.state.picture.set(picture)
+
+        self._runner.submit(Job(f"Light {light}", work, done, self._tell))
+
+    # Search ----------------------------------------------------------------------------------------
+
+    def search(self, seek: Seek) -> None:
+        """Look for the spectrum of the selected mark, or of the cursor where none is selected."""
+        result, (name, wanted) = self.state.result.value, self._target()
+        if result is None or wanted is None or not result.has_spectra:
+            self._notifier.tell(
+                "info", "Select a pin, region or reference, or point at a pixel, to look for it."
+            )
+            return
+
+        def work(progress: Progress) -> Search:
+            from dsl_core.evaluation.similarity import likeness
+
+            spectrum = np.interp(result.wavelengths_nm, wanted.nm, wanted.mean)
+            return Search(
+                name, likeness(result["reflectance"], spectrum, result.wavelengths_nm, progress), seek
+            )
+
+        def done(search: Search) -> None:
+            if self.state.result.value is result:
+                self.state.search.set(search)
+
+        self._runner.submit(Job(f"Look for {name}", work, done, self._tell))
+
+    def limit_search(self, within_rad: float, within_delta_e: float) -> None:
+        """Change the limits of the search; the image follows at once."""
+        search = self.state.search.value
+        if search is not None:
+            self.state.search.set(replace(search, within_rad=within_rad, within_delta_e=within_delta_e))
+
+    def seek(self, what: Seek) -> None:
+        """Look for the other thing with the same spectrum."""
+        search = self.state.search.value
+        if search is not None:
+            self.state.search.set(replace(search, seek=what))
+
+    def end_search(self) -> None:
+        """Show the image without the search."""
+        self.state.search.set(None)
+
+    def _target(self) -> tuple[str, Spectrum | None]:
+        mark, cursor = self.state.selected_mark, self.state.cursor.value
+        if mark is not None:
+            return mark.name, mark.spectrum
+        if cursor is not None:
+            return f"pixel {cursor[0]}, {cursor[1]}", self.state.spectrum_at(cursor)
+        return "", None
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", str(error))
+
+    # Export ----------------------------------------------------------------------------------------
+
+    def export(self, targets: dict[str, Path], overwrite: bool) -> None:
+        """Write the result in formats by name, to a path each; tells what was written."""
+        result = self.state.result.value
+        if result is None or not targets:
+            return
+        pixels = [mark.pixel for mark in self.state.marks.value if mark.kind == "pin" and mark.pixel]
+
+        def work(progress: Progress) -> list[Path]:
+            from dsl_core.io.export import export, export_csv
+            from dsl_core.io.result_file import load_result
+
+            data, written = load_result(result.path), []
+            for done, (form, path) in enumerate(targets.items()):
+                progress.report(f"write {form}", done, len(targets))
+                if form == "csv":
+                    written += export_csv(data, path, overwrite=overwrite, pixels=pixels)
+                else:
+                    written += export(data, path, form, overwrite=overwrite)
+            return written
+
+        self._runner.submit(Job(f"Export {result.path.stem}", work, self._exported, self._tell))
+
+    def _exported(self, written: Sequence[Path]) -> None:
+        megabytes = sum(path.stat().st_size for path in written if path.is_file()) / 1e6
+        files = "file" if len(written) == 1 else "files"
+        details = "\n".join(str(path) for path in written)
+        self._notifier.tell(
+            "info",
+            f"Wrote {len(written)} {files}, {megabytes:.1f} MB, to {written[0].parent}.",
+            details,
+        )
+
+    def taken(self, targets: dict[str, Path]) -> list[Path]:
+        """Files that an export would replace."""
+        result = self.state.result.value
+        return [] if result is None else [path for path in expected_files(targets, result) if path.exists()]
+
+
+def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
+    """Files that an export writes."""
+    files: list[Path] = []
+    for form, path in targets.items():
+        if form == "envi":
+            headers = [path]
+            if "reflectance_std" in result.arrays:
+                headers.append(path.with_name(f"{path.stem}_std.hdr"))
+            files += [file for header in headers for file in (header, header.with_suffix(".img"))]
+        elif form == "png":
+            files += sorted(path.parent.glob(f"{path.stem}_*.png"))
+        else:
+            files.append(path)
+    return files
+
+
+def picture_of(rgb: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """RGBA bytes (rows, columns, 4) of colours (3, rows, columns), 0..1; transparent without an answer."""
+    picture = np.empty((*rgb.shape[1:], 4), np.uint8)
+    for channel in range(3):
+        level = np.nan_to_num(rgb[channel]).clip(0, 1)
+        picture[..., channel] = (level * 255 + 0.5).astype(np.uint8)
+    picture[..., 3] = np.where(np.isfinite(rgb[0]), 255, 0)
+    return picture

@@ -1,0 +1,237 @@
+"""The Results page: picture or cloud at the left, spectra and what was marked at the right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QHBoxLayout,
+    QPushButton,
+    QSplitter,
+    QStackedWidget,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.jobs.base import JobRunner
+from app.panels.export_dialog import ExportDialog
+from app.panels.marks_panel import MarksPanel
+from app.panels.readout import Readout
+from app.panels.result_image import ResultImage
+from app.panels.results_commands import ResultCommands
+from app.panels.scene_panel import ScenePanel
+from app.panels.search_panel import SearchPanel
+from app.panels.spectrum_panel import SpectrumPanel
+from app.panels.view_bar import ViewBar
+from app.state.results import ResultsState, View
+from app.theme import Theme
+from app.widgets.forms import label
+from app.widgets.page import PageWidget
+
+NOTHING_OPEN = (
+    "No result is open. Open a result (a folder NAME.zarr) or a finished scan (NAME.dsl), or drop one here.\n"
+    "“dsl-scan demo” makes both on the simulated rig in a minute."
+)
+
+
+class ResultsPage(PageWidget):
+    """Follows a `ResultsState` and asks a controller."""
+
+    def __init__(self, state: ResultsState, commands: ResultCommands, runner: JobRunner) -> None:
+        super().__init__()
+        self._state, self._commands = state, commands
+        self.setAcceptDrops(True)
+        self.title, self.about = label("Results", "title"), label("", "muted")
+        self.about.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.about.setSizePolicy(
+            self.about.sizePolicy().Policy.Ignored, self.about.sizePolicy().verticalPolicy()
+        )
+        self.bar = ViewBar(state, commands)
+        self.image = ResultImage(state)
+        self.scene = ScenePanel(state, runner)
+        self.readout = Readout(state)
+        self.spectra = SpectrumPanel(state)
+        self.marks = MarksPanel(state, commands.marks)
+        self.search = SearchPanel(state, commands)
+        self._panels = (self.image, self.scene, self.spectra, self.marks)
+        self.stack = QStackedWidget()
+        self._open, self._export = QPushButton("Open…"), QPushButton("Export…")
+        self._lay_out()
+        self._connect()
+
+    # Lay out ---------------------------------------------------------------------------------------
+
+    def _lay_out(self) -> None:
+        self._open.setToolTip("Open a result or a finished scan (Ctrl+O opens any file)")
+        self._export.setToolTip("Write the result in formats of other programs (Ctrl+E)")
+        head = QHBoxLayout()
+        head.addWidget(self.title)
+        head.addSpacing(10)
+        head.addWidget(self.about, 1)
+        head.addWidget(self._open)
+        head.addWidget(self._export)
+        self.stack.addWidget(self._empty())
+        self.stack.addWidget(self._content())
+        column = QVBoxLayout(self)
+        column.setContentsMargins(16, 10, 12, 8)
+        column.addLayout(head)
+        column.addWidget(self.stack, 1)
+
+    def _empty(self) -> QWidget:
+        empty = QWidget()
+        self.message = label(NOTHING_OPEN, "muted")
+        self.message.setWordWrap(True)
+        self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.reconstruct = QPushButton("Reconstruct")
+        self.reconstruct.setProperty("role", "primary")
+        self.reconstruct.setToolTip(
+            "Turn the frames into depth and spectra; the result is saved beside the scan"
+        )
+        column = QVBoxLayout(empty)
+        column.addStretch(1)
+        column.addWidget(self.message)
+        column.addSpacing(8)
+        column.addWidget(self.reconstruct, 0, Qt.AlignmentFlag.AlignHCenter)
+        column.addStretch(2)
+        return empty
+
+    def _content(self) -> QWidget:
+        self.pictures = QSplitter(Qt.Orientation.Horizontal)
+        self.pictures.addWidget(self.image)
+        self.pictures.addWidget(self.scene)
+        self.pictures.setStretchFactor(0, 1)
+        self.pictures.setStretchFactor(1, 2)
+        left = QWidget()
+        column = QVBoxLayout(left)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.bar)
+        column.addWidget(self.pictures, 1)
+        column.addWidget(self.readout)
+        tabs = QTabWidget()
+        tabs.setDocumentMode(True)
+        tabs.tabBar().setDrawBase(False)
+        tabs.addTab(self.marks, "Pins, regions, references")
+        tabs.addTab(self.search, "Look for")
+        right = QSplitter(Qt.Orientation.Vertical)
+        right.addWidget(self.spectra)
+        right.addWidget(tabs)
+        right.setStretchFactor(0, 3)
+        right.setStretchFactor(1, 2)
+        content = QSplitter(Qt.Orientation.Horizontal)
+        content.addWidget(left)
+        content.addWidget(right)
+        content.setStretchFactor(0, 3)
+        content.setStretchFactor(1, 2)
+        content.setSizes([720, 440])
+        for splitter in (content, right, self.pictures):
+            splitter.setChildrenCollapsible(False)
+        return content
+
+    def _connect(self) -> None:
+        commands, state = self._commands, self._state
+        self._open.clicked.connect(self.choose)
+        self._export.clicked.connect(self.export)
+        self.reconstruct.clicked.connect(commands.reconstruct)
+        self.image.pointed.connect(commands.point_at)
+        self.image.pinned.connect(commands.marks.pin)
+        self.image.outlined.connect(commands.marks.add_outline)
+        self.image.moved.connect(commands.move_cursor)
+        self.image.deleted.connect(self.marks.remove_selected)
+        self.scene.pointed.connect(commands.point_at)
+        self.scene.pinned.connect(commands.marks.pin)
+        self.scene.outlined.connect(commands.marks.add_pixels)
+        for value in (state.result, state.offer, state.busy):
+            value.changed.connect(lambda _: self._show_state())
+        state.view.follow(lambda view: self.scene.setVisible(view is View.CLOUD))
+        self._show_state()
+
+    # Show ------------------------------------------------------------------------------------------
+
+    def _show_state(self) -> None:
+        state, result = self._state, self._state.result.value
+        waiting = bool(state.busy.value) or state.offer.value is not None
+        self.stack.setCurrentIndex(0 if waiting or result is None else 1)
+        self.reconstruct.setVisible(state.offer.value is not None and not state.busy.value)
+        self._export.setEnabled(result is not None)
+        if state.busy.value:
+            self.message.setText(f"{state.busy.value} …")
+        elif state.offer.value is not None:
+            self.message.setText(f"{state.offer.value.name} is a scan without a result. Reconstruct it now?")
+        else:
+            self.message.setText(NOTHING_OPEN)
+        if result is None:
+            self.about.setText("")
+            return
+        height, width = result.shape
+        bands = f" · {len(result.wavelengths_nm)} bands" if result.has_spectra else " · depth only"
+        captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
+        self.title.setText(result.path.stem)
+        self.about.setText(
+            " · ".join(part for part in (f"{width} × {height} px{bands}", captured, str(result.path)) if part)
+        )
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        for panel in self._panels:
+            panel.apply_theme(theme)
+
+    # Do --------------------------------------------------------------------------------------------
+
+    def page_actions(self) -> dict[str, Callable[[], object]]:
+        """Views, bands and export."""
+        shows: dict[str, Callable[[], object]] = {
+            view.value: lambda view=view: self._commands.show(view)  # type: ignore[misc]
+            for view in View
+        }
+        return {
+            **shows,
+            "band_down": lambda: self._commands.step_band(-1),
+            "band_up": lambda: self._commands.step_band(1),
+            "export": self.export,
+        }
+
+    def choose(self) -> None:
+        """Choose the folder of a result or scan."""
+        name = QFileDialog.getExistingDirectory(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
+        if name and not self._commands.open(Path(name)):
+            self.message.setText(f"{name} is neither a result nor a scan. Choose another folder.")
+
+    def export(self) -> None:
+        """Ask for formats and write them."""
+        if self._state.result.value is not None:
+            dialog = ExportDialog(self._state, self._commands, self)
+            dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            dialog.open()
+
+    def open_path(self, path: Path) -> bool:
+        """Open a result, a scan or a reference."""
+        return self._commands.open(path)
+
+    def command_line(self) -> str:
+        """The command that makes or exports what is open."""
+        return self._commands.command_line()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Files may be dropped."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped, after the drop is over, so that its sender does not wait."""
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        event.acceptProposedAction()
+        for path in paths:
+            QTimer.singleShot(0, self, lambda path=path: self._dropped(path))
+
+    def _dropped(self, path: Path) -> None:
+        if not self._commands.open(path):
+            self.message.setText(f"{path.name} is no result, scan or reference spectrum.")
+
+    def release(self) -> None:
+        """Let go of the graphics context."""
+        self.scene.release()

@@ -1,0 +1,186 @@
+"""What is shown and how: the five views, the tools, and the controls of the view at hand."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QButtonGroup,
+    QCheckBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QSlider,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.panels.results_commands import ResultCommands
+from app.state.results import Quality, ResultsState, Tool, View
+from app.widgets.forms import ChoiceBox, label
+from dsl_core.evaluation.relighting import LIGHTS
+
+VIEWS = (
+    (View.COLOUR, "sRGB", "Colours as the eye sees them under a light"),
+    (View.BAND, "Band", "Reflectance of one band"),
+    (View.DEPTH, "Depth", "Depth along the camera axis"),
+    (View.QUALITY, "Quality", "Why pixels are limited, which order measured a band, and deviations"),
+    (View.CLOUD, "3D cloud", "The points in space; drag to turn, wheel to zoom"),
+)
+TOOLS = (
+    (Tool.PIN, "Pin", "Click to pin the spectrum of a pixel; drag to pan"),
+    (Tool.RECTANGLE, "Rectangle", "Drag a rectangle: mean and deviation of its pixels"),
+    (
+        Tool.POLYGON,
+        "Polygon",
+        "Click the corners; double click, Enter or a right click closes, Escape gives up",
+    ),
+    (Tool.LASSO, "Lasso", "Draw around pixels, in the picture or in the cloud"),
+)
+#: What the cloud can be coloured by.
+CLOUD_COLOURS = ((View.COLOUR, "sRGB"), (View.BAND, "Band"), (View.DEPTH, "Depth"), (View.QUALITY, "Quality"))
+_NEEDS_BAND = (Quality.ORDERS, Quality.SHARE, Quality.SPREAD)
+
+
+class ViewBar(QWidget):
+    """Follows a state and asks a controller."""
+
+    def __init__(self, state: ResultsState, commands: ResultCommands) -> None:
+        super().__init__()
+        self._state, self._commands = state, commands
+        self.views = {
+            view: self._button(text, f"{tip} ({i})") for i, (view, text, tip) in enumerate(VIEWS, 1)
+        }
+        self.tools = {tool: self._button(text, tip) for tool, text, tip in TOOLS}
+        self._groups = [self._group(list(each.values())) for each in (self.views, self.tools)]
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setAccessibleName("Band")
+        self.slider.setToolTip("Wavelength of the band (comma and full stop step it)")
+        self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.nm = label("")
+        self.nm.setMinimumWidth(self.nm.fontMetrics().horizontalAdvance("000.0 nm"))
+        self.light = ChoiceBox("Light", "The light under which the colours are computed")
+        for key, text in LIGHTS.items():
+            self.light.addItem(text, key)
+        self.adapted = QCheckBox("adapted eyes")
+        self.adapted.setToolTip("White stays white, as to eyes used to the light; else as beside daylight")
+        self.adapted.setChecked(True)
+        self.quality = ChoiceBox("Quality", "What the quality view shows")
+        for each in Quality:
+            self.quality.addItem(each.value[0].upper() + each.value[1:], each)
+        self.cloud_by = ChoiceBox("Colour of the cloud", "What the points are coloured by")
+        for view, text in CLOUD_COLOURS:
+            self.cloud_by.addItem(text, view)
+        self._lay_out()
+        self._connect()
+
+    def _button(self, text: str, tip: str) -> QToolButton:
+        button = QToolButton()
+        button.setText(text)
+        button.setToolTip(tip)
+        button.setAccessibleName(text)
+        button.setProperty("role", "choice")
+        button.setCheckable(True)
+        button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        return button
+
+    def _group(self, buttons: list[QToolButton]) -> QButtonGroup:
+        group = QButtonGroup(self)
+        for button in buttons:
+            group.addButton(button)
+        return group
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.setSpacing(4)
+        for button in self.views.values():
+            top.addWidget(button)
+        line = QFrame()
+        line.setFrameShape(QFrame.Shape.VLine)
+        top.addSpacing(6)
+        top.addWidget(line)
+        top.addSpacing(6)
+        for button in self.tools.values():
+            top.addWidget(button)
+        top.addStretch(1)
+        self._row = QHBoxLayout()
+        self._row.setSpacing(8)
+        self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
+        self._quality_label = QLabel("Show")
+        for widget in (
+            self._light_label,
+            self.light,
+            self.adapted,
+            self._quality_label,
+            self.quality,
+            self._cloud_label,
+            self.cloud_by,
+            self.nm,
+        ):
+            self._row.addWidget(widget)
+        self._row.addWidget(self.slider, 1000)
+        self._row.addStretch(1)
+        # Without controls the row keeps its height, so that the picture does not jump between views.
+        self._row.addStrut(self.light.sizeHint().height())
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(top)
+        column.addLayout(self._row)
+
+    def _connect(self) -> None:
+        state = self._state
+        for view, button in self.views.items():
+            button.clicked.connect(lambda _checked, view=view: self._show_view(view))
+        for tool, button in self.tools.items():
+            button.clicked.connect(lambda _checked, tool=tool: state.tool.set(tool))
+        self.slider.valueChanged.connect(state.band.set)
+        self.light.activated.connect(lambda _: self._relight())
+        self.adapted.clicked.connect(lambda _: self._relight())
+        self.quality.activated.connect(lambda _: state.quality.set(Quality(self.quality.currentData())))
+        self.cloud_by.activated.connect(lambda _: state.cloud_by.set(View(self.cloud_by.currentData())))
+        state.result.follow(lambda _: self._new_result())
+        state.tool.follow(lambda tool: self.tools[tool].setChecked(True))
+        state.band.follow(lambda _: self._show_band())
+        state.light.changed.connect(lambda light: self.light.setCurrentIndex(self.light.findData(light)))
+        for value in (state.view, state.quality, state.cloud_by):
+            value.changed.connect(lambda _: self._show_controls())
+        self._show_controls()
+
+    def _show_view(self, view: View) -> None:
+        self._commands.show(view)
+        self.views[self._state.view.value].setChecked(True)
+
+    def _relight(self) -> None:
+        self._commands.relight(self.light.currentData(), self.adapted.isChecked())
+
+    def _new_result(self) -> None:
+        result = self._state.result.value
+        if result is not None and result.has_spectra:
+            self.slider.setRange(0, len(result.wavelengths_nm) - 1)
+        self._show_band()
+        self._show_controls()
+
+    def _show_band(self) -> None:
+        result = self._state.result.value
+        if result is not None and result.has_spectra:
+            self.slider.setValue(self._state.band.value)
+            self.nm.setText(f"{result.wavelengths_nm[self._state.band.value]:g} nm")
+
+    def _show_controls(self) -> None:
+        state = self._state
+        self.views[state.view.value].setChecked(True)
+        cloud = state.view.value is View.CLOUD
+        shown = state.cloud_by.value if cloud else state.view.value
+        self.cloud_by.setCurrentIndex(self.cloud_by.findData(state.cloud_by.value))
+        self.quality.setCurrentIndex(self.quality.findData(state.quality.value))
+        for widgets, visible in (
+            ((self._light_label, self.light, self.adapted), shown is View.COLOUR),
+            ((self._quality_label, self.quality), shown is View.QUALITY),
+            ((self._cloud_label, self.cloud_by), cloud),
+            (
+                (self.nm, self.slider),
+                shown is View.BAND or (shown is View.QUALITY and state.quality.value in _NEEDS_BAND),
+            ),
+        ):
+            for widget in widgets:
+                widget.setVisible(visible)

@@ -1,0 +1,345 @@
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent, QMouseEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.application import make_window
+from app.controllers.results import ResultsController
+from app.jobs.base import InlineRunner
+from app.main_window import MainWindow
+from app.panels.export_dialog import ExportDialog
+from app.panels.mark_figures import figures_of
+from app.panels.result_layers import Layers, rgb_of
+from app.panels.results_page import ResultsPage
+from app.panels.scene import gl_works, still_picture
+from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Tool, View
+from app.theme import DARK as DARK_THEME
+from app.theme import LIGHT
+from app.widgets.page import PageWidget
+from app.widgets.spectrum_curve import split_by_share
+from tests.app.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
+
+
+def move(widget: QWidget, to: QPoint, buttons: Qt.MouseButton = Qt.MouseButton.NoButton) -> None:
+    """Move the mouse as a person does, wherever the cursor of the screen may be."""
+    event = QMouseEvent(
+        QMouseEvent.Type.MouseMove,
+        QPointF(to),
+        QPointF(widget.mapToGlobal(to)),
+        Qt.MouseButton.NoButton,
+        buttons,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    QApplication.sendEvent(widget, event)
+    QTest.qWait(5)
+
+
+class Bench:
+    """A window with the Results page alone; jobs run at once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.state = ResultsState()
+        self.page: ResultsPage
+        self.window = make_window({"results": self._make}, folder)
+
+    def _make(self, window: MainWindow) -> PageWidget:
+        runner = InlineRunner()
+        self.control = ResultsController(self.state, runner, window.toasts, window.parts.undo)
+        self.page = ResultsPage(self.state, self.control, runner)
+        self.page.apply_theme(window.theme)
+        return self.page
+
+    @property
+    def view(self) -> QWidget:
+        viewport: QWidget = self.page.image.canvas.viewport()
+        return viewport
+
+    def at(self, pixel: Pixel) -> QPoint:
+        """Where a pixel of the image lies on the canvas."""
+        image = self.page.image
+        at = image.canvas.mapFromScene(image.box.mapViewToScene(QPointF(*pixel)))
+        return QPoint(at.x(), at.y())
+
+    def drag(self, corners: list[Pixel]) -> None:
+        left = Qt.MouseButton.LeftButton
+        QTest.mousePress(self.view, left, pos=self.at(corners[0]))
+        for corner in corners[1:]:
+            move(self.view, self.at(corner), left)
+        QTest.mouseRelease(self.view, left, pos=self.at(corners[-1]))
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        return self.state.marks.value
+
+
+@pytest.fixture
+def bench(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
+    made = Bench(tmp_path)
+    qtbot.addWidget(made.window)
+    made.window.resize(1280, 800)
+    made.window.show()
+    qtbot.waitExposed(made.window)
+    made.window.open_path(write_small_result(tmp_path))
+    QTest.qWait(20)
+    yield made
+    made.window.close()
+
+
+def test_without_a_result_a_sentence_says_what_to_do(qtbot: QtBot, tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    qtbot.addWidget(bench.window)
+    bench.window.show()
+    assert "Open a result" in bench.page.message.text()
+    assert not bench.page.reconstruct.isVisible()
+    bench.state.offer.set(tmp_path / "scan.dsl")
+    assert "scan.dsl is a scan without a result" in bench.page.message.text()
+    assert bench.page.reconstruct.isVisible()
+
+
+def test_the_keys_1_to_5_choose_the_view(bench: Bench, qtbot: QtBot) -> None:
+    bench.page.image.canvas.setFocus()
+    keys = (Qt.Key.Key_1, Qt.Key.Key_2, Qt.Key.Key_3, Qt.Key.Key_4, Qt.Key.Key_5)
+    for key, view in zip(keys, View, strict=True):
+        QTest.keyClick(bench.window, key)
+        qtbot.waitUntil(lambda view=view: bench.state.view.value is view)  # type: ignore[misc]
+        assert bench.page.bar.views[view].isChecked()
+    assert bench.page.scene.isVisible()
+    QTest.keyClick(bench.window, Qt.Key.Key_Period)
+    qtbot.waitUntil(lambda: bench.state.band.value == 24)
+
+
+def test_without_opengl_the_cloud_is_a_picture_with_a_sentence(bench: Bench, qtbot: QtBot) -> None:
+    if gl_works():
+        pytest.skip("there is OpenGL here")
+    bench.control.show(View.CLOUD)
+    qtbot.waitUntil(lambda: bench.page.scene.scene is not None)
+    scene = bench.page.scene.scene
+    assert scene is not None
+    QTest.qWait(30)
+    texts = [label.text() for label in scene.widget.findChildren(QLabel)]
+    assert any("no OpenGL" in text for text in texts)
+    assert any(not label.pixmap().isNull() for label in scene.widget.findChildren(QLabel))
+
+
+def test_pointing_shows_the_pixel_and_its_spectrum(bench: Bench, qtbot: QtBot) -> None:
+    move(bench.view, bench.at((20, 7)))
+    move(bench.view, bench.at((20, 8)))
+    qtbot.waitUntil(lambda: bench.state.cursor.value == (20, 8))
+    text = bench.page.readout.values.text()
+    assert "pixel 20, 8" in text
+    assert "z 710.00 ± 0.25 mm" in text
+    assert "545 nm  0.400 ± 0.010" in text
+    x, y = bench.page.spectra.live.solid.getData()
+    assert x.tolist() == NM.tolist()
+    np.testing.assert_allclose(y, RED, atol=1e-4)
+
+
+def test_a_bad_pixel_says_why(bench: Bench) -> None:
+    bench.control.point_at(DARK)
+    assert "too little projector light" in bench.page.readout.reasons.text()
+    assert not bench.page.spectra.live.solid.isVisible()
+    bench.control.point_at(UNREACHED)
+    assert "430–445 nm" in bench.page.readout.reasons.text()
+    _, dashed = bench.page.spectra.live.dashed.getData()
+    assert np.isfinite(dashed).sum() == 5
+    bench.control.point_at((9, 9))
+    assert "Nothing to remark" in bench.page.readout.reasons.text()
+
+
+def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -> None:
+    QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at((10, 10)))
+    qtbot.waitUntil(lambda: len(bench.marks) == 1)
+    assert bench.marks[0].pixel == (10, 10)
+    canvas = bench.page.image.canvas
+    canvas.setFocus()
+    QTest.keyClick(canvas, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(canvas, Qt.Key.Key_Up)
+    QTest.keyClick(canvas, Qt.Key.Key_Return)
+    assert bench.marks[1].pixel == (20, 9)
+    assert "mm" in bench.page.marks.figures.text()
+    QTest.keyClick(canvas, Qt.Key.Key_Delete)
+    assert [mark.pixel for mark in bench.marks] == [(10, 10)]
+    bench.window.do("undo")
+    assert len(bench.marks) == 2
+
+
+def test_regions_are_drawn_with_every_tool(bench: Bench, qtbot: QtBot) -> None:
+    bench.page.bar.tools[Tool.RECTANGLE].click()
+    bench.drag([(2, 6), (4, 8), (7, 10)])
+    assert bench.marks[0].used == 30
+    bench.page.bar.tools[Tool.LASSO].click()
+    bench.drag([(20, 5), (30, 5), (30, 15), (20, 15)])
+    assert bench.marks[1].used == pytest.approx(100, abs=25)
+    bench.page.bar.tools[Tool.POLYGON].click()
+    for corner in ((2, 12), (12, 12), (12, 20)):
+        QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
+        QTest.qWait(1)
+    begun = bench.page.image.box.is_drawing
+    QTest.keyClick(bench.page.image.canvas, Qt.Key.Key_Escape)
+    assert (begun, bench.page.image.box.is_drawing) == (True, False)
+    for corner in ((2, 12), (12, 12), (12, 20)):
+        QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
+        QTest.qWait(1)
+    QTest.keyClick(bench.page.image.canvas, Qt.Key.Key_Return)
+    assert bench.marks[2].used == pytest.approx(40, abs=12)
+
+
+def test_the_list_names_hides_and_selects(bench: Bench) -> None:
+    bench.control.marks.pin((10, 10))
+    bench.control.marks.pin((20, 10))
+    tree = bench.page.marks.tree
+    first = tree.topLevelItem(0)
+    assert first is not None
+    first.setText(0, "sky")
+    assert bench.marks[0].name == "sky"
+    again = tree.topLevelItem(0)
+    assert again is not None
+    again.setCheckState(0, Qt.CheckState.Unchecked)
+    assert not bench.marks[0].shown
+    assert bench.marks[0].key not in bench.page.spectra._curves
+    now = tree.topLevelItem(0)
+    assert now is not None
+    tree.setCurrentItem(now)
+    assert bench.state.selected.value == bench.marks[0].key
+
+
+def test_references_are_dropped_and_compared(bench: Bench, qtbot: QtBot, tmp_path: Path) -> None:
+    bench.control.marks.pin((10, 10))
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(write_reference(tmp_path / "tile <b>.csv", 2 * BLUE)))])
+    drop = QDropEvent(
+        QPointF(50, 50),
+        Qt.DropAction.CopyAction,
+        data,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    bench.page.dropEvent(drop)
+    qtbot.waitUntil(lambda: len(bench.marks) == 2)
+    bench.state.selected.set(bench.marks[0].key)
+    text = figures_of(bench.state, LIGHT)
+    assert "tile &lt;b&gt;" in text
+    assert "2.000" in text
+    assert "ΔE00" in bench.page.marks.figures.text()
+
+
+def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
+    bench.control.point_at((30, 5))
+    panel = bench.page.search
+    panel.start.click()
+    assert "50.00% of the pixels" in panel.text.text()
+    assert bench.page.image.overlay.isVisible()
+    panel.what.setCurrentIndex(panel.what.findData(Seek.METAMERS))
+    assert "look like pixel 30, 5" in panel.text.text()
+    panel.angle.setValue(0.2)
+    search = bench.state.search.value
+    assert search is not None
+    assert search.within_rad == 0.2
+    panel.end.click()
+    assert not bench.page.image.overlay.isVisible()
+
+
+def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
+    result = bench.state.result.value
+    assert result is not None
+    image = bench.page.image
+    for view, quality in itertools.product(View, Quality):
+        bench.state.quality.set(quality)
+        bench.state.view.set(view)
+        layer = Layers(result).layer(bench.state)
+        assert layer is not None
+        assert rgb_of(layer).shape == (24, 36, 3)
+        assert image.legend.isVisible() == bool(layer.keys)
+        assert image.image.image.shape[:2] == (24, 36)
+
+
+def test_the_band_line_and_the_slider_agree(bench: Bench) -> None:
+    bench.control.show(View.BAND)
+    bench.page.bar.slider.setValue(10)
+    assert bench.state.band.value == 10
+    assert bench.page.spectra.band_line.value() == NM[10]
+    bench.page.spectra.band_line.setValue(611.0)
+    assert bench.state.band.value == 36
+    assert bench.page.bar.nm.text() == "610 nm"
+
+
+def test_the_export_dialog_warns_before_it_replaces(bench: Bench, qtbot: QtBot, tmp_path: Path) -> None:
+    dialog = ExportDialog(bench.state, bench.control, bench.page)
+    qtbot.addWidget(dialog)
+    assert dialog.write.isEnabled()
+    assert not dialog.formats["csv"].isEnabled()
+    (tmp_path / "small.ply").write_text("mine")
+    dialog.formats["png"].setChecked(True)
+    assert "small.ply exists already" in dialog.text.text()
+    assert not dialog.write.isEnabled()
+    dialog.replace.setChecked(True)
+    dialog.folder.setText("/nowhere")
+    assert "no folder" in dialog.text.text()
+    dialog.folder.setText(str(tmp_path))
+    dialog.write.click()
+    assert (tmp_path / "small.ply").read_bytes().startswith(b"ply")
+    assert (tmp_path / "small_rgb.png").exists()
+    bench.window.do("export")
+    opened = bench.page.findChildren(ExportDialog)
+    assert opened
+    for each in opened:
+        each.close()
+
+
+def test_themes_reach_every_panel(bench: Bench) -> None:
+    bench.control.marks.pin((10, 10))
+    for theme in (LIGHT, DARK_THEME):
+        bench.page.apply_theme(theme)
+        assert bench.page.image.canvas.backgroundBrush().color().name() == theme.base
+
+
+def test_curves_are_dashed_where_the_prior_decides() -> None:
+    share = np.array([0.1, 0.9, 0.9, 0.9, 0.2])
+    solid, dashed = split_by_share(np.arange(5.0), share)
+    assert np.isfinite(solid).tolist() == [False, True, True, True, False]
+    assert np.isfinite(dashed).tolist() == [True, True, False, True, True]
+
+
+def test_a_still_picture_shows_near_points_before_far_ones() -> None:
+    points = np.array([[0, 0, 900], [0, 0, 700], [50, 40, 800], [-50, -40, 800]], np.float32)
+    colours = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [9, 9, 9]], np.uint8)
+    picture = still_picture(points, colours, "#102030")
+    assert picture is not None
+    assert picture.shape == (480, 640, 3)
+    assert (picture == (0, 255, 0)).all(2).any()
+    assert still_picture(points[:0], colours[:0], "#000000") is None
+
+
+@pytest.mark.gl
+def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) -> None:
+    if not gl_works():
+        pytest.skip("no OpenGL here")
+    bench.control.show(View.CLOUD)
+    qtbot.waitUntil(lambda: bench.page.scene.scene is not None)
+    scene = bench.page.scene.scene
+    assert scene is not None
+    QTest.qWait(300)
+    widget = scene.widget
+    middle = QPoint(widget.width() // 2, widget.height() // 2)
+    move(widget, middle)
+    qtbot.waitUntil(lambda: bench.state.cursor.value is not None)
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=middle)
+    qtbot.waitUntil(lambda: len(bench.marks) == 1)
+    bench.state.tool.set(Tool.LASSO)
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, pos=middle - QPoint(60, 60))
+    for corner in (QPoint(60, -60), QPoint(60, 60), QPoint(-60, 60)):
+        move(widget, middle + corner, Qt.MouseButton.LeftButton)
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, pos=middle + QPoint(-60, 60))
+    qtbot.waitUntil(lambda: len(bench.marks) == 2)
+    assert bench.marks[1].runs
+    QTest.qWait(400)
+    assert bench.window.grab().toImage().pixelColor(5, 5).isValid()
