@@ -151,18 +151,22 @@ class ScanController:
 
     def _failed(self, error: Exception) -> None:
         folder = self._end(Phase.LOST)
-        self._remember(folder)
+        self._offer_again(folder)
         session = self.state.interrupted.value
         safe = f" {session.done} of {session.total} frames are safe in {folder}." if session else ""
         self.state.trouble.set(f"The scan stopped: {sentence_of(error)}{safe}")
-        self._notifier.tell("error", self.state.trouble.value)
+        self._notifier.tell("error", f"The scan {folder.name} was interrupted. The Scan page says why.")
 
     def _cancelled(self) -> None:
-        folder = self._end(Phase.STOPPED)
-        self._remember(folder)
-        session = self.state.interrupted.value
-        if session is not None:
-            self.state.note.set(f"Stopped after {session.done} of {session.total} frames; they are stored.")
+        self._offer_again(self._end(Phase.STOPPED))
+
+    def _offer_again(self, folder: Path) -> None:
+        """Offer to go on, as far as the session can be read."""
+        try:
+            self._remember(folder)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+        self.plans.refresh()
 
     def _end(self, phase: Phase) -> Path:
         assert self._scan is not None

@@ -26,6 +26,10 @@ def bench(tmp_path: Path) -> ScanBench:
     return made
 
 
+def phase(bench: ScanBench) -> Phase:
+    return bench.state.phase.value
+
+
 def fail_from(monkeypatch: pytest.MonkeyPatch, shot: int) -> None:
     snap = SimCamera.snap
 
@@ -40,7 +44,7 @@ def fail_from(monkeypatch: pytest.MonkeyPatch, shot: int) -> None:
 def test_without_a_rig_nothing_starts_and_the_reason_is_told(tmp_path: Path) -> None:
     bench = make_bench(tmp_path)
     bench.scans.start()
-    assert bench.state.phase.value is Phase.PLANNING
+    assert phase(bench) is Phase.PLANNING
     assert "Connect one on the Rig page" in bench.notifier.told[-1][1]
 
 
@@ -64,13 +68,13 @@ def test_an_impossible_plan_says_why(bench: ScanBench) -> None:
     plan = SHORT.model_copy(update={"spectral": LineComb(period_px=700)})
     bench.scans.plans.change_plan(plan)
     bench.scans.start()
-    assert bench.state.phase.value is Phase.PLANNING
+    assert phase(bench) is Phase.PLANNING
     assert "at most one line" in bench.notifier.told[-1][1]
 
 
 def test_a_scan_is_stored_and_the_next_has_another_name(bench: ScanBench, tmp_path: Path) -> None:
     bench.scans.start()
-    assert bench.state.phase.value is Phase.DONE
+    assert phase(bench) is Phase.DONE
     assert bench.state.status.value.done == 75
     assert SessionReader(tmp_path / "first.dsl").missing() == []
     assert bench.state.target.value == tmp_path / "scan-20260301-1020.dsl"
@@ -103,14 +107,14 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
         fail_from(lost, 30)
         bench.scans.start()
     session = bench.state.interrupted.value
-    assert bench.state.phase.value is Phase.LOST
+    assert phase(bench) is Phase.LOST
     assert session is not None
     assert (session.done, session.total) == (30, 75)
     assert "Check its cable" in bench.state.trouble.value
     assert "30 of 75 frames are safe" in bench.state.trouble.value
     assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
     bench.scans.start()
-    assert bench.state.phase.value is Phase.DONE
+    assert phase(bench) is Phase.DONE
     assert bench.state.trouble.value == ""
     assert SessionReader(tmp_path / "first.dsl").missing() == []
 
@@ -123,7 +127,7 @@ def test_a_scene_that_moved_meanwhile_is_refused(
         bench.scans.start()
     bench.rig.connect(TWIN.__class__("twin", (("scene", "box"), ("size", "64x48"))))
     bench.scans.start()
-    assert bench.state.phase.value is Phase.LOST
+    assert phase(bench) is Phase.LOST
     assert "changed since the scan stopped" in bench.state.trouble.value
 
 
@@ -143,7 +147,7 @@ def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
     other.rig.connect(TWIN)
     other.state.then_reconstruct.set(False)
     other.scans.start()
-    assert other.state.phase.value is Phase.DONE
+    assert phase(other) is Phase.DONE
     assert not other.scans.open(tmp_path / "first.dsl")
     assert not other.scans.open(tmp_path)
 
@@ -163,7 +167,7 @@ def test_leaving_a_session_plans_a_new_one(
         bench.scans.start()
     bench.scans.leave_session()
     assert bench.state.interrupted.value is None
-    assert bench.state.phase.value is Phase.PLANNING
+    assert phase(bench) is Phase.PLANNING
     assert bench.state.target.value != tmp_path / "first.dsl"
     assert (tmp_path / "first.dsl").is_dir()
 
@@ -172,7 +176,7 @@ def test_a_full_disk_is_said_before_the_start(bench: ScanBench, monkeypatch: pyt
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))
     bench.scans.start()
-    assert bench.state.phase.value is Phase.PLANNING
+    assert phase(bench) is Phase.PLANNING
     assert "too little room" in bench.notifier.told[-1][1]
 
 
@@ -204,7 +208,7 @@ def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp
     bench.scans.plans.set_override(True)
     assert "--calibration bench --override-calibration" in bench.scans.command_line()
     bench.scans.start()
-    assert bench.state.phase.value is Phase.DONE
+    assert phase(bench) is Phase.DONE
     assert "gain" in SessionReader(tmp_path / "first.dsl").manifest.notes["calibration_overridden"]
     assert devices.calibration.conditions is None
 

@@ -74,8 +74,8 @@ def main() -> None:
 def write(path: Path | None, size: str, points: dict[str, Any]) -> None:
     """Write the table; after every preset, so that an interrupted run is not lost."""
     origin = (
-        f"Measured on the twin of the published rig at {size.replace('x', ' × ')} px: Color Checker"
-        " (RMSE of mean reflectance, depth) and nine filters of 10 nm (width of their peaks)."
+        f"Measured on the twin at {size.replace('x', ' × ')} px: a Color Checker and nine filters of 10 nm."
+        " Times are those of the rig at hand."
     )
     write_json(path, {"schema_version": 1, "origin": origin, "points": points})
 
