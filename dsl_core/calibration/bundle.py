@@ -51,10 +51,15 @@ class Problem:
         self.board_mm = np.concatenate([pose.board_mm for pose in poses])
         self.camera_px = np.concatenate([pose.camera_px for pose in poses])
         self.projector_px = np.concatenate([pose.projector_px for pose in poses])
+        self.slopes = np.concatenate([pose.slopes for pose in poses])
         self.pose_of = np.repeat(np.arange(len(poses)), [len(pose.ids) for pose in poses])
 
     def evaluate(self, parameters: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Residuals (corners, 2) of camera and projector, and their derivatives (corners, 2, parameters)."""
+        """Residuals (corners, 2) of camera and projector, and their derivatives (corners, 2, parameters).
+
+        Those of the projector are without what the camera's errors bring into them: what is left is how well
+        the code fits at the pixels themselves, which is known far better than where a corner is.
+        """
         boards = parameters[SHARED:].reshape(-1, 6)
         in_camera, by_board = move(boards[self.pose_of], self.board_mm)
         camera, by_lens, by_point = project(parameters[CAMERA], in_camera)
@@ -69,7 +74,14 @@ class Problem:
         projector_jac[:, :, STEREO] = by_point @ by_stereo
         rotation = rotation_of(parameters[STEREO][:3])
         self._put_boards(projector_jac, by_point @ (rotation @ by_board))
-        return camera - self.camera_px, projector - self.projector_px, camera_jac, projector_jac
+        camera_residual = camera - self.camera_px
+        projector_residual = projector - self.projector_px - self.carried(camera_residual)
+        projector_jac -= np.einsum("nij,njp->nip", self.slopes, camera_jac)
+        return camera_residual, projector_residual, camera_jac, projector_jac
+
+    def carried(self, camera_residual: Floats) -> Floats:
+        """What errors of corners in the camera picture are on the projector, (corners, 2)."""
+        return np.asarray(np.einsum("nij,nj->ni", self.slopes, camera_residual))
 
     def _put_boards(self, jacobian: Floats, by_board: Floats) -> None:
         columns = SHARED + 6 * self.pose_of[:, None] + np.arange(6)
@@ -126,10 +138,10 @@ def adjust(
     `CalibrationError` when the fit does not converge.
     """
     problem = Problem(poses)
-    parameters = start
+    parameters, one = start, np.ones(2)
     for _ in range(ROBUST_ROUNDS):
         far = _farthest(problem, parameters, np.ones(len(problem.pose_of), bool))
-        parameters = _solve(problem, parameters, (1.0, 1.0), 1 / (1 + (far / CAUCHY_SIGMAS) ** 2))
+        parameters = _solve(problem, parameters, (one, one), 1 / (1 + (far / CAUCHY_SIGMAS) ** 2))
     used = np.ones(len(problem.pose_of), bool)
     for _ in range(MAX_ROUNDS):
         sigmas = _noises(problem, parameters, used)
@@ -155,7 +167,7 @@ def refit(poses: Sequence[PoseObservation], start: Floats) -> Floats:
     )
 
 
-def _solve(problem: Problem, start: Floats, sigmas: tuple[float, float], weights: Floats) -> Floats:
+def _solve(problem: Problem, start: Floats, sigmas: tuple[Floats, Floats], weights: Floats) -> Floats:
     """Levenberg and Marquardt for weighted corners."""
     from scipy.optimize import least_squares
 
@@ -177,7 +189,8 @@ def _solve(problem: Problem, start: Floats, sigmas: tuple[float, float], weights
 
     def jacobian(parameters: Floats) -> Floats:
         _, _, camera, projector = evaluated(parameters)
-        both = [camera * root[:, None] / sigmas[0], projector * root[:, None] / sigmas[1]]
+        scales = [root[:, None] / sigma[:, None] for sigma in sigmas]
+        both = [camera * scales[0], projector * scales[1]]
         return np.concatenate(both).reshape(-1, len(parameters))
 
     fit = least_squares(residuals, start, jac=jacobian, method="lm", x_scale="jac", max_nfev=200)
@@ -186,7 +199,7 @@ def _solve(problem: Problem, start: Floats, sigmas: tuple[float, float], weights
     return np.asarray(fit.x, np.float64)
 
 
-def _noises(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> tuple[float, float]:
+def _noises(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> tuple[Floats, Floats]:
     camera, projector, _, _ = problem.evaluate(parameters)
     return _noise(camera[used]), _noise(projector[used])
 
@@ -194,12 +207,12 @@ def _noises(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> tu
 def _farthest(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> Floats:
     """Largest of the four errors of every corner, in robust standard deviations of the used ones."""
     camera, projector, _, _ = problem.evaluate(parameters)
-    errors = np.abs(camera).max(1) / _noise(camera[used]), np.abs(projector).max(1) / _noise(projector[used])
+    errors = [(np.abs(each) / _noise(each[used])).max(1) for each in (camera, projector)]
     return np.asarray(np.maximum(*errors))
 
 
 def _summary(
-    problem: Problem, parameters: Floats, used: NDArray[np.bool_], sigmas: tuple[float, float]
+    problem: Problem, parameters: Floats, used: NDArray[np.bool_], sigmas: tuple[Floats, Floats]
 ) -> Adjustment:
     """The fit with its covariance, which allows for the errors of a corner being correlated.
 
@@ -208,7 +221,7 @@ def _summary(
     """
     camera, projector, camera_jac, projector_jac = problem.evaluate(parameters)
     errors = np.concatenate([camera / sigmas[0], projector / sigmas[1]], 1)[used]
-    slopes = np.concatenate([camera_jac / sigmas[0], projector_jac / sigmas[1]], 1)[used]
+    slopes = np.concatenate([camera_jac / sigmas[0][:, None], projector_jac / sigmas[1][:, None]], 1)[used]
     rows = slopes.reshape(-1, len(parameters))
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0] = 1
@@ -217,9 +230,9 @@ def _summary(
     # Parameters take freedom from the residuals.
     freed = len(rows) / max(len(rows) - len(parameters), 1)
     covariance = freed * inverse @ (pulls.T @ pulls) @ inverse
-    return Adjustment(parameters, covariance, camera, projector, used)
+    return Adjustment(parameters, covariance, camera, projector + problem.carried(camera), used)
 
 
-def _noise(residual: Floats) -> float:
-    """Robust standard deviation of residuals (px), never so small that exact corners become outliers."""
-    return max(1.4826 * float(np.median(np.abs(residual))), 1e-4)
+def _noise(residual: Floats) -> Floats:
+    """Robust deviation of residuals (corners, 2), px, across and down; exact corners become no outliers."""
+    return np.maximum(1.4826 * np.median(np.abs(residual), axis=0), 1e-4)

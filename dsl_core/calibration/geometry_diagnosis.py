@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.projector_corners import PoseObservation
+from dsl_core.calibration.targets import saturated
 from dsl_core.errors import CalibrationError
 from dsl_core.model.geometry_calibration import GeometryCalibration
 from dsl_core.model.pose_frames import PoseFrames
@@ -26,9 +27,7 @@ GOOD_RMS_PX, GOOD_FOCAL_SHARE = 0.5, 0.01
 def exposure_warning(frames: PoseFrames, seen: PoseObservation) -> str | None:
     """A sentence when the board is over-exposed on the white picture of a pose."""
     (left, top), (right, bottom) = seen.camera_px.min(0).astype(int), seen.camera_px.max(0).astype(int)
-    on_board = np.asarray(frames.white)[top : bottom + 1, left : right + 1]
-    full = next(2.0**bits - 1 for bits in (8, 10, 12, 14, 16, 64) if np.max(frames.white) < 2**bits)
-    share = float((on_board >= 0.998 * full).mean())
+    share = float(saturated(frames)[max(top, 0) : bottom + 1, max(left, 0) : right + 1].mean())
     if share <= MAX_SATURATED:
         return None
     return (

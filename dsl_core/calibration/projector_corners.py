@@ -1,46 +1,48 @@
-"""Where a projector sees the corners of a board: from Gray code, by local homographies.
+"""Where a camera and a projector see the corners of a board: edges in the picture, Gray code around them.
 
 Moreno and Taubin, "Simple, accurate, and robust projector-camera calibration" (3DIMPVT 2012): a corner is a
 point where four squares meet, where no pixel decodes well; but around it, on the plane of the board, the map
-from camera to projector pixels is a homography, which many decoded pixels determine well below one pixel.
+from camera to projector pixels is smooth, and many decoded pixels determine it well below one pixel. Here
+that map is quadratic, and fitted to the grey values of the code instead of decoded whole numbers.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.targets import Corners, find_corners, grey_of, pitches_px
+from dsl_core.calibration.board_code import (
+    check_frames,
+    check_projector_size,
+    decode_pose,
+    decoded_maps,
+    explain,
+    windows_around,
+)
+from dsl_core.calibration.code_model import code_light, refine_maps
+from dsl_core.calibration.corner_model import even_mosaic, fit_corners
+from dsl_core.calibration.targets import Corners, find_corners, grey_of, saturated
 from dsl_core.errors import CalibrationError
-from dsl_core.model.board import Board, corner_positions_mm
-from dsl_core.model.plan import GrayCode
+from dsl_core.model.board import Board, Charuco, corner_positions_mm
 from dsl_core.model.pose_frames import PoseFrames
-from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, frame_count, lit_mask
+from dsl_core.patterns.gray_code import DecodedCode
 
 Floats = NDArray[np.float64]
 
-#: Pixels within this share of the distance between corners tell of a corner: into all four squares around it.
-WINDOW = 0.8
-#: Decoded pixels that a corner needs, and the residual (projector px) beyond which one is decoded wrongly.
-MIN_PIXELS, INLIER_PX = 30, 1.5
-#: A bit counts when it differs from its inverse by this share of the light on its pixel.
-MIN_MARGIN = 0.05
-#: Pixels with less light than this share of the brightest ones are in shadow.
-MIN_LIGHT = 0.03
 #: Share of the corners around which the code must be readable.
 MIN_READ = 0.4
-#: Share of readable pixels that may tell of places that the projector does not have.
-MAX_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True)
 class PoseObservation:
     """Corners of one pose as both devices see them; arrays have one row a corner.
 
-    ``board_mm`` (x, y, 0) on the board, ``camera_px`` and ``projector_px`` (column, row).
+    ``board_mm`` (x, y, 0) on the board, ``camera_px`` and ``projector_px`` (column, row). ``slope`` (corners,
+    2, 2) is how the projector's place changes with the camera's on the board: the code was looked up at
+    ``camera_px``, so that an error there comes back in ``projector_px``, times the slope; None counts as
+    zero. ``blur_px`` is that of the edges in the camera's picture (deviation, median of the corners).
     """
 
     name: str
@@ -48,12 +50,19 @@ class PoseObservation:
     board_mm: Floats
     camera_px: Floats
     projector_px: Floats
+    slope: Floats | None = None
+    blur_px: float = 0.0
 
     def only(self, keep: NDArray[np.bool_]) -> PoseObservation:
         """The corners where ``keep`` is true."""
-        return PoseObservation(
-            self.name, self.ids[keep], self.board_mm[keep], self.camera_px[keep], self.projector_px[keep]
-        )
+        slope = None if self.slope is None else self.slope[keep]
+        chosen = (self.ids[keep], self.board_mm[keep], self.camera_px[keep], self.projector_px[keep])
+        return PoseObservation(self.name, *chosen, slope, self.blur_px)
+
+    @property
+    def slopes(self) -> Floats:
+        """`slope`, zero where it is not known, shape (corners, 2, 2)."""
+        return np.zeros((len(self.ids), 2, 2)) if self.slope is None else self.slope
 
 
 def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int, int]) -> PoseObservation:
@@ -64,140 +73,76 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
     """
     check_frames(frames, projector_size_px)
     corners = find_corners(grey_of(frames.white, frames.bayer), board, f"the white picture of {frames.name}")
+    corners, blur_px = refine_corners(frames, corners, board)
     code = decode_pose(frames, projector_size_px)
-    projector_px = corners_on_projector(code, corners)
+    projector_px, slope = corners_on_projector(code, corners, frames, projector_size_px)
     known = np.isfinite(projector_px[:, 0])
     if known.sum() < max(6, MIN_READ * len(known)):
         raise CalibrationError(
             f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be read"
             f" around {known.sum()} of them only. {explain(frames, corners, projector_size_px)}"
         )
-    _check_projector_size(code, frames.name, projector_size_px)
+    check_projector_size(code, frames.name, projector_size_px)
     seen = PoseObservation(
-        frames.name, corners.ids, corner_positions_mm(board)[corners.ids], corners.points_px, projector_px
+        frames.name,
+        corners.ids,
+        corner_positions_mm(board)[corners.ids],
+        corners.points_px,
+        projector_px,
+        slope,
+        blur_px,
     )
     return seen.only(known)
 
 
-def _check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[int, int]) -> None:
-    """Bits that are clear never lead outside the projector, unless its size is wrong."""
-    assert code.margin_sigmas is not None
-    clear = code.margin_sigmas >= MIN_MARGIN
-    outside = float((code.undecided & clear).sum() / max(clear.sum(), 1))
-    if outside > MAX_OUTSIDE:
-        width, height = projector_size_px
-        raise CalibrationError(
-            f"{name}: {outside:.0%} of the pixels that can be read tell of places outside a projector of"
-            f" {width} x {height} px. Correct its size; width and height may be exchanged."
-        )
+def refine_corners(frames: PoseFrames, corners: Corners, board: Board) -> tuple[Corners, float]:
+    """Corners at the crossing of the edges around them, and the median blur of these edges, px.
 
-
-def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:
-    """Raise `CalibrationError` when the pictures of a pose are incomplete, of mixed sizes or exchanged."""
-    wanted = frame_count(GrayCode(), projector_size_px) - 2
-    if len(frames.pairs) != wanted:
-        width, height = projector_size_px
-        raise CalibrationError(
-            f"{frames.name} has {len(frames.pairs)} pattern pictures; a projector of {width} x {height} px"
-            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or take the"
-            " pose again."
-        )
-    shapes = {np.shape(picture) for picture in (*frames.pairs, frames.white, frames.black)}
-    if len(shapes) > 1:
-        raise CalibrationError(
-            f"The pictures of {frames.name} differ in size ({', '.join(map(str, sorted(shapes)))})."
-            " Take all pictures with one setting of the camera."
-        )
-    if not all(np.isfinite(np.asarray(p)).all() for p in (*frames.pairs, frames.white, frames.black)):
-        raise CalibrationError(f"Pictures of {frames.name} hold values that are not finite. Take them again.")
-    if np.mean(frames.white) <= np.mean(frames.black):
-        raise CalibrationError(
-            f"{frames.name}: the white picture is not brighter than the black one. They are exchanged, or the"
-            " projector was off; correct the order of the pictures."
-        )
-
-
-def decode_pose(frames: PoseFrames, projector_size_px: tuple[int, int]) -> DecodedCode:
-    """Projector column and row of every camera pixel; undecided in shadow and where a bit is unclear.
-
-    A mosaic is decoded pixel by pixel, since a pixel is compared with itself only.
+    Corners whose edges cannot be told stay where they were.
     """
-    decoder = GrayDecoder(GrayCode(), projector_size_px)
-    light = _one_channel(frames.white) - _one_channel(frames.black)
-    bright = float(np.quantile(light, 0.99))
-    # Noise of a bit over the light it is made of: the limit is a share, so each pixel has its own scale.
-    scale = np.where(lit_mask(light, 0, MIN_LIGHT * bright), light, np.inf)
-    for pattern, inverse in zip(frames.pairs[::2], frames.pairs[1::2], strict=True):
-        decoder.add(_one_channel(pattern), _one_channel(inverse), scale)
-    return decoder.finish(min_sigmas=MIN_MARGIN)
+    along = _steps_px(corners, board)
+    light = np.asarray(frames.white, np.float32) - np.asarray(frames.black, np.float32)
+    if frames.bayer is not None:
+        light = even_mosaic(light, frames.bayer, 0.5 * float(np.linalg.norm(along, axis=2).mean()))
+    grey = grey_of(light)
+    grey[saturated(frames)] = np.nan
+    gap = 0.5 * (1 - board.marker_mm / board.square_mm) if isinstance(board, Charuco) else 1.0
+    found = fit_corners(grey, corners.points_px, along, gap)
+    points = np.where(np.isfinite(found.points_px), found.points_px, corners.points_px)
+    return Corners(corners.ids, points), float(np.median(found.blur_px))
 
 
-def corners_on_projector(code: DecodedCode, corners: Corners) -> Floats:
-    """Column and row (px) of every corner on the projector, shape (corners, 2); NaN where too few decode."""
-    pitch = pitches_px(corners.points_px)
-    return np.array(
-        [
-            _corner_on_projector(code, point, WINDOW * step)
-            for point, step in zip(corners.points_px, pitch, strict=True)
-        ]
-    ).reshape(-1, 2)
-
-
-def _corner_on_projector(code: DecodedCode, point_px: Floats, radius_px: float) -> Floats:
+def _steps_px(corners: Corners, board: Board) -> Floats:
+    """One square's step along board x and y at every corner, shape (corners, 2, 2), px."""
     import cv2
 
-    assert code.row is not None
-    reach = int(np.ceil(radius_px))
-    x, y = np.round(point_px).astype(int)
-    top, left = max(y - reach, 0), max(x - reach, 0)
-    window = (slice(top, y + reach + 1), slice(left, x + reach + 1))
-    rows, columns = np.nonzero(~code.undecided[window])
-    # Around the corner, so that the homography is well conditioned and its value there is its last column.
-    near = np.stack([columns + left, rows + top], 1) - point_px
-    inside = (near**2).sum(1) <= radius_px**2
-    near = near[inside]
-    if len(near) < MIN_PIXELS or not _surrounds(near):
-        return np.full(2, np.nan)
-    seen = np.stack([code.column[window], code.row[window]], -1)[rows[inside], columns[inside]].astype(float)
-    homography, used = cv2.findHomography(near, seen, cv2.RANSAC, INLIER_PX)
-    if homography is None or used.sum() < max(MIN_PIXELS, 0.5 * len(near)):
-        return np.full(2, np.nan)
-    return np.asarray(homography[:2, 2] / homography[2, 2], np.float64)
+    places = corner_positions_mm(board)[corners.ids, :2] / board.square_mm
+    homography, _ = cv2.findHomography(places, corners.points_px, cv2.RANSAC, 3.0)
+    if homography is None:
+        raise CalibrationError("The corners of the board lie on one line. Leave this pose out.")
+    ends = []
+    for step in np.array([[0.5, 0.0], [0.0, 0.5]]):
+        both = cv2.perspectiveTransform(np.stack([places + step, places - step]), homography)
+        ends.append(np.asarray(both, np.float64)[0] - np.asarray(both, np.float64)[1])
+    return np.stack(ends, 1)
 
 
-def _surrounds(near: Floats) -> bool:
-    """Whether points lie on all sides of the origin, so that nothing is extrapolated."""
-    return bool((near.min(0) < 0).all() and (near.max(0) > 0).all())
+def corners_on_projector(
+    code: DecodedCode, corners: Corners, frames: PoseFrames, projector_size_px: tuple[int, int]
+) -> tuple[Floats, Floats]:
+    """Column and row (px) of every corner on the projector, (corners, 2), and their slopes (corners, 2, 2).
 
-
-def _one_channel(picture: NDArray[Any]) -> NDArray[np.float32]:
-    values = np.asarray(picture, np.float32)
-    return np.asarray(values.mean(2)) if values.ndim == 3 else values
-
-
-def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, int]) -> str:
-    """Why a code cannot be read: another order of the pictures that can, or else how they are lit."""
-    bits = bit_counts(GrayCode(), projector_size_px)
-    for words, pairs in _other_orders(list(frames.pairs), bits[0]):
-        code = decode_pose(replace(frames, pairs=pairs), projector_size_px)
-        read = np.isfinite(corners_on_projector(code, corners)[:, 0]).mean()
-        if read > 0.8:
-            return f"It can be read if {words}: the order of the patterns is wrong. Correct it."
-    return (
-        "Check that the projector lights the whole board, that its pictures are neither too dark nor"
-        " over-exposed, and the order of the patterns (columns first, most significant bit first, each"
-        " followed by its inverse)."
-    )
-
-
-def _other_orders(frames: list[NDArray[Any]], column_bits: int) -> list[tuple[str, list[NDArray[Any]]]]:
-    """Orders that are easily mistaken for the right one, in words and as pictures put right."""
-    pairs = list(zip(frames[::2], frames[1::2], strict=True))
-    half, rows = len(pairs), len(pairs) - column_bits
-    orders = {
-        "every inverse comes before its pattern": [(b, a) for a, b in pairs],
-        "rows come before columns": pairs[rows:] + pairs[:rows],
-        "the least significant bit comes first": pairs[:column_bits][::-1] + pairs[column_bits:][::-1],
-        "all patterns come before all inverses": list(zip(frames[:half], frames[half:], strict=True)),
-    }
-    return [(words, [picture for pair in order for picture in pair]) for words, order in orders.items()]
+    NaN where too few pixels decode; see `PoseObservation` for the slopes.
+    """
+    windows = windows_around(code, corners)
+    starts = [decoded_maps(code, window) for window in windows]
+    known = [k for k, start in enumerate(starts) if start is not None]
+    places, slopes = np.full((len(windows), 2), np.nan), np.zeros((len(windows), 2, 2))
+    if not known:
+        return places, slopes
+    chosen = [windows[k] for k in known]
+    for axis, light in enumerate(code_light(frames, projector_size_px)):
+        maps = refine_maps(light, chosen, np.array([start[axis] for start in starts if start is not None]))
+        places[known, axis] = maps[:, 0]
+        slopes[known, axis] = maps[:, 1:3] / np.array([each.radius_px for each in chosen])[:, None]
+    return places, slopes

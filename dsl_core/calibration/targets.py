@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board, Charuco, Checkerboard
+from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.demosaic import demosaic
 
 #: A board with fewer corners in view says too little of its pose.
 MIN_CORNERS = 12
+#: Pixels above this share of the largest value are saturated.
+SATURATED_SHARE = 0.998
 #: Edges within this share of the distance between corners refine a corner (less where markers are near).
 REACH, ARUCO_REACH, MAX_REACH_PX = 0.35, 0.12, 11
 #: Red, green and blue in the grey picture, as a mosaic samples them.
@@ -63,11 +66,15 @@ def _checkerboard(grey: NDArray[np.uint8], board: Checkerboard) -> Corners | Non
     import cv2
 
     # Duda and Frese (BMVC 2018): finds and refines in one; does not bend at squares of few pixels.
-    flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
-    ok, points = cv2.findChessboardCornersSB(grey, board.corner_grid, flags=flags)
-    if not ok or points is None:
-        return None
-    return Corners(np.arange(points.size // 2), _refined(grey, points))
+    thorough = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
+    half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    # Noise of a dark surrounding, or squares of many pixels, hide a board from one attempt but not from all.
+    for picture, flags in ((grey, cv2.CALIB_CB_ACCURACY), (half, thorough), (grey, thorough)):
+        ok, points = cv2.findChessboardCornersSB(picture, board.corner_grid, flags=flags)
+        if ok and points is not None:
+            at = points.reshape(-1, 2) if picture is grey else points.reshape(-1, 2) * 2 + 0.5
+            return Corners(np.arange(len(at)), _refined(grey, at))
+    return None
 
 
 def _charuco(grey: NDArray[np.uint8], board: Charuco) -> Corners | None:
@@ -87,6 +94,18 @@ def _charuco(grey: NDArray[np.uint8], board: Charuco) -> Corners | None:
     if points is None or ids is None:
         return None
     return Corners(np.asarray(ids, np.int64).ravel(), _refined(grey, points, ARUCO_REACH))
+
+
+def saturated(frames: PoseFrames) -> NDArray[np.bool_]:
+    """Pixels whose white is as bright as the camera can tell, shape (rows, columns)."""
+    if frames.saturated is not None:
+        return frames.saturated
+    white = np.asarray(frames.white)
+    if np.issubdtype(white.dtype, np.floating):
+        return np.zeros(white.shape[:2], bool)
+    full = next(2.0**bits - 1 for bits in (8, 10, 12, 14, 16, 64) if np.max(white) < 2**bits)
+    full_pixels = white >= SATURATED_SHARE * full
+    return np.asarray(full_pixels.any(2) if white.ndim == 3 else full_pixels)
 
 
 def _refined(grey: NDArray[np.uint8], points: NDArray[Any], reach: float = REACH) -> NDArray[np.float64]:

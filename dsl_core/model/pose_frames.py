@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import BayerPattern
@@ -16,7 +17,9 @@ class PoseFrames:
     """Pictures of one board pose, mono or mosaic, all of one shape.
 
     ``pairs`` holds pattern, inverse, pattern, inverse ... in the order of the Gray code (columns before rows,
-    most significant bit first). ``name`` is what errors call the pose.
+    most significant bit first). ``name`` is what errors call the pose. ``variance`` is that of ``white``, up
+    to a factor, and ``saturated`` marks pixels without a value; pictures merged from several settings know
+    both, of others brightness tells.
     """
 
     name: str
@@ -24,3 +27,5 @@ class PoseFrames:
     white: NDArray[Any]
     black: NDArray[Any]
     bayer: BayerPattern | None = None
+    variance: NDArray[np.floating] | None = None
+    saturated: NDArray[np.bool_] | None = None

@@ -52,9 +52,15 @@ class PatternTable:
         return self.blurred.shape[1] > 1
 
     def at(self, led: int, column: Tensor, row: Tensor) -> Tensor:
-        """Zero-order light at projector positions (px); linear across, nearest down."""
-        blurred = self.blurred[led]
-        return _lookup(blurred, (column + 0.5) * self.oversample[0] - 0.5, self._offset(row, blurred))
+        """Zero-order light at projector positions (px), linear between samples."""
+        blurred, across = self.blurred[led], (column + 0.5) * self.oversample[0] - 0.5
+        if not self.has_rows:
+            return _lookup(blurred, across, None)
+        down = ((row + 0.5) * self.oversample[1] - 0.5).clip(0, blurred.shape[0] - 1.001)
+        above = down.int()
+        offset = above * blurred.shape[1]
+        upper = _lookup(blurred, across, offset)
+        return torch.lerp(upper, _lookup(blurred, across, offset + blurred.shape[1]), down - above)
 
     def mean_between(self, led: int, start: Tensor, stop: Tensor, row: Tensor | None) -> Tensor:
         """Mean of the pattern between two columns (px), zero outside the frame."""

@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from dsl_core.calibration.board_code import decode_pose
 from dsl_core.calibration.geometry_diagnosis import exposure_warning
-from dsl_core.calibration.projector_corners import corners_on_projector, decode_pose, observe_pose
+from dsl_core.calibration.projector_corners import corners_on_projector, observe_pose
 from dsl_core.calibration.targets import Corners, find_corners, grey_of
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Charuco
@@ -48,7 +49,7 @@ def test_undecided_pixels_are_done_without(frames: PoseFrames) -> None:
         code, undecided=code.undecided | lost, column=np.where(wrong, code.column ^ 64, code.column)
     )
     points = _true_corners()
-    found = corners_on_projector(damaged, Corners(np.arange(20), points))
+    found, _ = corners_on_projector(damaged, Corners(np.arange(20), points), frames, SMALL_PROJECTOR_PX)
     assert np.abs(found - np.stack(on_projector(points), 1)).max() < 0.2
 
 
