@@ -95,8 +95,19 @@ ACTIONS: tuple[Action, ...] = (
             1,
         )
     ),
-    Action("band_down", "Band d&own", "Results", ",", "The next shorter wavelength", "results", separator=True),
+    Action(
+        "band_down", "Band d&own", "Results", ",", "The next shorter wavelength", "results", separator=True
+    ),
     Action("band_up", "Band &up", "Results", ".", "The next longer wavelength", "results"),
+    Action(
+        "intensity_graph",
+        "&Intensity graph",
+        "Results",
+        "I",
+        "What the pixel under the cursor saw line by line, against the model",
+        "results",
+        separator=True,
+    ),
     Action("help_page", "&Help on this page", "Help", "F1", "What this page does and what its numbers mean"),
     Action("shortcuts", "&Keyboard shortcuts", "Help", "Ctrl+/", "Every action and its keys"),
     Action("report_bundle", "Save a &report bundle…", "Help", "", "Log, settings and versions in one file"),

@@ -14,6 +14,7 @@ from app.jobs.base import Job, JobRunner
 from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
 from app.state.undo import UndoStack
 from app.views import Notifier
+from dsl_core.inspection import FrameBlock, IntensityGraph, find_session, intensity_graph, read_block
 from dsl_core.io.result_arrays import ResultArrays, load_arrays
 from dsl_core.progress import Progress
 
@@ -28,6 +29,7 @@ class ResultsController:
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self.marks = MarksController(state, runner, notifier, undo)
+        self._block: FrameBlock | None = None
 
     # Open ------------------------------------------------------------------------------------------
 
@@ -97,6 +99,8 @@ class ResultsController:
         state.busy.set("")
         state.offer.set(None)
         state.search.set(None)
+        state.graph.set(None)
+        self._block = None
         state.cursor.set(None)
         state.light.set("D65")
         state.picture.set(picture)
@@ -226,6 +230,27 @@ class ResultsController:
 
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", str(error))
+
+    # Inspect ---------------------------------------------------------------------------------------
+
+    def inspect(self) -> None:
+        """Show what the pixel under the cursor saw line by line, if the scan lies beside the result."""
+        result, pixel, block = self.state.result.value, self.state.cursor.value, self._block
+        if result is None or pixel is None:
+            self._notifier.tell("info", "Point at a pixel to see its intensity graph.")
+            return
+
+        def work(progress: Progress) -> tuple[FrameBlock, IntensityGraph]:
+            near = block if block is not None and block.holds(pixel) else None
+            near = near or read_block(find_session(result), pixel, progress)
+            return near, intensity_graph(near, result, pixel)
+
+        def done(found: tuple[FrameBlock, IntensityGraph]) -> None:
+            if self.state.result.value is result:
+                self._block, graph = found
+                self.state.graph.set(graph)
+
+        self._runner.submit(Job("Intensity graph", work, done, self._tell))
 
     # Export ----------------------------------------------------------------------------------------
 

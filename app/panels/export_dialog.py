@@ -95,9 +95,8 @@ class ExportDialog(QDialog):
     def targets(self) -> dict[str, Path]:
         """Format and path of everything that is ticked."""
         folder, name = Path(self.folder.text()), self.name.text().strip()
-        return {
-            form: folder / f"{name}{suffix}" for form, suffix, _, _ in FORMATS if self.formats[form].isChecked()
-        }
+        ticked = ((form, suffix) for form, suffix, _, _ in FORMATS if self.formats[form].isChecked())
+        return {form: folder / f"{name}{suffix}" for form, suffix in ticked}
 
     def _browse(self) -> None:
         folder = QFileDialog.getExistingDirectory(self, "Export to", self.folder.text())

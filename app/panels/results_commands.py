@@ -80,6 +80,9 @@ class ResultCommands(Protocol):
     def end_search(self) -> None:
         """Show the image without the search."""
 
+    def inspect(self) -> None:
+        """Show what the pixel under the cursor saw line by line."""
+
     def export(self, targets: dict[str, Path], overwrite: bool) -> None:
         """Write formats to paths."""
 

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from app.jobs.base import JobRunner
 from app.panels.export_dialog import ExportDialog
+from app.panels.intensity_window import IntensityWindow
 from app.panels.marks_panel import MarksPanel
 from app.panels.readout import Readout
 from app.panels.result_image import ResultImage
@@ -32,6 +33,7 @@ from app.state.results import ResultsState, View
 from app.theme import Theme
 from app.widgets.forms import label
 from app.widgets.page import PageWidget
+from dsl_core.inspection import IntensityGraph
 
 NOTHING_OPEN = (
     "No result is open. Open a result (a folder NAME.zarr) or a finished scan (NAME.dsl), or drop one here.\n"
@@ -58,21 +60,25 @@ class ResultsPage(PageWidget):
         self.spectra = SpectrumPanel(state)
         self.marks = MarksPanel(state, commands.marks)
         self.search = SearchPanel(state, commands)
-        self._panels = (self.image, self.scene, self.spectra, self.marks)
+        self.graph = IntensityWindow(state, self)
+        self._panels = (self.image, self.scene, self.spectra, self.marks, self.graph)
         self.stack = QStackedWidget()
         self._open, self._export = QPushButton("Open…"), QPushButton("Export…")
+        self._inspect = QPushButton("Intensity graph")
         self._lay_out()
         self._connect()
 
     # Lay out ---------------------------------------------------------------------------------------
 
     def _lay_out(self) -> None:
+        self._inspect.setToolTip("What the pixel under the cursor saw line by line, against the model (I)")
         self._open.setToolTip("Open a result or a finished scan (Ctrl+O opens any file)")
         self._export.setToolTip("Write the result in formats of other programs (Ctrl+E)")
         head = QHBoxLayout()
         head.addWidget(self.title)
         head.addSpacing(10)
         head.addWidget(self.about, 1)
+        head.addWidget(self._inspect)
         head.addWidget(self._open)
         head.addWidget(self._export)
         self.stack.addWidget(self._empty())
@@ -122,6 +128,7 @@ class ResultsPage(PageWidget):
         right.addWidget(tabs)
         right.setStretchFactor(0, 3)
         right.setStretchFactor(1, 2)
+        right.setSizes([400, 340])
         content = QSplitter(Qt.Orientation.Horizontal)
         content.addWidget(left)
         content.addWidget(right)
@@ -136,6 +143,8 @@ class ResultsPage(PageWidget):
         commands, state = self._commands, self._state
         self._open.clicked.connect(self.choose)
         self._export.clicked.connect(self.export)
+        self._inspect.clicked.connect(self.inspect)
+        state.graph.changed.connect(self._show_graph)
         self.reconstruct.clicked.connect(commands.reconstruct)
         self.image.pointed.connect(commands.point_at)
         self.image.pinned.connect(commands.marks.pin)
@@ -158,6 +167,7 @@ class ResultsPage(PageWidget):
         self.stack.setCurrentIndex(0 if waiting or result is None else 1)
         self.reconstruct.setVisible(state.offer.value is not None and not state.busy.value)
         self._export.setEnabled(result is not None)
+        self._inspect.setEnabled(result is not None)
         if state.busy.value:
             self.message.setText(f"{state.busy.value} …")
         elif state.offer.value is not None:
@@ -192,6 +202,7 @@ class ResultsPage(PageWidget):
             **shows,
             "band_down": lambda: self._commands.step_band(-1),
             "band_up": lambda: self._commands.step_band(1),
+            "intensity_graph": self.inspect,
             "export": self.export,
         }
 
@@ -200,6 +211,16 @@ class ResultsPage(PageWidget):
         name = QFileDialog.getExistingDirectory(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
         if name and not self._commands.open(Path(name)):
             self.message.setText(f"{name} is neither a result nor a scan. Choose another folder.")
+
+    def inspect(self) -> None:
+        """Show what the pixel under the cursor saw; its window comes when that is known."""
+        self._commands.inspect()
+
+    def _show_graph(self, graph: IntensityGraph | None) -> None:
+        if graph is None:
+            self.graph.hide()
+        elif not self.graph.isVisible():
+            self.graph.show()
 
     def export(self) -> None:
         """Ask for formats and write them."""
@@ -234,4 +255,5 @@ class ResultsPage(PageWidget):
 
     def release(self) -> None:
         """Let go of the graphics context."""
+        self.graph.close()
         self.scene.release()

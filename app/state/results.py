@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from app.state.evented import Value
 from dsl_core.evaluation.similarity import Likeness
 from dsl_core.evaluation.uncertainty import BAND_95
+from dsl_core.inspection import IntensityGraph
 from dsl_core.io.result_arrays import ResultArrays
 from dsl_core.model.spectral import SpectralCurve
 
@@ -118,7 +119,7 @@ class ResultsState:
 
     ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes
     under ``light``; ``cloud_by`` is the view that colours the cloud; ``busy`` says in words what is being
-    opened (empty: nothing).
+    opened (empty: nothing). ``graph`` is what the pixel saw that was last inspected.
     """
 
     def __init__(self) -> None:
@@ -137,6 +138,7 @@ class ResultsState:
         self.light = Value("D65")
         self.adapted = Value(True)
         self.search: Value[Search | None] = Value(None)
+        self.graph: Value[IntensityGraph | None] = Value(None)
 
     @property
     def selected_mark(self) -> Mark | None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from app.controllers.results import ResultsController
 from app.jobs.base import InlineRunner
 from app.main_window import MainWindow
 from app.panels.export_dialog import ExportDialog
+from app.panels.intensity_window import ticks
 from app.panels.mark_figures import figures_of
 from app.panels.result_layers import Layers, rgb_of
 from app.panels.results_page import ResultsPage
@@ -26,6 +28,7 @@ from app.theme import DARK as DARK_THEME
 from app.theme import LIGHT
 from app.widgets.page import PageWidget
 from app.widgets.spectrum_curve import split_by_share
+from dsl_core.inspection import IntensityGraph
 from tests.app.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
 
 
@@ -293,6 +296,34 @@ def test_the_export_dialog_warns_before_it_replaces(bench: Bench, qtbot: QtBot, 
     assert opened
     for each in opened:
         each.close()
+
+
+def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
+    frames = np.linspace(60.0, 110.0, NM.size)
+    measured = np.zeros((3, 200))
+    measured[:, 150], measured[1, 80] = 100.0, 2.0
+    graph = IntensityGraph((4, 5), measured, measured + 0.1, measured, 150.0, {1: frames}, NM)
+    bench.state.graph.set(graph)
+    window = bench.page.graph
+    assert window.isVisible()
+    assert "4, 5" in window.windowTitle()
+    assert "First order +1 reaches the pixel" in window.text.text()
+    assert [text for _, text in ticks(graph)] == ["450", "500", "550", "600", "650", "zero order"]
+    assert window.item.viewRange()[1][1] < 5
+    window.faint.setChecked(False)
+    assert window.item.viewRange()[1][1] > 100
+    bench.state.graph.set(replace(graph, model=None, orders={}, zero=None))
+    assert "no model" in window.text.text()
+    bench.state.graph.set(None)
+    assert not window.isVisible()
+
+
+def test_without_its_scan_a_graph_is_refused_in_words(bench: Bench) -> None:
+    bench.window.do("intensity_graph")
+    assert "Point at a pixel" in bench.window.toasts.shown[-1].text
+    bench.control.point_at((3, 3))
+    bench.window.do("intensity_graph")
+    assert "not beside it" in bench.window.toasts.shown[-1].text
 
 
 def test_themes_reach_every_panel(bench: Bench) -> None:

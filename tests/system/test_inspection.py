@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core import pipeline
+from dsl_core.devices.registry import open_rig
+from dsl_core.errors import DecodeError, StoreError
+from dsl_core.inspection import find_session, intensity_graph, read_block
+from dsl_core.io.origin import rig_notes
+from dsl_core.io.result_arrays import ResultArrays, load_arrays
+from dsl_core.io.result_file import save_result
+from dsl_core.model.plan import CapturePlan, GrayCode, Setting
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.sessions import reconstruct_session
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> ResultArrays:
+    folder, options = tmp_path_factory.mktemp("inspection"), {"size": "160x104", "scene": "plane"}
+    with open_rig("twin", options) as rig:
+        plan = pipeline.fit_plan(
+            CapturePlan(
+                code=GrayCode(rows=False),
+                settings=(Setting(exposure_ms=333.3, level=0.8),),
+                code_settings=(0,),
+            ),
+            rig,
+        )
+        pipeline.scan(rig, plan, folder / "a.dsl", None, rig_notes("twin", options))
+    made = reconstruct_session(folder / "a.dsl", options=pipeline.Options(WavelengthGrid(step_nm=10)))
+    return load_arrays(save_result(made, folder / "other-name.zarr"))
+
+
+def test_the_model_explains_what_a_pixel_saw(result: ResultArrays) -> None:
+    solid = np.argwhere(np.isfinite(result["reflectance"][0]) & np.isfinite(result["shading"]))
+    y, x = solid[len(solid) // 2].tolist()
+    pixel = (x, y)
+    block = read_block(find_session(result), pixel)
+    graph = intensity_graph(block, result, pixel)
+    assert graph.model is not None
+    assert graph.zero is not None
+    assert graph.measured.shape == graph.model.shape == graph.std.shape
+    peak = int(graph.measured.sum(0).argmax())
+    assert abs(peak - graph.zero) < 3
+    # Beside the zero order, whose steep flanks the large pixels of a small picture smear.
+    beside = np.abs(np.arange(graph.model.shape[1]) - graph.zero) > 20
+    assert np.corrcoef(graph.measured[:, beside].ravel(), graph.model[:, beside].ravel())[0, 1] > 0.97
+    reached = [frames[np.isfinite(frames)] for frames in graph.orders.values()]
+    assert any(frames.size for frames in reached)
+    far = np.concatenate(reached)
+    assert (np.abs(far - graph.zero) > 20).all()
+
+
+def test_a_pixel_at_the_corner_has_a_graph_too(result: ResultArrays) -> None:
+    block = read_block(find_session(result), (0, 0))
+    assert block.holds((0, 0))
+    assert not block.holds((90, 60))
+    assert intensity_graph(block, result, (0, 0)).measured.shape[0] == 3
+    with pytest.raises(DecodeError, match="outside"):
+        intensity_graph(block, result, (90, 60))
+
+
+def test_a_scan_that_is_elsewhere_is_asked_for(result: ResultArrays, tmp_path: Path) -> None:
+    moved = ResultArrays(tmp_path / "b.zarr", result.wavelengths_nm, result.arrays, result.attributes)
+    with pytest.raises(StoreError, match="not beside it"):
+        find_session(moved)
