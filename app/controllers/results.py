@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.controllers.marks import MarksController
+from app.controllers.result_files import expected_files, picture_of
 from app.jobs.base import Job, JobRunner
 from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
 from app.state.undo import UndoStack
@@ -290,29 +291,3 @@ class ResultsController:
         """Files that an export would replace."""
         result = self.state.result.value
         return [] if result is None else [path for path in expected_files(targets, result) if path.exists()]
-
-
-def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
-    """Files that an export writes."""
-    files: list[Path] = []
-    for form, path in targets.items():
-        if form == "envi":
-            headers = [path]
-            if "reflectance_std" in result.arrays:
-                headers.append(path.with_name(f"{path.stem}_std.hdr"))
-            files += [file for header in headers for file in (header, header.with_suffix(".img"))]
-        elif form == "png":
-            files += sorted(path.parent.glob(f"{path.stem}_*.png"))
-        else:
-            files.append(path)
-    return files
-
-
-def picture_of(rgb: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """RGBA bytes (rows, columns, 4) of colours (3, rows, columns), 0..1; transparent without an answer."""
-    picture = np.empty((*rgb.shape[1:], 4), np.uint8)
-    for channel in range(3):
-        level = np.nan_to_num(rgb[channel]).clip(0, 1)
-        picture[..., channel] = (level * 255 + 0.5).astype(np.uint8)
-    picture[..., 3] = np.where(np.isfinite(rgb[0]), 255, 0)
-    return picture

@@ -22,7 +22,8 @@ from app.panels.intensity_window import ticks
 from app.panels.mark_figures import figures_of
 from app.panels.result_layers import Layers, rgb_of
 from app.panels.results_page import ResultsPage
-from app.panels.scene import gl_works, still_picture
+from app.panels.scene import gl_works
+from app.panels.still_scene import still_picture
 from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Tool, View
 from app.theme import DARK as DARK_THEME
 from app.theme import LIGHT
