@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film import FilmFit, OrderSamples, fit_film, grating_columns
+from dsl_core.calibration.film import FilmFit, OrderSamples, fit_film, grating_columns, with_geometry
 from dsl_core.calibration.filter_template import filter_template
 from dsl_core.calibration.line_samples import LineFrames
 from dsl_core.calibration.peaks import find_coarsely, find_shifts
@@ -79,6 +79,7 @@ def calibrate_depth_stage(rig: Rig, data: StageData, progress: Progress) -> Dept
     planes = refine_planes(rig, data.positions_mm, data.columns, covariance, data.stage_std_mm)
     film, samples = fit_first_orders(planes.rig, planes.planes, data, progress)
     fitted = planes.rig.model_copy(update={"film": film.film})
+    film = with_geometry(film, fitted, samples, planes.variants())
     residual, held_out = choose_residual(
         fitted,
         samples,
@@ -93,6 +94,7 @@ def calibrate_depth_stage(rig: Rig, data: StageData, progress: Progress) -> Dept
         geometry_covariance=None if covariance is None else tuple(planes.covariance.ravel().tolist()),
         column_std_px=planes.column_std_px if covariance is not None else rig.column_std_px,
         depth_std_mm=planes.depth_std_mm,
+        geometry_pull=planes.pull,
         positions=_positions(data, planes),
         film=film.film,
         film_std=film.std,
@@ -114,7 +116,7 @@ def fit_first_orders(
         samples = _samples(here, planes, data, round_ == 0, progress)
         fit = fit_film(here, samples, mounting)
         here = rig.model_copy(update={"film": fit.film})
-        _require_filters(here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)
+        _require_filters(rig, here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)
     return fit, samples
 
 
@@ -149,16 +151,34 @@ def _dispersion(rig: Rig) -> float:
     return rig.projector.fx_px * rig.film.lines_per_mm * 1e-6
 
 
-def _require_filters(rig: Rig, data: StageData, samples: OrderSamples, limit_px: float) -> None:
+def _require_filters(
+    mounted: Rig, fitted: Rig, data: StageData, samples: OrderSamples, limit_px: float
+) -> None:
     """Raise `CalibrationError` when one filter's light lies elsewhere than all others say."""
-    shifts = _shifts_nm(rig, data, samples)
-    position, name = np.unravel_index(int(np.abs(shifts).argmax()), shifts.shape)
-    if abs(shifts[position, name]) * _dispersion(rig) > limit_px:
-        raise CalibrationError(
-            f"Position {data.name(int(position), int(name))}: the first orders lie where light of another"
-            f" wavelength would, {shifts[position, name]:+.1f} nm off. Check that the filter is the right one"
-            " and not tilted, and that nothing moved, and capture this step again."
-        )
+    limit_nm = limit_px / _dispersion(fitted)
+    if np.abs(_shifts_nm(fitted, data, samples)).max() < limit_nm:
+        return
+    position, name, off_nm = _odd_one(mounted, fitted, data, samples)
+    raise CalibrationError(
+        f"Position {data.name(position, name)}: the first orders lie where light of another wavelength would,"
+        f" about {off_nm:+.1f} nm off. Check that the filter is the right one, not tilted, and nothing moved,"
+        " and capture this step again."
+    )
+
+
+def _odd_one(mounted: Rig, fitted: Rig, data: StageData, samples: OrderSamples) -> tuple[int, int, float]:
+    """The capture without which all others agree best: position, filter, and how far it is off, nm."""
+    found = []
+    # A wrong capture pulls the film towards itself, so that others may look worse than it.
+    for position, name in np.ndindex(len(data.positions_mm), len(data.filters)):
+        mine = (samples.position == position) & (samples.filter == name)
+        film = fit_film(fitted, samples.only(~mine), mounted.film).film
+        shifts = _shifts_nm(fitted.model_copy(update={"film": film}), data, samples)
+        off = float(shifts[position, name])
+        shifts[position, name] = 0.0
+        found.append((float(np.abs(shifts).max()), position, name, off))
+    _, position, name, off = min(found)
+    return position, name, off
 
 
 def _shifts_nm(rig: Rig, data: StageData, samples: OrderSamples) -> Floats:
@@ -166,9 +186,9 @@ def _shifts_nm(rig: Rig, data: StageData, samples: OrderSamples) -> Floats:
     # Both orders move away from the zero order with wavelength, in opposite directions.
     off = (samples.column_px - grating_columns(rig, samples)) * samples.order / _dispersion(rig)
     shifts = np.zeros((len(data.positions_mm), len(data.filters)))
-    for place in np.ndindex(*shifts.shape):
-        mine = (samples.position == place[0]) & (samples.filter == place[1])
-        shifts[place] = np.median(off[mine])
+    for position, name in np.ndindex(shifts.shape):
+        mine = (samples.position == position) & (samples.filter == name)
+        shifts[position, name] = np.median(off[mine])
     return shifts
 
 

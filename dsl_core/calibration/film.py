@@ -6,8 +6,8 @@ bend, or period and distance over few depths) the values of the mounting decide,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -17,6 +17,8 @@ from dsl_core.calibration.peaks import TileShifts
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.shading import Plane
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -77,11 +79,15 @@ class OrderSamples:
 
 @dataclass(frozen=True)
 class FilmFit:
-    """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px)."""
+    """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px).
+
+    ``gain`` (fields, samples) is how far each field moves when a column does.
+    """
 
     film: Film
     covariance: Floats
     scatter_px: float
+    gain: Floats
 
     @property
     def std(self) -> dict[str, float]:
@@ -113,7 +119,7 @@ def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUN
         )
     centre, values = _values(mounting), _values(rig.film)
     sigma = np.hypot(samples.std_px, FLOOR_PX)
-    scale, covariance = 1.0, np.eye(len(FIELDS))
+    scale, covariance, gain = 1.0, np.eye(len(FIELDS)), np.empty((len(FIELDS), len(samples)))
     for _ in range(rounds):
         here = grating_columns(_with(rig, values), samples)
         residual = samples.column_px - here
@@ -125,6 +131,7 @@ def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUN
         information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(FIELDS))
         gradient = jacobian.T @ (weight * residual) + (centre - values) / PRIOR_STD
         covariance = np.linalg.inv(information)
+        gain = covariance @ (jacobian * weight[:, None]).T * PRIOR_STD[:, None]
         step = covariance @ gradient
         values = values + PRIOR_STD * step.clip(-1, 1)
         if np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-2:
@@ -134,7 +141,27 @@ def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUN
             "The fit of the film did not converge. Check the filters, and the film's data."
         )
     film = _with(rig, values).film
-    return FilmFit(film, covariance * np.outer(PRIOR_STD, PRIOR_STD), scale * float(np.median(sigma)))
+    spread = covariance * np.outer(PRIOR_STD, PRIOR_STD)
+    return FilmFit(film, spread, scale * float(np.median(sigma)), gain)
+
+
+def with_geometry(
+    fit: FilmFit, rig: Rig, samples: OrderSamples, variants: Iterable[tuple[Rig, tuple[Plane, ...]]]
+) -> FilmFit:
+    """The fit with a covariance that holds what the geometry leaves open.
+
+    ``variants`` are rigs and planes of all positions, each one deviation off in an independent direction. The
+    film makes up for such errors, so that columns come out right though its own numbers are off.
+    """
+    here = grating_columns(_with(rig, _values(fit.film)), samples)
+    covariance = fit.covariance.copy()
+    for other, planes in variants:
+        rays = pixel_rays(other.camera).reshape(3, -1)[:, samples.pixel]
+        inverse = np.stack([plane.inverse for plane in planes])[samples.position]
+        there = replace(samples, depth_mm=1 / (inverse.T * rays).sum(0))
+        moved = fit.gain @ (here - grating_columns(_with(other, _values(fit.film)), there))
+        covariance += np.outer(moved, moved)
+    return replace(fit, covariance=covariance)
 
 
 def _values(film: Film) -> Floats:

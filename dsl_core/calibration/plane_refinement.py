@@ -7,7 +7,7 @@ points of every position lie on a plane, the planes are parallel, and their dist
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,13 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.bundle import CAMERA, PROJECTOR, SHARED, STEREO
 from dsl_core.calibration.geometric import lens_of, pose_of
+from dsl_core.calibration.stage_checks import (
+    require_agreement,
+    require_alike,
+    require_flat,
+    require_steps,
+    require_tiles,
+)
 from dsl_core.calibration.stage_planes import (
     DISTANCE,
     SLOPES,
@@ -25,7 +32,6 @@ from dsl_core.calibration.stage_planes import (
     rays_through,
 )
 from dsl_core.calibration.tiles import ColumnSamples
-from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.shading import Plane
 
@@ -36,22 +42,23 @@ ROUNDS = 12
 HUBER_SIGMAS = 2.5
 #: Tile means are never better than this: lens models leave as much (px).
 FLOOR_PX = 0.002
-#: Tiles a position needs.
-MIN_TILES = 30
-#: What a stage or a plane may be off (mm) before it is taken as wrong, and by how much a stage's scale.
-MAX_STEP_ERROR_MM, MAX_PLANE_RMS_MM, MAX_SCALE_ERROR = 0.3, 0.3, 0.02
 
 
 @dataclass(frozen=True)
 class PlaneRefinement:
     """The refined rig, the plane of every position, and how well all agree.
 
-    ``plane_rms_mm`` is the scatter of the points of each position about its plane (the 95 % nearest to it),
-    ``step_error_mm`` how far each position is from where the stage says, with its deviation. ``covariance``
-    (24, 24) is that of the refined lenses and pose; ``column_std_px`` is what it means for zero-order columns
-    and ``depth_std_mm`` for depths, rms over the image and the range of depth.
+    ``rig`` and ``planes`` are those of the fitted ``numbers`` of a ``problem``, ``posterior`` the covariance
+    of these. ``plane_rms_mm`` is the scatter of the points of each position about its plane (the 95 % nearest
+    to it), ``step_error_mm`` how far each position is from where the stage says, with its deviation.
+    ``covariance`` (24, 24) is that of the refined lenses and pose; ``column_std_px`` is what it means for
+    zero-order columns and ``depth_std_mm`` for depths, rms over the image and the range of depth. ``pull`` is
+    how far lenses and pose had to move, in their deviations before, rms: about one or less if all is well.
     """
 
+    problem: StageProblem
+    numbers: Floats
+    posterior: Floats
     rig: Rig
     planes: tuple[Plane, ...]
     plane_rms_mm: Floats
@@ -61,6 +68,28 @@ class PlaneRefinement:
     covariance: Floats
     column_std_px: float
     depth_std_mm: float
+    pull: float
+
+    def variants(self) -> Iterator[tuple[Rig, tuple[Plane, ...]]]:
+        """Rigs and planes that are one deviation off, in each independent direction of what is uncertain."""
+        values, directions = np.linalg.eigh(self.posterior)
+        for value, direction in zip(values, directions.T, strict=True):
+            if value > 0:
+                yield _found(self.rig, self.problem, self.numbers + np.sqrt(value) * direction)
+
+
+def _found(rig: Rig, problem: StageProblem, numbers: Floats) -> tuple[Rig, tuple[Plane, ...]]:
+    """The rig and the planes of fitted numbers."""
+    shared = problem.shared(numbers)
+    camera, projector = rig.camera, rig.projector
+    found = rig.model_copy(
+        update={
+            "camera": lens_of(shared[CAMERA], (camera.width_px, camera.height_px)),
+            "projector": lens_of(shared[PROJECTOR], (projector.width_px, projector.height_px)),
+            "pose": pose_of(shared[STEREO]),
+        }
+    )
+    return found, tuple(plane_of(numbers[SLOPES], float(d)) for d in problem.distances_mm(numbers))
 
 
 def refine_planes(
@@ -75,13 +104,14 @@ def refine_planes(
     ``positions_mm`` are what the stage reported, ``samples`` the tile means of each position. Raises
     `CalibrationError` that names the position whose plane is not flat, or whose step is not what was asked.
     """
-    _require_tiles(positions_mm, samples)
+    require_tiles(positions_mm, samples)
     start = _start(rig, positions_mm, samples, stage_std_mm)
     problem = StageProblem(rig, positions_mm, samples, covariance, stage_std_mm)
     free = np.arange(SHARED if covariance is None else 0, len(start))
     numbers, posterior = _gauss_newton(problem, start, free)
     found = _summary(rig, problem, numbers, posterior)
-    _require_flat(positions_mm, found)
+    require_flat(positions_mm, found.plane_rms_mm)
+    require_agreement(found.pull)
     return found
 
 
@@ -116,7 +146,7 @@ def _start(
     rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
 ) -> Floats:
     """Plane of each position for itself under the geometry given; checks the steps between them."""
-    slopes, distances = [], []
+    slopes, distances, scatter = [], [], []
     for part in samples:
         alone = StageProblem(rig, [0.0], [part], None, stage_std_mm)
         numbers = np.zeros(STEPS + 1)
@@ -126,7 +156,9 @@ def _start(
             numbers, _ = _gauss_newton(alone, numbers, np.array(free), prior=False)
         slopes.append(numbers[SLOPES])
         distances.append(float(numbers[DISTANCE]))
-    _require_steps(positions_mm, np.array(distances))
+        scatter.append(_rms(alone.residual_px(numbers) / _per_mm(alone, numbers)))
+    require_alike(positions_mm, np.array(scatter))
+    require_steps(positions_mm, np.array(distances))
     start = np.zeros(STEPS + len(samples))
     start[SLOPES] = np.mean(slopes, 0)
     steps = np.asarray(positions_mm) - positions_mm[0]
@@ -137,26 +169,17 @@ def _start(
 def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats) -> PlaneRefinement:
     shared = problem.shared(numbers)
     covariance = problem.root @ posterior[:SHARED, :SHARED] @ problem.root.T
-    camera, projector = rig.camera, rig.projector
-    refined = rig.model_copy(
-        update={
-            "camera": lens_of(shared[CAMERA], (camera.width_px, camera.height_px)),
-            "projector": lens_of(shared[PROJECTOR], (projector.width_px, projector.height_px)),
-            "pose": pose_of(shared[STEREO]),
-        }
-    )
+    refined, planes = _found(rig, problem, numbers)
     residual = problem.residual_px(numbers)
-    points = problem.points_mm(numbers)
-    # Pixels of column that a millimetre of depth moves the point.
-    slope = columns_at(shared, points * (1 + 0.5 / points[2])) - columns_at(
-        shared, points * (1 - 0.5 / points[2])
-    )
+    slope = _per_mm(problem, numbers)
     each = [problem.position_of == k for k in range(len(problem.steps_mm))]
     column_std, depth_std = systematic_std(refined, shared, problem.root, posterior[:SHARED, :SHARED])
-    distances = problem.distances_mm(numbers)
     return PlaneRefinement(
+        problem=problem,
+        numbers=numbers,
+        posterior=posterior,
         rig=refined,
-        planes=tuple(plane_of(numbers[SLOPES], float(d)) for d in distances),
+        planes=planes,
         plane_rms_mm=np.array([_rms(residual[part] / slope[part]) for part in each]),
         residual_rms_px=np.array([_rms(residual[part]) for part in each]),
         step_error_mm=numbers[STEPS:] - numbers[STEPS:].mean(),
@@ -164,7 +187,15 @@ def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats
         covariance=covariance,
         column_std_px=column_std,
         depth_std_mm=depth_std,
+        pull=float(np.sqrt(np.mean(numbers[:SHARED] ** 2))),
     )
+
+
+def _per_mm(problem: StageProblem, numbers: Floats) -> Floats:
+    """By how many columns a millimetre of depth moves the points (n,)."""
+    shared, points = problem.shared(numbers), problem.points_mm(numbers)
+    ahead, behind = (columns_at(shared, points * (1 + half / points[2])) for half in (0.5, -0.5))
+    return ahead - behind
 
 
 def systematic_std(rig: Rig, shared: Floats, root: Floats, posterior: Floats) -> tuple[float, float]:
@@ -196,50 +227,3 @@ def _rms(values: Floats) -> float:
     # Tiles at the rim of the light are few and far off; the middle 95 % tell what the plane is like.
     limit = np.percentile(np.abs(values), 95)
     return float(np.sqrt(np.mean(values[np.abs(values) <= limit] ** 2)))
-
-
-def _require_tiles(positions_mm: Sequence[float], samples: Sequence[ColumnSamples]) -> None:
-    if len(samples) < 2:
-        raise CalibrationError(
-            f"The depth stage needs a plane at two or more positions, given {len(samples)}. Add positions."
-        )
-    for position, part in zip(positions_mm, samples, strict=True):
-        if len(part) < MIN_TILES:
-            raise CalibrationError(
-                f"At the stage's position {position:g} mm only {len(part)} tiles of the image show"
-                f" columns of the projector; {MIN_TILES} are needed. Check that the plane fills the view."
-            )
-
-
-def _require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> None:
-    """Raise `CalibrationError` unless the planes stand as far apart as the stage says."""
-    positions = np.asarray(positions_mm, float)
-    # The step that all pairs agree on: one wrong position spoils only its own pairs.
-    first, second = np.triu_indices(len(positions), 1)
-    scales = (distances_mm[second] - distances_mm[first]) / (positions[second] - positions[first])
-    scale = float(np.median(scales))
-    offset = np.median(distances_mm - scale * positions)
-    off = distances_mm - scale * positions - offset
-    worst = int(np.abs(off).argmax())
-    if len(positions) > 2 and np.abs(off[worst]) > MAX_STEP_ERROR_MM + 0.002 * np.ptp(positions):
-        raise CalibrationError(
-            f"The plane at the stage's position {positions[worst]:g} mm stands {off[worst]:+.2f} mm from"
-            " where the other positions say it should. Check that the stage reached it and that nothing else"
-            " moved, and take this position again."
-        )
-    if abs(scale - 1) > MAX_SCALE_ERROR:
-        raise CalibrationError(
-            f"The planes are {scale:.3f} times as far apart as the stage's positions"
-            f" {', '.join(f'{p:g}' for p in positions)} mm. Check the unit of the stage, that it moves along"
-            " the camera's axis, and the printed size of the board that the geometry was calibrated with."
-        )
-
-
-def _require_flat(positions_mm: Sequence[float], found: PlaneRefinement) -> None:
-    worst = int(found.plane_rms_mm.argmax())
-    if found.plane_rms_mm[worst] > MAX_PLANE_RMS_MM:
-        raise CalibrationError(
-            f"The points at the stage's position {positions_mm[worst]:g} mm lie"
-            f" {found.plane_rms_mm[worst]:.2f} mm rms off a plane; {MAX_PLANE_RMS_MM:g} mm are allowed. Use a"
-            " flat target that fills the view, and check that all positions were captured with this rig."
-        )

@@ -7,6 +7,8 @@ from dsl_core.model.figure import Figure
 
 #: Flatness of a plane and error of a stage's step, mm; error of columns that a fit never saw, px.
 MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
+#: How far planes may move the geometry, in its deviations, without a doubt.
+MAX_PULL = 1.8
 
 
 def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
@@ -50,6 +52,13 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             std=step.step_std_mm,
             high=MAX_STEP_MM,
             advice=f"Check the stage at {step.position_mm:g} mm; repeat the geometry with more poses.",
+        ),
+        Figure(
+            name="pull of the planes on the geometry",
+            value=record.geometry_pull,
+            unit="deviations",
+            high=MAX_PULL,
+            advice="Use a flatter target, or calibrate the geometry again: one of both is not what it seems.",
         ),
         Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),
         Figure(

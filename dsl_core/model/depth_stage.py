@@ -58,8 +58,9 @@ class DepthStageCalibration(Record):
 
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (None where it was not known
     before, and the geometry is as it was); ``column_std_px`` and ``depth_std_mm`` are what it leaves open in
-    columns of the zero order and in depth. ``film_std`` are deviations by the film's fields, ``scatter_px``
-    is that of single samples of first orders. ``frames`` counts the exposures.
+    columns of the zero order and in depth; ``geometry_pull`` is how far it moved, in its deviations before.
+    ``film_std`` are deviations by the film's fields, ``scatter_px`` is that of single samples of first
+    orders. ``frames`` counts the exposures.
     """
 
     schema_version: Literal[1] = 1
@@ -69,6 +70,7 @@ class DepthStageCalibration(Record):
     geometry_covariance: tuple[float, ...] | None = None
     column_std_px: float
     depth_std_mm: float
+    geometry_pull: float
     positions: tuple[StagePosition, ...]
     film: Film
     film_std: dict[str, float]

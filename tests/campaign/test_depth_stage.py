@@ -1,0 +1,142 @@
+"""The depth-stage calibration on a twin whose film nobody knows, and whose geometry only a board told."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.campaign.depth_stage import NOTE_NAME, SCAN_NAME, DepthStageRecipe
+from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
+from dsl_core.io.session_reader import SessionReader
+from dsl_core.model.depth_stage import DepthStageCalibration
+from dsl_core.model.figure import failures
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import GratingModel, correspondence, zero_order
+from dsl_core.progress import NoProgress
+from dsl_core.reconstruction.depth import triangulate
+from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from tests.cases.board_calibrated import board_calibrated
+
+RECIPE = DepthStageRecipe(
+    positions_mm=(620.0, 850.0), filters_nm=(450.0, 540.0, 640.0), code_step_px=5, chain=False
+)
+SAME = ("emission", "sensor", "flat_field", "response", "white_scale", "projector_response", "efficiency")
+#: The step that mishaps happen to.
+FILTERED = 6
+
+
+def truth_of(devices: DeviceRig) -> Rig:
+    assert isinstance(devices.camera, SimCamera)
+    return devices.camera.world.rig
+
+
+def bench_of(folder: Path, seed: int = 1, **options: str) -> Bench:
+    """Film unknown, geometry as a board tells it, the rest true."""
+    devices = open_twin({"truth": str(seed), "size": "112x72", **options})
+    truth, nominal = truth_of(devices), devices.nominal
+    assert nominal is not None
+    known = nominal.model_copy(update={name: getattr(truth, name) for name in SAME})
+    return Bench(devices, folder, board_calibrated(truth, known, seed))
+
+
+def capture(bench: Bench, step: Step, filter_nm: float | None = None) -> None:
+    assert bench.devices.place is not None
+    placed = step.placement
+    bench.devices.place(placed.model_copy(update={"filter_nm": filter_nm}) if filter_nm else placed)
+    RECIPE.capture(bench, step, NoProgress())
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    """All steps captured."""
+    bench = bench_of(tmp_path_factory.mktemp("depth-stage"))
+    for step in RECIPE.steps(bench):
+        assert not RECIPE.is_captured(bench, step)
+        capture(bench, step)
+        assert RECIPE.is_captured(bench, step)
+    return bench
+
+
+@pytest.fixture(scope="module")
+def record(bench: Bench) -> DepthStageCalibration:
+    return RECIPE.fit(bench, NoProgress())
+
+
+def copied(bench: Bench, folder: Path, without: Step) -> Bench:
+    """The campaign's captures but for one step, somewhere else."""
+    shutil.copytree(bench.folder, folder, dirs_exist_ok=True)
+    shutil.rmtree(folder / without.key)
+    return Bench(bench.devices, folder, bench.rig)
+
+
+def test_first_orders_and_depth_are_found(bench: Bench, record: DepthStageCalibration) -> None:
+    truth, found = truth_of(bench.devices), RECIPE.apply(record, bench.rig)
+    rng = np.random.default_rng(5)
+    pixels = torch.as_tensor(rng.integers(0, 112 * 72, 3000))
+    depth = torch.as_tensor(rng.uniform(600, 900, 3000))
+    column, row = zero_order(truth, pixels, depth)
+    lit = (column > 0) & (column < 639) & (row > 0) & (row < 359)
+    ours = triangulate(found, pixels, column)[0]
+    assert float((ours - depth)[lit].square().mean().sqrt()) < 2.5 * record.depth_std_mm < 0.4
+    nm = np.arange(440.0, 661.0, 20.0)
+    for order in (1, -1):
+        seen = GratingModel(truth).exact(pixels, depth, order, nm)
+        off = correspondence(found).trace(pixels, ours, order, nm).columns - seen.columns
+        assert float(off[seen.inside(640, 360) & lit].square().mean().sqrt()) < 0.02
+
+
+def test_film_lies_within_its_deviations(bench: Bench, record: DepthStageCalibration) -> None:
+    truth = truth_of(bench.devices).film
+    pulls = [
+        (getattr(record.film, name) - getattr(truth, name)) / std for name, std in record.film_std.items()
+    ]
+    assert np.sqrt(np.mean(np.square(pulls))) < 2.5
+
+
+def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibration) -> None:
+    assert DepthStageCalibration.model_validate_json(record.model_dump_json()) == record
+    assert failures(RECIPE.figures(record)) == ()
+    assert record.held_out_px < 0.1
+    assert record.frames == 2 * (20 + 2 + 128 + 1 + 128) + 6 * 41
+    assert len(record.model_dump_json()) < 100_000
+
+
+def test_finished_scan_is_not_taken_again(bench: Bench) -> None:
+    step = RECIPE.steps(bench)[FILTERED]
+    before = SessionReader(bench.step_folder(step) / SCAN_NAME).entries
+    capture(bench, step)
+    assert SessionReader(bench.step_folder(step) / SCAN_NAME).entries == before
+
+
+def test_stage_notes_where_it_was(bench: Bench) -> None:
+    notes = [(bench.step_folder(step) / NOTE_NAME).read_text() for step in RECIPE.steps(bench)]
+    assert ["850.0" in note for note in notes] == [False] * 4 + [True] * 4
+
+
+def test_a_wrong_filter_is_named(bench: Bench, tmp_path: Path) -> None:
+    step = RECIPE.steps(bench)[FILTERED]
+    other = copied(bench, tmp_path, step)
+    capture(other, step, filter_nm=560.0)
+    with pytest.raises(CalibrationError, match=r"850 mm, filter of 540 nm: .* \+(1[5-9]|2[0-4])\.\d nm off"):
+        RECIPE.fit(other, NoProgress())
+
+
+def test_a_capture_without_first_orders_is_named(bench: Bench, tmp_path: Path) -> None:
+    step = RECIPE.steps(bench)[FILTERED]
+    other = copied(bench, tmp_path, step)
+    assert other.devices.place is not None
+    other.devices.place(step.placement.model_copy(update={"film": False}))
+    RECIPE.capture(other, step, NoProgress())
+    with pytest.raises(CalibrationError, match="850 mm, filter of 540 nm: no first orders were found"):
+        RECIPE.fit(other, NoProgress())
+
+
+def test_positions_and_filters_are_needed(bench: Bench) -> None:
+    with pytest.raises(CalibrationError, match="given 1 and 3"):
+        DepthStageRecipe(positions_mm=(700.0,)).steps(bench)
