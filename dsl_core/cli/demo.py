@@ -105,7 +105,8 @@ def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
 def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Dataset) -> dict[str, float]:
     """Figures, exports and the report."""
     from dsl_core import pipeline, sessions
-    from dsl_core.cli.results import print_figures, report_content
+    from dsl_core.cli.results import print_figures
+    from dsl_core.evaluation.report_content import report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export
 

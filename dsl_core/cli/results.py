@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_format
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,9 +23,7 @@ from dsl_core.errors import DecodeError, PlanError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from dsl_core.evaluation.report import ReportContent
-    from dsl_core.evaluation.summary import Evaluation, Truth
-    from dsl_core.evaluation.verdict import Goal
+    from dsl_core.evaluation.summary import Evaluation
 
 MODELS = ("auto", "grating", "hybrid", "grid")
 DEVICES = ("cpu", "cuda", "auto")
@@ -89,6 +86,7 @@ def evaluate(
 ) -> None:
     """Compare a result with known truth, in figures and one self-contained HTML page."""
     from dsl_core import pipeline, sessions
+    from dsl_core.evaluation.report_content import report_content
     from dsl_core.evaluation.verdict import figures
     from dsl_core.io.result_file import load_result
     from dsl_core.io.staging import check_targets
@@ -165,36 +163,6 @@ def print_figures(output: Output, evaluation: Evaluation) -> None:
     from dsl_core.evaluation.verdict import verdicts
 
     output.table(("figure", "value", "unit"), [(v.figure, v.value, v.unit) for v in verdicts(evaluation)])
-
-
-def report_content(
-    title: str,
-    result: xr.Dataset,
-    truth: Truth,
-    evaluation: Evaluation,
-    summary: str = "",
-    goals: dict[str, Goal] | None = None,
-) -> ReportContent:
-    """What the report of a result says; plan and costs come from the result's attributes."""
-    from dsl_core.evaluation.cost import StageCost
-    from dsl_core.evaluation.report import ReportContent
-    from dsl_core.evaluation.verdict import verdicts
-    from dsl_core.model.plan import CapturePlan
-
-    attributes = dict(result.attrs)
-    costs = [StageCost(**cost) for cost in json_format.loads(attributes.pop("stage_costs", "[]"))]
-    plan = attributes.pop("capture_plan", None)
-    return ReportContent(
-        title,
-        result,
-        summary=summary,
-        evaluation=evaluation,
-        truth=truth,
-        verdicts=verdicts(evaluation, goals),
-        costs=costs,
-        plan=CapturePlan.model_validate_json(plan) if plan else None,
-        provenance={str(key).replace("_", " "): str(value) for key, value in attributes.items()},
-    )
 
 
 def _torch_device(name: str) -> str:

@@ -1,0 +1,24 @@
+"""Small results of the twin on disk, for tests of the Compare page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dsl_core import pipeline, sessions
+from dsl_core.devices.registry import open_rig
+from dsl_core.io.origin import rig_notes
+from dsl_core.io.result_file import save_result
+from dsl_core.model.presets import PRESETS
+
+QUICK = next(preset.plan for preset in PRESETS if preset.key == "quick")
+
+
+def make_result(folder: Path, name: str, scene: str = "color-checker", size: str = "64x48") -> Path:
+    """Scan a scene of the twin quickly and save its result."""
+    options = {"scene": scene, "size": size}
+    with open_rig("twin", options) as rig:
+        session = folder / f"{name}.dsl"
+        pipeline.scan(rig, pipeline.fit_plan(QUICK, rig), session, notes=rig_notes("twin", options))
+    target = folder / f"{name}.zarr"
+    save_result(sessions.reconstruct_session(session), target)
+    return target
