@@ -14,6 +14,7 @@ from dsl_core.calibration.line_samples import LineFrames
 from dsl_core.calibration.peaks import find_coarsely, find_shifts
 from dsl_core.calibration.plane_refinement import PlaneRefinement, refine_planes
 from dsl_core.calibration.residual import choose_residual
+from dsl_core.calibration.stage_grid import fit_stage_grid
 from dsl_core.calibration.tiles import ColumnSamples
 from dsl_core.errors import CalibrationError
 from dsl_core.model.depth_stage import DepthStageCalibration, FilterSeen, StagePosition
@@ -31,7 +32,7 @@ FINE_ROUNDS = 2
 #: Tiles, of both orders together, that a capture needs.
 MIN_TILES = 40
 #: A filter's light lies this far (px) from where all others say it should: another filter, a tilted one.
-WRONG_PX, OFF_PX = 3.0, 0.5
+WRONG_PX, OFF_PX = 2.0, 0.5
 #: Doubt about a filter: this far off (px).
 DOUBT_PX = 0.15
 
@@ -66,10 +67,12 @@ class StageData:
         return f"{self.positions_mm[position]:g} mm, filter of {self.filters[filter].filter_nm:g} nm"
 
 
-def calibrate_depth_stage(rig: Rig, data: StageData, progress: Progress) -> DepthStageCalibration:
+def calibrate_depth_stage(
+    rig: Rig, data: StageData, progress: Progress, grid: bool = False
+) -> DepthStageCalibration:
     """Refine lenses and pose by planes, and fit the film and its residual to first orders on them.
 
-    The rig's `geometry_covariance` is the prior of its geometry, which stays as it is without one. Raises
+    With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the prior of its geometry, which stays as it is without one. Raises
     `CalibrationError` that names the position or the filter that does not fit.
     """
     progress.report("planes", 0, 1)
@@ -102,6 +105,7 @@ def calibrate_depth_stage(rig: Rig, data: StageData, progress: Progress) -> Dept
         filters=seen,
         residual=residual,
         held_out=held_out,
+        correspondence=fit_stage_grid(fitted, samples).grid if grid else None,
         frames=data.exposures,
         warnings=tuple(_warnings(data, seen)),
     )

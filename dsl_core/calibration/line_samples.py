@@ -25,7 +25,7 @@ NEAR_NM = 4.0
 #: Light must come from this far inside the projector's frame (px), so that no part of the profile is cut.
 COLUMN_MARGIN_PX, ROW_MARGIN_PX = 8.0, 3.0
 #: Pixels used of one capture at most, and pixels that a tile needs.
-MAX_PIXELS, MIN_PIXELS = 80_000, 6
+MAX_PIXELS, MIN_PIXELS = 140_000, 6
 
 
 @dataclass(frozen=True)

@@ -139,13 +139,18 @@ def find_coarsely(
     power, signal = profile(light**2 / near.variance), profile(light * near.value / near.variance)
     level = np.divide(signal, power, out=np.zeros_like(signal), where=power > 0)
     best = np.where(power > 0.2 * power.max(1, keepdims=True), level, -np.inf).argmax(1)
-    rows = np.arange(count)
+    rows, place = np.arange(count), np.arange(bins)
+    # Between lines far apart the level is flat: the middle of what is bright, not its first place.
+    bright = (level - 0.5 * level[rows, best][:, None]).clip(0) * (
+        np.abs(place - best[:, None]) < len(kernel)
+    )
+    middle = (bright * place).sum(1) / bright.sum(1).clip(1e-30)
     sigmas = (level[rows, best] - np.median(level, 1)) * np.sqrt(power[rows, best])
     chosen, at = paths.middle
     # A peak at the end of the search is the flank of something else.
     good = (sigmas[chosen] > LIT_SIGMAS) & (np.abs(best[chosen] - SEARCH_PX) < SEARCH_PX - 3)
-    width = np.full(int(good.sum()), frames.lines.width_px / 2 + frames.lines.step_px / 4)
-    return _shifts(paths, template, chosen[good], at[good], best - SEARCH_PX, width)
+    width = np.full(int(good.sum()), 1 + frames.lines.step_px / 8)
+    return _shifts(paths, template, chosen[good], at[good], middle - SEARCH_PX, width)
 
 
 def _shifts(

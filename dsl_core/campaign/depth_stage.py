@@ -53,7 +53,8 @@ class DepthStageRecipe:
     ``positions_mm`` are those of the stage, ``stage_std_mm`` how well it keeps them; ``filters_nm`` are
     nominal centres of bandpass filters. ``code_step_px`` is the step of the lines without filter, at most 5;
     ``filter_step_px`` that of the lines through filters, which may lie far apart. ``reflectance`` is the
-    target's; ``chain`` corrects the product of response, emission and efficiency by it.
+    target's; ``chain`` corrects the product of response, emission and efficiency by it; ``grid``
+    adds the data-driven model of the seed, which needs three positions.
     """
 
     positions_mm: tuple[float, ...] = (600.0, 750.0, 900.0)
@@ -63,6 +64,7 @@ class DepthStageRecipe:
     stage_std_mm: float = 0.02
     reflectance: float = 0.99
     chain: bool = True
+    grid: bool = False
 
     @property
     def name(self) -> str:
@@ -155,7 +157,7 @@ class DepthStageRecipe:
             frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
             exposures=sum(_scan(bench, step).plan.shot_count for step in steps),
         )
-        found = calibrate_depth_stage(bench.rig, data, progress)
+        found = calibrate_depth_stage(bench.rig, data, progress, self.grid)
         if not self.chain:
             return found
         return found.model_copy(update={"chain": self._chain(bench, plain, found, progress)})
