@@ -188,7 +188,8 @@ class RunBox(QGroupBox):
         self.pause.setEnabled(phase in (Phase.RUNNING, Phase.PAUSED))
         self.cancel.setEnabled(phase.is_busy and phase is not Phase.STOPPING)
         self.renew.setVisible(session is not None and not phase.is_busy)
-        self._phase.setText(f"● {phase.value}")
+        ready = phase is not Phase.PLANNING or not obstacles
+        self._phase.setText(f"● {phase.value}" if ready else "● not ready")
         set_role(self._phase, _PHASE_ROLES.get(phase, "muted"))
         lines = list(obstacles)
         if session is not None and not phase.is_busy:

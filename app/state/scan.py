@@ -45,7 +45,7 @@ class CalibrationChoice:
     @property
     def text(self) -> str:
         """Name and date as people read them."""
-        where = self.name if self.key else f"{self.name} (the rig's own)"
+        where = self.name if self.key or self == OWN_CALIBRATION else f"{self.name} (the rig's own)"
         return f"{where}, {self.date[:10]}" if self.date else where
 
 

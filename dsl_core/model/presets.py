@@ -53,12 +53,6 @@ PRESETS: tuple[Preset, ...] = (
         _plan("comb", LineComb(), _DARK, _BRIGHT),
     ),
     Preset(
-        "wide-comb",
-        "Wide comb",
-        "Combs with half as many lines: orders of neighbouring lines overlap less.",
-        _plan("wide-comb", LineComb(period_px=212), _DARK, _BRIGHT),
-    ),
-    Preset(
         "quick",
         "Quick",
         "Single lines at one setting, each beside the last.",

@@ -1,0 +1,198 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from app.jobs.qt_runner import QtRunner
+from app.panels.scan_page import ScanPage
+from app.state.scan import Phase
+from app.theme import LIGHT
+from dsl_core.errors import DeviceError
+from dsl_core.evaluation.operating_points import load_operating_points
+from dsl_core.io.session import SessionReader
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import LineComb
+from dsl_core.model.presets import PRESETS
+from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.scan_bench import TWIN, ScanBench, make_bench
+
+Bench = tuple[ScanPage, ScanBench, list[Path]]
+
+
+@pytest.fixture
+def ready(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
+    runner = QtRunner()
+    bench = make_bench(tmp_path, runner)
+    opened: list[Path] = []
+    page = ScanPage(bench.state, bench.scans, load_operating_points(), opened.append)
+    qtbot.addWidget(page)
+    page.apply_theme(LIGHT)
+    page.resize(1200, 800)
+    page.show()
+    bench.rig.connect(TWIN)
+    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=20_000)
+    bench.plan()
+    qtbot.waitUntil(lambda: runner.active == ())
+    yield page, bench, opened
+    page.release()
+    runner.shut_down()
+
+
+def click(button: object) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)  # type: ignore[call-overload]
+
+
+def in_phase(bench: ScanBench, phase: Phase) -> Callable[[], bool]:
+    return lambda: bench.state.phase.value is phase
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    snap = SimCamera.snap
+
+    def slowly(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        time.sleep(0.01)
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", slowly)
+
+
+def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path: Path) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(page.run.pause.isEnabled, timeout=20_000)
+    assert not page.plan.isEnabled()
+    click(page.run.pause)
+    qtbot.waitUntil(in_phase(bench, Phase.PAUSED), timeout=20_000)
+    assert page.run.pause.text() == "&Go on"
+    click(page.run.pause)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert page.plan.isEnabled()
+    assert "75 of 75" in page.run._what.text()
+
+
+def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(lambda: bench.state.status.value.done > 3, timeout=20_000)
+    click(page.run.cancel)
+    qtbot.waitUntil(in_phase(bench, Phase.STOPPED), timeout=2_000)
+    assert page.run.start.text() == "&Resume scan"
+    assert page.run.renew.isVisible()
+    click(page.run.start)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+
+
+def test_a_second_scan_is_refused_in_a_sentence(qtbot: QtBot, ready: Bench, slow: None) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    assert not page.run.start.isEnabled()
+    bench.scans.start()
+    assert "A scan is running" in bench.notifier.told[-1][1]
+    assert bench.scans.open(Path("x.dsl")) is False
+
+
+def test_a_lost_camera_is_said_over_the_page(
+    qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, bench, _ = ready
+
+    def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        raise DeviceError("The camera sent no frame. Check its cable.")
+
+    with monkeypatch.context() as lost:
+        lost.setattr(SimCamera, "snap", silent)
+        click(page.run.start)
+        qtbot.waitUntil(in_phase(bench, Phase.LOST), timeout=20_000)
+    assert page.banner.isVisible()
+    assert "Check its cable" in page.banner.text
+    click(page.banner.action)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert not page.banner.isVisible()
+
+
+def test_closing_the_window_during_a_scan_loses_no_frame(qtbot: QtBot, tmp_path: Path, slow: None) -> None:
+    runner = QtRunner()
+    bench = make_bench(tmp_path, runner)
+    bench.rig.connect(TWIN)
+    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=20_000)
+    bench.plan()
+    bench.scans.start()
+    seen = 0
+
+    def begun() -> bool:
+        nonlocal seen
+        bench.scans.take_news()
+        seen = bench.state.status.value.done
+        return seen > 2
+
+    qtbot.waitUntil(begun, timeout=20_000)
+    bench.scans.pause()
+    runner.shut_down()
+    reader = SessionReader(tmp_path / "first.dsl")
+    assert len(list(reader.plan.shots())) - len(reader.missing()) >= seen
+
+
+def test_the_marker_snaps_to_the_nearest_plan(qtbot: QtBot, ready: Bench) -> None:
+    page, bench, _ = ready
+    spots = page.curve._spots()
+    at = spots["reference"]
+    page.curve.marker.setPos(at[0] + 0.02, at[1])
+    page.curve.marker.sigPositionChangeFinished.emit(page.curve.marker)
+    assert bench.state.preset is PRESETS[-1]
+    assert page.plan.preset.currentData() == "reference"
+    page.curve.marker.setPos(at[0] + 0.01, at[1])
+    page.curve.marker.sigPositionChangeFinished.emit(page.curve.marker)
+    assert page.curve.marker.pos() == QPointF(*at)
+
+
+def test_every_preset_has_a_measured_point() -> None:
+    assert set(load_operating_points().points) == {preset.key for preset in PRESETS}
+
+
+def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
+    page, bench, _ = ready
+    page.plan.step.setValue(3)
+    spectral = bench.state.plan.value.spectral
+    assert isinstance(spectral, LineComb)
+    assert (spectral.step_px, spectral.period_px) == (3, 105)
+    assert page.plan.period.value() == 105
+    assert page.plan.preset.currentText() == "Own plan"
+    assert not page.curve.marker.isVisible()
+
+
+def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
+    page, bench, _ = ready
+    exposure, _ = page.plan.settings._rows[0]
+    exposure.setValue(60.0)
+    assert bench.state.plan.value.settings[0].exposure_ms == pytest.approx(4 * 1000 / 60)
+    assert exposure.value() == pytest.approx(66.7)
+    page.plan.settings._add()
+    assert len(page.plan.settings._rows) == 2
+    assert bench.state.plan.value.code_settings == (0, 1)
+    page.plan.settings._remove(0)
+    assert len(bench.state.plan.value.settings) == 1
+
+
+def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> None:
+    page, _, _ = ready
+    page.plan.step.setValue(9)
+    assert not page.run.start.isEnabled()
+    assert "leave columns between them dark" in page.run._text.text()
+
+
+def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    QTest.keyClick(page.picture, Qt.Key.Key_Right)
+    QTest.keyClick(page.picture, Qt.Key.Key_Down)
+    assert bench.state.cursor.value == (36, 28)
+    assert "Intensity graph at 36, 28" in page.graph._title.text()
