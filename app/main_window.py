@@ -67,7 +67,7 @@ class MainWindow(QMainWindow):
         self._makers = pages
         self._made: dict[str, PageWidget] = {}
         self.toasts = Toasts(self)
-        self.rail = Rail(PAGES)
+        self.rail = Rail([page for page in PAGES if page.key in pages])
         self.rail.chosen.connect(self.open_page)
         self.stack = QStackedWidget()
         self._lay_out()
@@ -97,7 +97,9 @@ class MainWindow(QMainWindow):
                 menus[action.menu] = self.menuBar().addMenu(f"&{action.menu}")
             if action.separator:
                 menus[action.menu].addSeparator()
-            menus[action.menu].addAction(self._make_action(action))
+            made = self._make_action(action)
+            made.setVisible(action.key.removeprefix("page_") in self._makers or "page_" not in action.key)
+            menus[action.menu].addAction(made)
 
     def _make_action(self, action: Action) -> QAction:
         made = QAction(action.text, self)
@@ -159,7 +161,7 @@ class MainWindow(QMainWindow):
 
     def open_path(self, path: Path) -> None:
         """Open a file or folder on the page that knows it."""
-        order = [self.page, *(page.key for page in PAGES if page.key != self.page)]
+        order = [self.page, *(key for key in self._makers if key != self.page)]
         for key in order:
             if key not in self._made:
                 self._made[key] = self._makers[key](self)

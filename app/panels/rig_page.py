@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import (
@@ -33,16 +33,16 @@ _ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED
 class RigPage(PageWidget):
     """Follows a `RigState` and asks a controller."""
 
-    def __init__(self, state: RigState, commands: RigCommands, rigs: list[tuple[str, str]]) -> None:
-        """``rigs`` are names and descriptions of the rigs that are installed."""
+    def __init__(self, state: RigState, commands: RigCommands, rigs: Sequence[str]) -> None:
+        """``rigs`` are the names of the rigs that are installed."""
         super().__init__()
         self._state, self._commands = state, commands
         self._stops: list[Callable[[], None]] = []
         self.live = LiveView()
         self.projector = ProjectorPanel()
         self._rig = ChoiceBox("Rig", "The rig to connect")
-        for name, description in rigs:
-            self._rig.addItem(f"{name} – {description}" if description else name, name)
+        for name in rigs:
+            self._rig.addItem(name, name)
         self._options = QLineEdit(" ".join(f"{key}={value}" for key, value in state.choice.value.options))
         self._options.setAccessibleName("Options of the rig")
         self._options.setPlaceholderText("scene=color-checker size=445x290")

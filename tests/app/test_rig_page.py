@@ -23,7 +23,7 @@ Bench = tuple[RigPage, RigState, QtRunner, RecordingNotifier]
 def bench(qtbot: QtBot) -> Iterator[Bench]:
     state = RigState(RigChoice("twin", (("scene", "plane"), ("size", "64x48"))))
     runner, notifier = QtRunner(), RecordingNotifier()
-    page = RigPage(state, RigController(state, runner, notifier), [("replay", ""), ("twin", "the twin")])
+    page = RigPage(state, RigController(state, runner, notifier), ["replay", "twin"])
     qtbot.addWidget(page)
     page.apply_theme(LIGHT)
     page.show()

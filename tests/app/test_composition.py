@@ -1,0 +1,69 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.application import make_window
+from app.composition import Composition, Wish
+from app.main_window import MainWindow
+from app.state.rig import Link, RigChoice
+
+TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
+
+
+@pytest.fixture
+def composed(qtbot: QtBot, tmp_path: Path) -> tuple[Composition, MainWindow]:
+    composition = Composition(Wish(TWIN))
+    window = make_window(composition.pages, tmp_path)
+    qtbot.addWidget(window)
+    window.show()
+    return composition, window
+
+
+def test_the_rig_is_connected_once_the_window_is_there(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow]
+) -> None:
+    composition, window = composed
+    composition.start(window)
+    rig = composition.rig(window)
+    assert rig.state.link.value is Link.CLOSED
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
+
+
+def test_every_page_opens_in_both_themes(composed: tuple[Composition, MainWindow]) -> None:
+    composition, window = composed
+    for theme in ("light", "dark"):
+        window.do(f"theme_{theme}")
+        for key in composition.pages:
+            window.do(f"page_{key}")
+            assert window.page == key
+
+
+def test_the_rig_is_remembered(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow], tmp_path: Path
+) -> None:
+    composition, window = composed
+    rig = composition.rig(window)
+    rig.connect(RigChoice("twin", (("scene", "box"), ("size", "64x48"))))
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
+    window.close()
+    assert '"scene": "box"' in (tmp_path / "settings.json").read_text()
+
+
+def test_starting_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, app.application, app.composition;"
+        "print([m for m in ('torch', 'scipy', 'cv2', 'xarray', 'zarr', 'pyvista') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_program_says_how_it_is_called() -> None:
+    done = subprocess.run([sys.executable, "-m", "app", "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "--rig" in done.stdout
