@@ -18,6 +18,8 @@ from dsl_core.model.presets import PRESETS
 
 #: Points that are always named; the others only while they are chosen or pointed at.
 NAMED = ("preview", "balanced", "reference")
+#: Names closer than this share of the axis would overlap.
+NEAR = 0.15
 TITLES = {preset.key: preset.title for preset in PRESETS}
 
 
@@ -127,13 +129,22 @@ class OperatingCurve(QWidget):
             [{"pos": at, "data": key, "brush": theme.accent, "pen": theme.base} for key, at in spots.items()]
         )
         self._set_ranges(spots, figure.wanted)
-        for key in {*NAMED, self._current} & set(spots):
+        for key in self._named(spots):
             self._name(key, spots)
         self._own.setPos(self._own_s / 60)
         self._own.setVisible(self._current not in spots)
         self.marker.setVisible(self._current in spots)
         if self._current in spots:
             self._place_marker(spots)
+
+    def _named(self, spots: dict[str, tuple[float, float]]) -> list[str]:
+        """Points with names; the one at hand pushes out those beside it."""
+        current, right = spots.get(self._current), max(x for x, _ in spots.values())
+        others = [
+            key for key in NAMED
+            if key in spots and (current is None or abs(spots[key][0] - current[0]) > NEAR * right)
+        ]  # fmt: skip
+        return others if current is None else [*others, self._current]
 
     def _set_ranges(self, spots: dict[str, tuple[float, float]], wanted: float) -> None:
         right = max(*(x for x, _ in spots.values()), self._own_s / 60)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DeviceError
+from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.describe import describe_shot
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.progress import CancelToken
 
 PatternImage = Callable[[CapturePlan, Shot], NDArray[np.uint8]]
 
@@ -44,13 +45,19 @@ class ShotTaker:
     """Takes shots with a rig and remembers what projector and camera are set to."""
 
     def __init__(
-        self, rig: DeviceRig, plan: CapturePlan, pattern_image: PatternImage, policy: RetryPolicy
+        self,
+        rig: DeviceRig,
+        plan: CapturePlan,
+        pattern_image: PatternImage,
+        policy: RetryPolicy,
+        token: CancelToken | None = None,
     ) -> None:
-        """Keep the parts; nothing is sent to the devices yet."""
+        """Keep the parts; nothing is sent to the devices yet. A cancelled ``token`` ends further attempts."""
         self._rig = rig
         self._plan = plan
         self._pattern_image = pattern_image
         self._policy = policy
+        self._token = token or CancelToken()
         self._sleep = rig.sleep or time.sleep
         self._shown: tuple[object, ...] | None = None
         self._exposure_ms: float | None = None
@@ -58,7 +65,7 @@ class ShotTaker:
         self._noiseless = False
 
     def take(self, shot: Shot) -> Frame:
-        """The frame of a shot; raises `DeviceError` when all attempts failed."""
+        """The frame of a shot; raises `DeviceError` when all attempts failed, or `Cancelled`."""
         before = self._last
         twins: list[Frame] = []
         for attempt in range(self._policy.attempts):
@@ -134,6 +141,10 @@ class ShotTaker:
 
     def _recover(self, shot: Shot, attempt: int, error: DeviceError) -> None:
         """Get ready for another attempt, or give up with a clear sentence."""
+        if self._token.is_cancelled:
+            raise Cancelled(
+                f"Cancelled while {describe_shot(shot)} failed: {error} Everything before it is stored."
+            ) from error
         if attempt + 1 >= self._policy.attempts:
             raise DeviceError(
                 f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {error}"

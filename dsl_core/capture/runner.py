@@ -47,9 +47,9 @@ class Runner:
         self._rig = rig
         self._plan = plan
         self._sink = sink
-        self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy())
-        self._progress = progress or NoProgress()
         self._token = token or CancelToken()
+        self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token)
+        self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []

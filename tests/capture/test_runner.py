@@ -355,3 +355,22 @@ def test_a_runner_runs_once(rig: DeviceRig, plan: CapturePlan, pattern: Pattern)
 def test_a_frame_not_taken_is_named(plan: CapturePlan) -> None:
     with pytest.raises(StoreError, match=r"Frame 0 .* has not been taken"):
         MemorySink(plan).read(next(plan.shots()))
+
+
+def test_cancelling_a_silent_camera_spares_the_other_attempts(
+    rig: DeviceRig, bench: Any, plan: CapturePlan, pattern: Pattern
+) -> None:
+    sink = MemorySink(plan)
+    runner = Runner(rig, plan, sink, pattern)
+
+    def silent(shot: int, attempt: int) -> None:
+        if shot == 4:
+            runner.cancel()
+            raise DeviceError("No light.")
+
+    bench.before_snap = silent
+    with pytest.raises(Cancelled, match="No light"):
+        runner.run()
+    assert [attempt for shot, attempt in bench.snapped if shot == 4] == [0]
+    assert runner.status.state is State.CANCELLED
+    assert len(sink.frames) == 4
