@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from dsl_core.errors import DslError
 
 if TYPE_CHECKING:
     from app.panels.rig_page import RigPage
+    from app.state.scan import ScanState
 
 _log = logging.getLogger(__name__)
 IDENTIFY_MS = 3000
@@ -51,6 +53,8 @@ class Composition(QObject):
             "rig": self._rig_page,
             "scan": self._scan_page,
             "results": self._results_page,
+            "compare": self._compare_page,
+            "compare": self._compare_page,
         }
 
     def start(self, window: MainWindow) -> None:
@@ -96,14 +100,18 @@ class Composition(QObject):
 
     def _scan_page(self, window: MainWindow) -> PageWidget:
         from app.controllers.scan import ScanController
+        from app.controllers.scan_words import fresh_target
         from app.panels.scan_page import ScanPage
-        from app.state.scan import ScanState
+        from app.state.scan import Phase, ScanState
         from dsl_core.evaluation.operating_points import load_operating_points
         from dsl_core.model.plan import CapturePlan
 
         parts = window.parts
         folder = Path(parts.settings.output_folder or Path.home() / "dsl-scans")
-        state = ScanState(CapturePlan(), folder / "scan.dsl")
+        state = ScanState(CapturePlan(), fresh_target(folder, datetime.now()))
+        state.phase.changed.connect(
+            lambda phase: _remember_folder(window, state) if phase is Phase.DONE else None
+        )
         controller = ScanController(state, self.rig(window), parts.runner, window.toasts, parts.undo)
         try:
             points = load_operating_points()
@@ -122,6 +130,26 @@ class Composition(QObject):
         parts, state = window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
         page = ResultsPage(state, controller, parts.runner)
+        page.apply_theme(window.theme)
+        return page
+
+    def _compare_page(self, window: MainWindow) -> PageWidget:
+        from app.controllers.compare import CompareController
+        from app.panels.compare_page import ComparePage
+        from app.state.compare import CompareState
+
+        state = CompareState()
+        page = ComparePage(state, CompareController(state, window.parts.runner, window.toasts))
+        page.apply_theme(window.theme)
+        return page
+
+    def _compare_page(self, window: MainWindow) -> PageWidget:
+        from app.controllers.compare import CompareController
+        from app.panels.compare_page import ComparePage
+        from app.state.compare import CompareState
+
+        state = CompareState()
+        page = ComparePage(state, CompareController(state, window.parts.runner, window.toasts))
         page.apply_theme(window.theme)
         return page
 
@@ -174,3 +202,7 @@ class Composition(QObject):
 def _remember(window: MainWindow, choice: RigChoice) -> None:
     window.parts.settings.rig = choice.name
     window.parts.settings.rig_options = dict(choice.options)
+
+
+def _remember_folder(window: MainWindow, state: ScanState) -> None:
+    window.parts.settings.output_folder = str(state.target.value.parent)
