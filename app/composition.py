@@ -54,7 +54,6 @@ class Composition(QObject):
             "scan": self._scan_page,
             "results": self._results_page,
             "compare": self._compare_page,
-            "compare": self._compare_page,
         }
 
     def start(self, window: MainWindow) -> None:
@@ -130,16 +129,6 @@ class Composition(QObject):
         parts, state = window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
         page = ResultsPage(state, controller, parts.runner)
-        page.apply_theme(window.theme)
-        return page
-
-    def _compare_page(self, window: MainWindow) -> PageWidget:
-        from app.controllers.compare import CompareController
-        from app.panels.compare_page import ComparePage
-        from app.state.compare import CompareState
-
-        state = CompareState()
-        page = ComparePage(state, CompareController(state, window.parts.runner, window.toasts))
         page.apply_theme(window.theme)
         return page
 
