@@ -72,8 +72,9 @@ def calibrate_depth_stage(
 ) -> DepthStageCalibration:
     """Refine lenses and pose by planes, and fit the film and its residual to first orders on them.
 
-    With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the prior of its geometry, which stays as it is without one. Raises
-    `CalibrationError` that names the position or the filter that does not fit.
+    With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the
+    prior of its geometry, which stays as it is without one. Raises `CalibrationError` that names the position
+    or the filter that does not fit.
     """
     progress.report("planes", 0, 1)
     covariance = None

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.film import FIELDS, OrderSamples, fit_film, grating_columns
 from dsl_core.calibration.peaks import TileShifts
 from dsl_core.calibration.residual import choose_residual, correction_px, fit_residual
+from dsl_core.calibration.stage_grid import fit_stage_grid
 from dsl_core.calibration.tiles import tile_of_pixels
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
@@ -142,6 +143,28 @@ def test_hybrid_model_adds_the_correction() -> None:
     # The zero order has nothing to correct.
     zero = model.trace(pixels, depth, 0, wavelengths).columns
     np.testing.assert_allclose(zero, GratingModel(rig).trace(pixels, depth, 0, wavelengths).columns)
+
+
+def test_grid_of_the_seed_follows_from_the_same_samples() -> None:
+    rig = small_rig()
+    samples = one_a_tile(samples_of(rig, 0.0))
+    fit = fit_stage_grid(rig, samples)
+    assert fit.grid.depth_range_mm == (600.0, 900.0)
+    model = correspondence(rig.model_copy(update={"correspondence": fit.grid}), "grid")
+    part = samples.only((samples.order == -1) & (samples.filter == 1) & (samples.position == 1))
+    pixels, depth = torch.as_tensor(part.pixel), torch.as_tensor(part.depth_mm)
+    columns = model.trace(pixels, depth, -1, np.array([540.0])).columns[0].numpy()
+    # Nodes at the rim, which fewer than three depths reach, are extrapolated.
+    assert np.median(np.abs(columns - part.column_px)) < 0.02
+    assert len(fit.grid.model_dump_json()) < 1_000_000
+
+
+def one_a_tile(samples: OrderSamples) -> OrderSamples:
+    """The first sample of each tile of each capture."""
+    keys = np.stack([samples.position, samples.filter, samples.order, samples.tile], 1)
+    first = np.zeros(len(samples), bool)
+    first[np.unique(keys, axis=0, return_index=True)[1]] = True
+    return samples.only(first)
 
 
 def test_hybrid_model_needs_a_residual() -> None:
