@@ -9,10 +9,10 @@ import pytest
 from app.controllers.scan_plan import connect_first
 from app.state.scan import Phase
 from dsl_core.cli.options import PlanChoice
-from dsl_core.errors import DeviceError
-from dsl_core.io.session import SessionReader
+from dsl_core.errors import DeviceError, StoreError
+from dsl_core.io.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
-from dsl_core.model.plan import LineComb
+from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.scan_bench import SHORT, TWIN, ScanBench, make_bench
@@ -232,3 +232,23 @@ def test_the_command_line_makes_the_same_plan(bench: ScanBench, preset: object, 
     assert [s.exposure_ms for s in made.settings] == pytest.approx(
         [s.exposure_ms for s in wanted.settings], rel=1e-11
     )
+
+
+def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    write = SessionWriter.write
+
+    def full(self: SessionWriter, shot: Shot, frame: Frame) -> None:
+        if shot.index >= 20:
+            raise StoreError("The disk is full. Free some space.")
+        write(self, shot, frame)
+
+    with monkeypatch.context() as filling:
+        filling.setattr(SessionWriter, "write", full)
+        bench.scans.start()
+    assert phase(bench) is Phase.LOST
+    assert "The disk is full" in bench.state.trouble.value
+    assert "20 of 75 frames are safe" in bench.state.trouble.value
+    bench.scans.start()
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
