@@ -154,8 +154,9 @@ def test_grid_of_the_seed_follows_from_the_same_samples() -> None:
     part = samples.only((samples.order == -1) & (samples.filter == 1) & (samples.position == 1))
     pixels, depth = torch.as_tensor(part.pixel), torch.as_tensor(part.depth_mm)
     columns = model.trace(pixels, depth, -1, np.array([540.0])).columns[0].numpy()
-    # Nodes at the rim, which fewer than three depths reach, are extrapolated.
-    assert np.median(np.abs(columns - part.column_px)) < 0.02
+    assert fit.rms_px < 0.002
+    # Half of the nodes are reached by fewer than three depths; what is extrapolated there bends the splines.
+    assert np.median(np.abs(columns - part.column_px)) < 0.1
     assert len(fit.grid.model_dump_json()) < 1_000_000
 
 
