@@ -25,6 +25,9 @@ SHARED = 2 * LENS + 6
 OUTLIER_SIGMAS, MAX_ROUNDS = 4.0, 12
 #: Before that, corners weigh less the farther off they are, from this many deviations on.
 CAUCHY_SIGMAS, ROBUST_ROUNDS = 2.0, 3
+#: Deviations stated over those that the scatter of corners explains: eight drawn rigs with noise, 145 rows of
+#: pixels, came out 1.18 times as far off.
+MARGIN = 1.2
 CAMERA, PROJECTOR, STEREO = slice(0, LENS), slice(LENS, 2 * LENS), slice(2 * LENS, SHARED)
 
 
@@ -216,8 +219,8 @@ def _summary(
 ) -> Adjustment:
     """The fit with its covariance, which allows for the errors of a corner being correlated.
 
-    A wrong corner in the camera picture is looked up at a wrong place in the code, so that its camera and
-    projector errors go together: the covariance sums over corners, not over coordinates (Huber's sandwich).
+    Where a board is badly printed or not flat, all errors of a corner go together: the covariance sums over
+    corners, not over coordinates (Huber's sandwich).
     """
     camera, projector, camera_jac, projector_jac = problem.evaluate(parameters)
     errors = np.concatenate([camera / sigmas[0], projector / sigmas[1]], 1)[used]
@@ -226,10 +229,11 @@ def _summary(
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0] = 1
     inverse = np.linalg.pinv((rows / scale).T @ (rows / scale), hermitian=True) / np.outer(scale, scale)
-    pulls = np.einsum("nk,nkp->np", errors, slopes)
-    # Parameters take freedom from the residuals.
-    freed = len(rows) / max(len(rows) - len(parameters), 1)
-    covariance = freed * inverse @ (pulls.T @ pulls) @ inverse
+    # A corner draws the fit towards itself: without it, its errors would be larger (Bell and McCaffrey 2002).
+    leverage = np.einsum("nkp,pq,nlq->nkl", slopes, inverse, slopes)
+    unseen = np.linalg.solve((1 + 1e-6) * np.eye(4) - leverage, errors[..., None])[..., 0]
+    pulls = np.einsum("nk,nkp->np", unseen, slopes)
+    covariance = MARGIN**2 * inverse @ (pulls.T @ pulls) @ inverse
     return Adjustment(parameters, covariance, camera, projector + problem.carried(camera), used)
 
 

@@ -20,7 +20,7 @@ from dsl_core.optics.sensor import bayer_channels
 Floats = NDArray[np.float64]
 
 #: Pixels within this share of the distance between corners tell of a corner, and at most so many pixels.
-REACH, MIN_REACH_PX, MAX_REACH_PX = 0.45, 3.0, 16.0
+REACH, MIN_REACH_PX, MAX_REACH_PX = 0.6, 3.0, 16.0
 ROUNDS = 12
 #: Blur: at the start, and at least; below, the square of a pixel hides it.
 START_BLUR_PX, MIN_BLUR_PX = 0.5, 0.12

@@ -31,6 +31,8 @@ from dsl_core.patterns.gray_code import DecodedCode
 
 Floats = NDArray[np.float64]
 
+#: Colours of a mosaic are made even over so many squares, of which half are black.
+EVEN_SQUARES = 2.0
 #: Share of the corners around which the code must be readable.
 MIN_READ = 0.4
 
@@ -101,15 +103,26 @@ def refine_corners(frames: PoseFrames, corners: Corners, board: Board) -> tuple[
     Corners whose edges cannot be told stay where they were.
     """
     along = _steps_px(corners, board)
-    light = np.asarray(frames.white, np.float32) - np.asarray(frames.black, np.float32)
+    light = _full_light(frames)
     if frames.bayer is not None:
-        light = even_mosaic(light, frames.bayer, 0.5 * float(np.linalg.norm(along, axis=2).mean()))
+        light = even_mosaic(light, frames.bayer, EVEN_SQUARES * float(np.linalg.norm(along, axis=2).mean()))
     grey = grey_of(light)
     grey[saturated(frames)] = np.nan
     gap = 0.5 * (1 - board.marker_mm / board.square_mm) if isinstance(board, Charuco) else 1.0
     found = fit_corners(grey, corners.points_px, along, gap)
     points = np.where(np.isfinite(found.points_px), found.points_px, corners.points_px)
     return Corners(corners.ids, points), float(np.median(found.blur_px))
+
+
+def _full_light(frames: PoseFrames) -> NDArray[np.float32]:
+    """The board in white light, from all pictures: pattern and inverse add up to it, with less noise."""
+    total = np.array(frames.white, np.float32)
+    for picture in frames.pairs:
+        total += picture
+    pairs = len(frames.pairs) // 2
+    return np.asarray(
+        total / (pairs + 1) - np.asarray(frames.black, np.float32) * ((2 * pairs + 1) / (pairs + 1))
+    )
 
 
 def _steps_px(corners: Corners, board: Board) -> Floats:

@@ -16,7 +16,7 @@ FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
 FINE_NM.setflags(write=False)
 
 #: Rays into a pixel on an edge, which tell the shares of its two materials.
-EDGE_RAYS = 64
+EDGE_RAYS = 256
 
 
 @dataclass(frozen=True)

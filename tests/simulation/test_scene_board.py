@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from dsl_core.calibration.projector_corners import refine_corners
 from dsl_core.calibration.targets import find_corners
 from dsl_core.errors import PlanError
 from dsl_core.model.board import Charuco, corner_positions_mm
+from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.optics.pinhole import project
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scene_board import INK, PAPER, printed_board
@@ -59,7 +61,9 @@ def test_corners_are_found_where_the_pose_puts_them(marker_mm: float) -> None:
     turned = {"x_mm": 20.0, "y_mm": -5.0, "tilt_x_deg": 12.0, "tilt_y_deg": -8.0, "roll_deg": 6.0}
     truth = see(marker_mm=marker_mm, **turned)
     printed = printed_board(11, 7, 20.0, marker_mm, "DICT_5X5_100")
-    found = find_corners(albedo(truth).astype(np.float32), printed, "the twin")
+    picture = albedo(truth).astype(np.float32)
+    frames = PoseFrames("the twin", [], picture, np.zeros_like(picture))
+    found, _ = refine_corners(frames, find_corners(picture, printed, "the twin"), printed)
     flat = corner_positions_mm(printed)
     x, y = (flat - flat.mean(0))[found.ids, :2].T
     a, b, c = np.radians([12.0, -8.0, 6.0])
@@ -78,7 +82,7 @@ def test_corners_are_found_where_the_pose_puts_them(marker_mm: float) -> None:
         # A checkerboard is the same from both ends.
         ends = np.linalg.norm(found.points_px[0] - expected[[0, -1]], axis=1)
         expected = expected if ends[0] < ends[1] else expected[::-1]
-    assert np.abs(found.points_px - expected).max() < 0.2
+    assert np.abs(found.points_px - expected).max() < 0.05
 
 
 def test_a_black_square_is_in_the_corner_and_the_margin_is_white() -> None:
