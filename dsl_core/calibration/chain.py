@@ -57,8 +57,9 @@ ROUNDS = 2
 #: Parts of the image (down, across) between which the scatter is taken.
 PARTS = (3, 4)
 MIN_PIXELS = 50
-#: What bands of finite width and straight lines between nodes leave, relative.
-MODEL_STD = 5e-4
+#: What geometry, film and bands of finite width leave, relative: the rms error of drawn rigs of the twin that
+#: were calibrated from what their camera sees alone was 0.2 to 0.3 % (0.05 to 0.12 % with the true geometry).
+MODEL_STD = 2.5e-3
 
 
 @dataclass(frozen=True)

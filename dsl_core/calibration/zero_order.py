@@ -1,10 +1,10 @@
 """Blur and halo of the projector from the zero order of scan lines on a flat target.
 
 A pixel at column q sees ``y_k = a g(q - x_k) + o`` of the line at x_k: box, blur and halo
-(`optics.light_path.zero_order_profile`). Amplitude a, column q and dark signal o are each pixel's own; blur
-width, halo peak and halo decay are common. All are fitted together by Gauss-Newton steps in which each pixel's
-unknowns are eliminated first. Lines closer than their width show each edge at several places, so that blur and
-column do not mix.
+(`optics.light_path.zero_order_profile`). Amplitude a, column q and dark signal o are each pixel's own;
+blur width, halo peak and halo decay are common. All are fitted together by Gauss-Newton steps in which each
+pixel's unknowns are eliminated first. Lines closer than their width show each edge at several places, so that
+blur and column do not mix.
 """
 
 from __future__ import annotations
@@ -98,8 +98,8 @@ def fit_zero_order(
             )
         if use.sum() < MIN_PIXELS:
             raise CalibrationError(
-                f"Only {int(use.sum())} of {len(use)} pixels see the projected lines as lines. Check that a flat"
-                " white target fills the picture, in focus and not saturated, and capture the step again."
+                f"Only {int(use.sum())} of {len(use)} pixels see the projected lines as lines. Check that a"
+                " flat white target fills the picture, in focus and not saturated, and capture the step again."
             )
         common = common + step_common
         common[:2] = common[0].clip(0.05, 5.0), common[1].clip(0.0, 0.1)

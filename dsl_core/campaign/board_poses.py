@@ -64,7 +64,8 @@ class BoardPose:
         how = ", ".join(turns) or "facing the camera"
         return (
             f"Film off. Hold the board still about {self.depth_mm:.0f} mm before the camera, {place},"
-            f" {how}. All of it must be in view and lit by the projector; nothing may move while it is captured."
+            f" {how}. All of it must be in view and lit by the projector; nothing may move while it is"
+            " captured."
         )
 
 
@@ -77,7 +78,7 @@ def _place(across: float, down: float) -> str:
     return f"in the {named} part of the picture" if named else "in the middle of the picture"
 
 
-#: Place in what is free of the view (-1 to 1 each way), depth (0 near, 1 far), tilt x, tilt y, roll (degrees).
+#: Place in what is free of the view (-1 to 1 each way), depth (0 near, 1 far), tilts x and y, roll (degrees).
 #: Tilts in all directions tell focal lengths, corners of the view tell distortion, rolls even out the print.
 _WISHES = (
     (0.0, 0.0, 0.1, 0.0, 0.0, 3.0),
