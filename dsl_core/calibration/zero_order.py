@@ -98,8 +98,8 @@ def fit_zero_order(
             )
         if use.sum() < MIN_PIXELS:
             raise CalibrationError(
-                f"Only {int(use.sum())} of {len(use)} pixels see the projected lines as lines. Check that a"
-                " flat white target fills the picture, in focus and not saturated, and capture the step again."
+                f"Only {int(use.sum())} of {len(use)} pixels see the lines as lines. Check that a flat white"
+                " target fills the picture, in focus and not saturated, and capture the step again."
             )
         common = common + step_common
         common[:2] = common[0].clip(0.05, 5.0), common[1].clip(0.0, 0.1)

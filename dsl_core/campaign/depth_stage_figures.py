@@ -16,7 +16,12 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
     flat = max(record.positions, key=lambda each: each.plane_rms_mm)
     step = max(record.positions, key=lambda each: abs(each.step_error_mm))
     film = [
-        Figure(name=name, value=getattr(record.film, field), unit=unit, std=record.film_std[field])
+        Figure(
+            name=f"{name}, to this geometry",
+            value=getattr(record.film, field),
+            unit=unit,
+            std=record.film_std[field],
+        )
         for name, field, unit in (
             ("film's lines", "lines_per_mm", "1/mm"),
             ("film's distance", "distance_mm", "mm"),
