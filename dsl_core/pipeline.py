@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from dsl_core.evaluation.summary import Evaluation, Truth
     from dsl_core.model.board import Board
     from dsl_core.model.geometry_calibration import GeometryCalibration
+    from dsl_core.model.pose_frames import PoseFrames
     from dsl_core.model.rig import BayerPattern
 
 
@@ -203,30 +204,34 @@ def calibrate_geometry(
 ) -> GeometryCalibration:
     """Lenses and pose of camera and projector from folders of pictures, one a board pose, film off.
 
-    Raises `CalibrationError` that names the pose or picture that is missing or wrong.
+    Goes on without poses whose board or code cannot be read, and says so. Raises `CalibrationError` that
+    names the picture that is missing, or the poses that are wrong when too few are left.
     """
     from dsl_core.calibration.geometric import calibrate_geometry as calibrate
-    from dsl_core.calibration.geometry_diagnosis import exposure_warning
-    from dsl_core.calibration.projector_corners import observe_pose
+    from dsl_core.calibration.pose_series import observe_series
     from dsl_core.io.pose_pictures import pose_folders, read_pose, require_one_size
     from dsl_core.patterns.gray_code import bit_counts
 
     bits, progress = bit_counts(GrayCode(), projector_size_px), progress or NoProgress()
-    seen, warnings, sizes = [], [], {}
+    sizes: dict[str, tuple[int, int]] = {}
     folders = pose_folders(folder)
-    for index, pose_folder in enumerate(folders):
-        progress.report("find the board", index, len(folders))
-        frames = read_pose(pose_folder, bits, bayer)
-        sizes[frames.name] = (frames.white.shape[1], frames.white.shape[0])
-        require_one_size(sizes)
-        seen.append(observe_pose(frames, board, projector_size_px))
-        warnings.append(exposure_warning(frames, seen[-1]))
+
+    def pictures() -> Iterator[PoseFrames]:
+        for index, pose_folder in enumerate(folders):
+            progress.report("find the board", index, len(folders))
+            frames = read_pose(pose_folder, bits, bayer)
+            sizes[frames.name] = (frames.white.shape[1], frames.white.shape[0])
+            require_one_size(sizes)
+            yield frames
+
+    series = observe_series(pictures(), board, projector_size_px)
     return calibrate(
-        seen,
+        series.seen,
         board,
         sizes[folders[0].name],
         projector_size_px,
         camera_binning=camera_binning,
         baseline_mm=baseline_mm,
-        warnings=[warning for warning in warnings if warning],
+        left_out=series.left_out,
+        warnings=series.warnings,
     )

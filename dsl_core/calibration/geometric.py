@@ -18,6 +18,7 @@ from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.geometry_calibration import (
     Flatness,
     GeometryCalibration,
+    LeftOut,
     LensDeviation,
     PoseDeviation,
     PoseQuality,
@@ -39,14 +40,15 @@ def calibrate_geometry(
     *,
     camera_binning: float = 1.0,
     baseline_mm: float | None = None,
+    left_out: Sequence[LeftOut] = (),
     warnings: Sequence[str] = (),
 ) -> GeometryCalibration:
     """Calibrate both lenses and their pose; sizes are (width, height).
 
     Starts from OpenCV's calibration of each device, refines everything jointly, leaves out poses that do not
     fit, and then checks itself with each pose left out in turn. ``baseline_mm``, the distance of the devices
-    measured by hand, lets a wrong printed size be noticed. ``warnings`` are passed on. Raises
-    `CalibrationError` for poses no calibration can come from.
+    measured by hand, lets a wrong printed size be noticed. ``left_out`` and ``warnings`` are passed on.
+    Raises `CalibrationError` for poses no calibration can come from.
     """
     check_poses(poses, camera_size_px)
     fit = adjust(poses, initial(poses, camera_size_px, projector_size_px))
@@ -58,7 +60,7 @@ def calibrate_geometry(
         final = adjust(rest, without(fit.parameters, np.flatnonzero(~kept)))
     qualities = _qualities(poses, kept, fit, final, board)
     found = _record(poses, kept, final, qualities, board, camera_size_px, projector_size_px)
-    found = found.model_copy(update={"camera_binning": camera_binning})
+    found = found.model_copy(update={"camera_binning": camera_binning, "left_out": tuple(left_out)})
     tilt = _largest_tilt_deg(final.parameters)
     return found.model_copy(update={"warnings": (*warnings, *doubts(found, tilt, baseline_mm))})
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.projector_corners import PoseObservation
 from dsl_core.calibration.targets import saturated
 from dsl_core.errors import CalibrationError
+from dsl_core.model.geometry import Lens
 from dsl_core.model.geometry_calibration import GeometryCalibration
 from dsl_core.model.pose_frames import PoseFrames
 
@@ -22,6 +23,8 @@ MIN_TILT_DEG, GOOD_TILT_DEG = 5.0, 20.0
 MAX_SATURATED = 0.01
 MIN_COVERAGE, CELLS = 0.3, 8
 GOOD_RMS_PX, GOOD_FOCAL_SHARE = 0.5, 0.01
+#: What the distortion may leave open in the corners of a picture, px, and the parameters of a lens.
+MAX_CORNER_PX, LENS = 1.0, 9
 
 
 def exposure_warning(frames: PoseFrames, seen: PoseObservation) -> str | None:
@@ -83,16 +86,19 @@ def largest_tilt_deg(poses: Sequence[PoseObservation], camera_size_px: Size) -> 
     width, height = camera_size_px
     focal = 1.5 * max(width, height)
     matrix = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
-    normals = np.array([_normal(pose, matrix) for pose in poses])
+    normals = np.array([board_normal(pose.board_mm, pose.camera_px, matrix, pose.name) for pose in poses])
     return float(np.degrees(np.arccos(np.clip(np.abs(normals @ normals.T), 0, 1))).max())
 
 
-def _normal(pose: PoseObservation, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def board_normal(
+    board_mm: NDArray[np.float64], camera_px: NDArray[np.float64], matrix: NDArray[np.float64], name: str
+) -> NDArray[np.float64]:
+    """Unit normal of a board in camera coordinates, (3,), either sign, from corners and camera matrix."""
     import cv2
 
-    homography, _ = cv2.findHomography(pose.board_mm[:, :2], pose.camera_px, 0)
+    homography, _ = cv2.findHomography(board_mm[:, :2], camera_px, 0)
     if homography is None:
-        raise CalibrationError(f"The corners of {pose.name} lie on one line. Leave this pose out.")
+        raise CalibrationError(f"The corners of {name} lie on one line. Leave this pose out.")
     normal = matrix.T @ np.linalg.inv(np.asarray(homography, np.float64)).T @ np.array([0.0, 0.0, 1.0])
     return np.asarray(normal / np.linalg.norm(normal))
 
@@ -135,6 +141,13 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
                 f"The focal length of the {what} is known to {deviation.fx_px / lens.fx_px:.1%} only."
                 " Add poses with more tilt."
             )
+        corner_px = _corner_px(found, lens, 0 if what == "camera" else LENS)
+        if corner_px > MAX_CORNER_PX:
+            sentences.append(
+                f"The distortion of the {what} is poorly known beyond the board (k3 {lens.distortion[4]:.2f} ±"
+                f" {deviation.distortion[4]:.2f}): {corner_px:.1f} px in the farthest corner of its picture."
+                " Add poses near the edges."
+            )
         if abs(lens.fx_px / lens.fy_px - 1) > 0.05:
             sentences.append(
                 f"The {what} seems to have oblong pixels (fx {lens.fx_px:.0f}, fy {lens.fy_px:.0f} px). Check"
@@ -150,6 +163,23 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
             f"The board was tilted by {tilt_deg:.0f} degrees at most. Tilt it by {GOOD_TILT_DEG:.0f} to 45."
         )
     return sentences + _size_doubt(found, baseline_mm)
+
+
+def _corner_px(found: GeometryCalibration, lens: Lens, first: int) -> float:
+    """What the radial distortion (k1, k2, k3) leaves open in the farthest corner of a picture, px.
+
+    ``first`` is where the lens begins among the parameters of the covariance.
+    """
+    if found.covariance is None:
+        return 0.0
+    side = round(len(found.covariance) ** 0.5)
+    radial = [first + 4, first + 5, first + 8]
+    covariance = np.array(found.covariance).reshape(side, side)[np.ix_(radial, radial)]
+    across = max(lens.cx_px, lens.width_px - 1 - lens.cx_px) / lens.fx_px
+    down = max(lens.cy_px, lens.height_px - 1 - lens.cy_px) / lens.fy_px
+    radius = float(np.hypot(across, down))
+    slope = lens.fx_px * radius ** np.array([3, 5, 7])
+    return float(np.sqrt(slope @ covariance @ slope))
 
 
 def _size_doubt(found: GeometryCalibration, baseline_mm: float | None) -> list[str]:

@@ -71,7 +71,7 @@ class StageProblem:
     ) -> None:
         """``covariance`` (24, 24) of lenses and pose; None holds them fixed."""
         self.mean = shared_parameters(rig)
-        self.root = np.zeros((SHARED, SHARED)) if covariance is None else _root(covariance)
+        self.root = np.zeros((SHARED, SHARED)) if covariance is None else covariance_root(covariance)
         self.steps_mm = np.asarray(positions_mm, float) - positions_mm[0]
         self.position_of = np.repeat(np.arange(len(samples)), [len(part) for part in samples])
         self.camera_px = np.concatenate([part.camera_px for part in samples])
@@ -117,7 +117,7 @@ class StageProblem:
         return found
 
 
-def _root(covariance: Floats) -> Floats:
+def covariance_root(covariance: Floats) -> Floats:
     """A square root of a covariance whose parameters have very different sizes."""
     scale = np.sqrt(np.diag(covariance).clip(1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))

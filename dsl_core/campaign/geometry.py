@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from dsl_core.calibration.bundle import SHARED
 from dsl_core.calibration.geometric import calibrate_geometry
-from dsl_core.calibration.geometry_diagnosis import exposure_warning
-from dsl_core.calibration.projector_corners import PoseObservation, observe_pose
-from dsl_core.calibration.targets import find_corners, grey_of
+from dsl_core.calibration.geometry_diagnosis import MIN_POSES, exposure_warning
+from dsl_core.calibration.pose_series import observe_series
+from dsl_core.calibration.projector_corners import observe_pose
+from dsl_core.campaign.board_look import look_at_board
 from dsl_core.campaign.board_poses import default_poses
 from dsl_core.campaign.exposures import bracket, measure_white
 from dsl_core.campaign.recipe import Bench, Step
@@ -29,9 +32,6 @@ from dsl_core.progress import Progress
 SCAN_NAME = "scan.dsl"
 #: Limits of a good calibration, camera pixels of the unbinned sensor and projector pixels.
 RMS_PX, PLANE_SHARE, SQUARE_SHARE, COVERAGE = 0.5, 5e-4, 0.005, 0.35
-#: A board of fewer corners than this share in view says too little.
-LEAST_CORNERS = 0.6
-MOST_AMBIENT = 20.0
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,13 @@ class GeometryRecipe:
     """The calibration of both lenses and their pose.
 
     ``board`` is the printed board, its squares measured; ``poses`` how many of the proposed poses are taken.
+    ``ratio`` is how much longer a second exposure is, 1 for none: ink reflects a twentieth of what paper
+    does, which one exposure spans.
     """
 
     board: Board = field(default_factory=lambda: Checkerboard(columns=11, rows=7, square_mm=20.0))
     poses: int = 10
+    ratio: float = 1.0
 
     @property
     def name(self) -> str:
@@ -73,28 +76,9 @@ class GeometryRecipe:
         )
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
-        """Whether the whole board is found, and how the room is."""
+        """Whether the board is whole, sharp and not over-exposed, how it stands, and the room's light."""
         white = measure_white(bench.devices, bench.rig)
-        grey = grey_of(white.picture, bench.rig.sensor.bayer)
-        corners = find_corners(grey, self.board, f"the test shot of {step.title}")
-        total = int(np.prod(self.board.corner_grid))
-        return (
-            Figure(
-                name="corners found",
-                value=len(corners.ids),
-                unit="",
-                low=LEAST_CORNERS * total,
-                high=total,
-                advice="Move the board until all of it is in view and lit.",
-            ),
-            Figure(
-                name="other light",
-                value=100 * white.ambient,
-                unit="% of white",
-                high=MOST_AMBIENT,
-                advice="Darken the room.",
-            ),
-        )
+        return look_at_board(white, self.board, bench.rig, step.title)
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether the scan of the pose is complete."""
@@ -102,7 +86,11 @@ class GeometryRecipe:
         return (scan / MANIFEST_NAME).exists() and not SessionReader(scan).missing()
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Choose an exposure by a test shot and capture the code; a scan that was begun goes on."""
+        """Choose an exposure by a test shot and capture the code; a scan that was begun goes on.
+
+        Raises `CalibrationError` naming the pose when the board or the code on it cannot be read, or white is
+        saturated.
+        """
         from dsl_core import pipeline
 
         scan = bench.step_folder(step) / SCAN_NAME
@@ -110,37 +98,45 @@ class GeometryRecipe:
             plan = SessionReader(scan).plan
         else:
             white = measure_white(bench.devices, bench.rig)
-            settings = bracket(bench.rig, white, f"The board of {step.title}", 1.0)
+            settings = bracket(bench.rig, white, f"The board of {step.title}", self.ratio)
             plan = CapturePlan(
-                name=step.title, code=GrayCode(), spectral=NoSpectral(), settings=settings, code_settings=(0,)
+                name=step.title,
+                code=GrayCode(),
+                spectral=NoSpectral(),
+                settings=settings,
+                code_settings=tuple(range(len(settings))),
             )
             plan = pipeline.fit_plan(plan, bench.devices)
             scan.parent.mkdir(parents=True, exist_ok=True)
         pipeline.scan(bench.devices, plan, scan, progress)
+        frames = read_pose(bench.step_folder(step), step.title, bench.rig)
+        doubt = exposure_warning(frames, observe_pose(frames, self.board, plan.projector_size_px))
+        if doubt:
+            raise CalibrationError(doubt)
 
     def fit(self, bench: Bench, progress: Progress) -> GeometryCalibration:
         """Find the board on every pose and calibrate; poses that do not fit are left out by name."""
-        seen: list[PoseObservation] = []
-        warnings: list[str] = []
         steps = self.steps(bench)
-        size = (0, 0)
-        for index, step in enumerate(steps):
-            progress.report("find the board", index, len(steps))
-            frames, size, projector = read_pose(bench.step_folder(step), step.title, bench.rig)
-            try:
-                seen.append(observe_pose(frames, self.board, projector))
-            except CalibrationError as error:
-                warnings.append(f"{step.title} is left out: {error}")
-                continue
-            doubt = exposure_warning(frames, seen[-1])
-            warnings += [doubt] if doubt else []
-        if len(seen) < max(3, len(steps) // 2):
-            raise CalibrationError(
-                f"Only {len(seen)} of {len(steps)} poses can be used. {' '.join(warnings)}"
-                " Capture these poses anew."
-            )
+        if len(steps) < MIN_POSES:
+            raise CalibrationError(f"{len(steps)} poses are too few; {MIN_POSES} are needed, 10 are good.")
+
+        def pictures() -> Iterator[PoseFrames]:
+            for index, step in enumerate(steps):
+                progress.report("find the board", index, len(steps))
+                yield read_pose(bench.step_folder(step), step.title, bench.rig)
+
+        plan = SessionReader(bench.step_folder(steps[0]) / SCAN_NAME).plan
+        series = observe_series(pictures(), self.board, plan.projector_size_px)
         progress.report("adjust lenses and pose", 0, 1)
-        record = calibrate_geometry(seen, self.board, size, projector, warnings=warnings)
+        record = calibrate_geometry(
+            series.seen,
+            self.board,
+            plan.camera_size_px,
+            plan.projector_size_px,
+            baseline_mm=float(np.linalg.norm(bench.rig.pose.translation_mm)),
+            left_out=series.left_out,
+            warnings=series.warnings,
+        )
         progress.report("adjust lenses and pose", 1, 1)
         return record
 
@@ -150,9 +146,9 @@ class GeometryRecipe:
         return geometry_figures(record)
 
     def apply(self, record: Record, rig: Rig) -> Rig:
-        """The rig with both lenses, their pose, and how well they are known."""
+        """The rig with both lenses, their pose, and how well they and zero-order columns are known."""
         assert isinstance(record, GeometryCalibration)
-        return rig.model_copy(
+        known = rig.model_copy(
             update={
                 "camera": record.camera,
                 "projector": record.projector,
@@ -160,19 +156,37 @@ class GeometryRecipe:
                 "geometry_covariance": record.covariance,
             }
         )
+        return known.model_copy(update={"column_std_px": open_columns_px(known)})
 
 
-def read_pose(folder: Path, name: str, rig: Rig) -> tuple[PoseFrames, tuple[int, int], tuple[int, int]]:
-    """Pictures of a captured pose, and the sizes (width, height) of camera and projector."""
+def open_columns_px(rig: Rig) -> float:
+    """What the geometry's covariance leaves open in zero-order columns, px, rms over the image and depths."""
+    from dsl_core.calibration.plane_refinement import systematic_std
+    from dsl_core.calibration.stage_planes import covariance_root, shared_parameters
+
+    if rig.geometry_covariance is None:
+        return rig.column_std_px
+    root = covariance_root(np.array(rig.geometry_covariance).reshape(SHARED, SHARED))
+    return systematic_std(rig, shared_parameters(rig), root, np.eye(SHARED))[0]
+
+
+def read_pose(folder: Path, name: str, rig: Rig) -> PoseFrames:
+    """Pictures of a captured pose in linear light, all settings merged, black subtracted."""
+    from dsl_core.reconstruction.merge import MergedScan
+
     reader = SessionReader(folder / SCAN_NAME)
-    pictures = {
-        role: [reader.read(shot) for shot in reader.plan.shots() if shot.role == role] for role in _ROLES
-    }
-    frames = PoseFrames(name, pictures["code"], pictures["white"][0], pictures["black"][0], rig.sensor.bayer)
-    return frames, reader.plan.camera_size_px, reader.plan.projector_size_px
-
-
-_ROLES = ("code", "white", "black")
+    scan = MergedScan(reader, rig)
+    pairs = [scan.merge("code", index).radiance for index in range(reader.plan.code_count)]
+    white = scan.merge("white", 0)
+    return PoseFrames(
+        name,
+        pairs,
+        white.radiance,
+        np.zeros_like(white.radiance),
+        rig.sensor.bayer,
+        white.variance,
+        white.saturated,
+    )
 
 
 def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:

@@ -57,15 +57,22 @@ class PoseQuality(Record):
     left_out: Flatness | None = None
 
 
+class LeftOut(Record):
+    """A pose that could not be used, and why."""
+
+    name: str
+    reason: str
+
+
 class GeometryCalibration(Record):
     """Lenses and pose of camera and projector from a printed board, film off.
 
     ``rms_px`` is the rms over camera and projector errors together, without outliers. ``camera_binning`` is
     how many sensor pixels a camera pixel spans along a side: errors times it are errors at full resolution.
     Coverage is the share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used
-    poses. ``covariance``, row by row, is that of 24 parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3 of the
-    camera and of the projector, then rotation vector (rad) and translation (mm) of the pose; None where it is
-    not known.
+    poses; ``left_out`` are those whose board or code could not be read. ``covariance``, row by row, is that
+    of 24 parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3 of the camera and of the projector, then rotation
+    vector (rad) and translation (mm) of the pose; None where it is not known.
     """
 
     schema_version: Literal[1] = 1
@@ -86,6 +93,7 @@ class GeometryCalibration(Record):
     projector_coverage: float
     squares: Flatness
     poses: tuple[PoseQuality, ...]
+    left_out: tuple[LeftOut, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @property

@@ -90,7 +90,9 @@ def test_stated_deviations_cover_the_truth(seed: int) -> None:
 def test_figures_tell_the_noise(found: GeometryCalibration) -> None:
     assert found.camera_rms_px == pytest.approx(0.05 * np.sqrt(2), rel=0.1)
     assert found.squares.square_mm == pytest.approx(30, abs=0.02)
-    assert found.warnings == ()
+    # Nothing but this: no corner lies near the edges of the pictures.
+    assert [warning[:21] for warning in found.warnings] == ["The distortion of the"] * 2
+    assert "camera is poorly known beyond the board (k3" in found.warnings[0]
     assert all(pose.used and pose.left_out is not None for pose in found.poses)
     assert all(pose.left_out and abs(pose.left_out.square_mm / 30 - 1) < 3e-3 for pose in found.poses)
 

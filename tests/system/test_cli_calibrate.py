@@ -48,6 +48,25 @@ def test_real_captures(give: Give, tmp_path: Path) -> None:
     assert stereo.camera.fx_px == pytest.approx(found.camera.fx_px)
 
 
+@pytest.mark.skipif(not REAL.is_dir(), reason=f"the real captures are not in {REAL}")
+def test_a_real_pose_without_a_board_is_left_out_and_said(give: Give, tmp_path: Path) -> None:
+    for pose in range(5):
+        home = tmp_path / "poses" / f"capture_{pose}"
+        home.mkdir(parents=True)
+        for picture in (REAL / home.name).iterdir():
+            if (pose, picture.name) == (2, "graycode_40.png"):
+                cv2.imwrite(str(home / picture.name), np.full((512, 640), 90, np.uint8))
+            else:
+                (home / picture.name).symlink_to(picture.resolve())
+    board = ["--board", "9x7", "--square-mm", 75, "--projector", "1024x768", "--binning", 2]
+    ending = give("calibrate", "geometry", tmp_path / "poses", "--pictures", *board, "--json")
+    assert ending.code == 0, ending.err
+    found = ending.json["calibration"]
+    assert [each["name"] for each in found["left_out"]] == ["capture_2"]
+    assert [pose["name"] for pose in found["poses"]] == [f"capture_{k}" for k in (0, 1, 3, 4)]
+    assert any("capture_2 is left out: The board" in warning for warning in found["warnings"])
+
+
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pictures")
