@@ -144,8 +144,8 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
         corner_px = _corner_px(found, lens, 0 if what == "camera" else LENS)
         if corner_px > MAX_CORNER_PX:
             sentences.append(
-                f"The distortion of the {what} is poorly known beyond the board (k3 {lens.distortion[4]:.2f} ±"
-                f" {deviation.distortion[4]:.2f}): {corner_px:.1f} px in the farthest corner of its picture."
+                f"The distortion of the {what} is poorly known beyond the board (k3 {lens.distortion[4]:.2f}"
+                f" ± {deviation.distortion[4]:.2f}): {corner_px:.1f} px in the farthest corner of its picture."
                 " Add poses near the edges."
             )
         if abs(lens.fx_px / lens.fy_px - 1) > 0.05:
