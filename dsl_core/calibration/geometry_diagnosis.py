@@ -145,7 +145,7 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
         if corner_px > MAX_CORNER_PX:
             sentences.append(
                 f"The distortion of the {what} is poorly known beyond the board (k3 {lens.distortion[4]:.2f}"
-                f" ± {deviation.distortion[4]:.2f}): {corner_px:.1f} px in the farthest corner of its picture."
+                f" ± {deviation.distortion[4]:.2f}): {corner_px:.1f} px in a corner of its picture."
                 " Add poses near the edges."
             )
         if abs(lens.fx_px / lens.fy_px - 1) > 0.05:
