@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, Cancelled
-from dsl_core.model.figure import Figure, failures
 
 if TYPE_CHECKING:
     from dsl_core.campaign.recipe import Step
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
     from dsl_core.io.campaign_folder import CampaignFolder
     from dsl_core.model.accepted import AcceptedCalibration
+    from dsl_core.model.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class ConsoleGuide:
 
     def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
         """Tell what a look found; where it is not good, a person decides."""
+        from dsl_core.model.figure import failures
+
         wrong = failures(tuple(figures))
         told = ", ".join(map(str, figures)) or "nothing to measure"
         self.output.say(f"  {step.title}: {told}{' - not good yet' if wrong else ''}")
@@ -59,6 +61,8 @@ class ConsoleGuide:
 
     def judge(self, fitted: AcceptedCalibration) -> bool:
         """Print the key figures; accept when all are within their limits, or anything if tolerant."""
+        from dsl_core.model.figure import failures
+
         print_figures(self.output, fitted.figures)
         return self.tolerant or not failures(fitted.figures)
 

@@ -120,6 +120,8 @@ def test_linear_light_of_srgb() -> None:
 
 
 def test_csv_in_the_csv_module(tmp_path: Path) -> None:
+    import colour  # noqa: F401 - it changes how NumPy prints, which must not reach the file
+
     result = small_result()
     y, x = WARNED
     (path,) = export_csv(result, tmp_path / "spectra.csv", pixels=[(x, y), (UNLIT[1], UNLIT[0])])

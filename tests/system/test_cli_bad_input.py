@@ -211,7 +211,7 @@ def test_frames_that_show_nothing(
         ("reconstruct absent.dsl --model magic", "--model must be one of auto, grating, hybrid, grid"),
         ("reconstruct absent.dsl --device tpu", "--device must be one of"),
         ("reconstruct absent.dsl -o folder", "exists already"),
-        ("reconstruct absent.dsl --calibration absent.json", "absent.json cannot be read"),
+        ("reconstruct absent.dsl --calibration absent.json", "There is no file absent.json"),
         ("evaluate absent.zarr", "is not a result"),
         ("export absent.zarr ply a.ply", "is not a result"),
         ("export absent.zarr stl a.stl", "is not a result"),

@@ -88,8 +88,12 @@ def _number(spot: xr.Dataset, name: str, band: int | None = None) -> str:
     """Shortest text that reads back as the same float32; ``nan`` for what the result does not hold."""
     if name not in spot:
         return "nan"
+    import numpy as np
+
     values = spot[name].values
-    return str(values if band is None else values[band])
+    # Not str(): colour-science sets NumPy's print options for the whole process, which cuts digits.
+    text: str = np.format_float_positional(values[()] if band is None else values[band], trim="0")
+    return text
 
 
 def _reach_in_words(reach: int) -> str:
