@@ -92,8 +92,7 @@ def _number(spot: xr.Dataset, name: str, band: int | None = None) -> str:
 
     values = spot[name].values
     # Not str(): colour-science sets NumPy's print options for the whole process, which cuts digits.
-    text: str = np.format_float_positional(values[()] if band is None else values[band], trim="0")
-    return text
+    return np.format_float_positional(np.float32(values if band is None else values[band]), trim="0")
 
 
 def _reach_in_words(reach: int) -> str:
