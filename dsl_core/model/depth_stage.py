@@ -59,9 +59,8 @@ class DepthStageCalibration(Record):
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (None where it was not known
     before, and the geometry is as it was); ``column_std_px`` and ``depth_std_mm`` are what it leaves open in
     columns of the zero order and in depth; ``geometry_pull`` is how far it moved, in its deviations before.
-    ``film_std`` are deviations by the film's fields with the geometry as found, whose own errors the film
-    takes up as well: only together do they describe the rig. ``scatter_px`` is that of single samples of
-    first orders. ``frames`` counts the exposures.
+    ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
+    is that of single samples of first orders. ``frames`` counts the exposures.
     """
 
     schema_version: Literal[1] = 1
