@@ -17,7 +17,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
     step = max(record.positions, key=lambda each: abs(each.step_error_mm))
     film = [
         Figure(
-            name=f"{name}, to this geometry",
+            name=name,
             value=getattr(record.film, field),
             unit=unit,
             std=record.film_std[field],
