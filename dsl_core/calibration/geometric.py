@@ -165,6 +165,7 @@ def _qualities(
                 tilt_deg=float(np.degrees(np.arccos(min(abs(rotation_of(motion[:3])[2, 2]), 1.0)))),
                 measured=_measured(final.parameters, pose.only(used), motion, board),
                 left_out=left_out,
+                corners_px=tuple((float(x), float(y)) for x, y in np.round(pose.camera_px, 2)),
             )
         )
     return found

@@ -23,7 +23,7 @@ from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.board import Board, Checkerboard
 from dsl_core.model.figure import Figure
-from dsl_core.model.geometry_calibration import GeometryCalibration
+from dsl_core.model.geometry_calibration import GeometryCalibration, LeftOut
 from dsl_core.model.plan import CapturePlan, GrayCode, NoSpectral
 from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.model.rig import Rig
@@ -32,6 +32,8 @@ from dsl_core.progress import Progress
 SCAN_NAME = "scan.dsl"
 #: Limits of a good calibration, camera pixels of the unbinned sensor and projector pixels.
 RMS_PX, PLANE_SHARE, SQUARE_SHARE, COVERAGE = 0.5, 5e-4, 0.005, 0.35
+#: Why a pose is left out that could be used.
+BY_HAND = "A person left it out."
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,14 @@ class GeometryRecipe:
 
     ``board`` is the printed board, its squares measured; ``poses`` how many of the proposed poses are taken.
     ``ratio`` is how much longer a second exposure is, 1 for none: ink reflects a twentieth of what paper
-    does, which one exposure spans.
+    does, which one exposure spans. ``left_out`` are keys of steps, such as ``pose-03``, that the fit does
+    without; their captures are kept.
     """
 
     board: Board = field(default_factory=lambda: Checkerboard(columns=11, rows=7, square_mm=20.0))
     poses: int = 10
     ratio: float = 1.0
+    left_out: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -116,9 +120,17 @@ class GeometryRecipe:
 
     def fit(self, bench: Bench, progress: Progress) -> GeometryCalibration:
         """Find the board on every pose and calibrate; poses that do not fit are left out by name."""
-        steps = self.steps(bench)
+        every = self.steps(bench)
+        unknown = set(self.left_out) - {step.key for step in every}
+        if unknown:
+            known = ", ".join(step.key for step in every)
+            raise CalibrationError(
+                f"There is no pose {', '.join(sorted(unknown))} to leave out; there are {known}."
+            )
+        steps = [step for step in every if step.key not in self.left_out]
         if len(steps) < MIN_POSES:
             raise CalibrationError(f"{len(steps)} poses are too few; {MIN_POSES} are needed, 10 are good.")
+        unwanted = [LeftOut(name=s.title, reason=BY_HAND) for s in every if s.key in self.left_out]
 
         def pictures() -> Iterator[PoseFrames]:
             for index, step in enumerate(steps):
@@ -134,7 +146,7 @@ class GeometryRecipe:
             plan.camera_size_px,
             plan.projector_size_px,
             baseline_mm=float(np.linalg.norm(bench.rig.pose.translation_mm)),
-            left_out=series.left_out,
+            left_out=(*series.left_out, *unwanted),
             warnings=series.warnings,
         )
         progress.report("adjust lenses and pose", 1, 1)

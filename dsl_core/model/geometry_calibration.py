@@ -42,7 +42,8 @@ class PoseQuality(Record):
     """Errors of one board pose; ``left_out`` is measured with a calibration that never saw it.
 
     Errors are rms lengths (two axes together) over the ``corners`` that were no ``outliers``. A pose that is
-    not ``used`` did not fit the others.
+    not ``used`` did not fit the others. ``corners_px`` are columns and rows of all its corners in the camera
+    image, to a hundredth; records of before they were kept have none.
     """
 
     name: str
@@ -55,10 +56,11 @@ class PoseQuality(Record):
     tilt_deg: float
     measured: Flatness
     left_out: Flatness | None = None
+    corners_px: tuple[tuple[float, float], ...] = ()
 
 
 class LeftOut(Record):
-    """A pose that could not be used, and why."""
+    """A pose that could not be used, or that a person did without, and why."""
 
     name: str
     reason: str
@@ -70,9 +72,9 @@ class GeometryCalibration(Record):
     ``rms_px`` is the rms over camera and projector errors together, without outliers. ``camera_binning`` is
     how many sensor pixels a camera pixel spans along a side: errors times it are errors at full resolution.
     Coverage is the share of an 8 x 8 grid of image cells that hold a corner. ``squares`` sums up all used
-    poses; ``left_out`` are those whose board or code could not be read. ``covariance``, row by row, is that
-    of 24 parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3 of the camera and of the projector, then rotation
-    vector (rad) and translation (mm) of the pose; None where it is not known.
+    poses; ``left_out`` are those whose board or code could not be read, or that a person left out.
+    ``covariance``, row by row, is that of 24 parameters: fx, fy, cx, cy, k1, k2, p1, p2, k3 of the camera and
+    of the projector, then rotation vector (rad) and translation (mm) of the pose; None where it is not known.
     """
 
     schema_version: Literal[1] = 1

@@ -88,6 +88,25 @@ def test_columns_of_the_drawn_rig_come_back(bench: Bench, record: GeometryCalibr
     assert found.geometry_covariance is not None
 
 
+def test_a_pose_that_a_person_left_out_is_not_in_the_fit(bench: Bench, record: GeometryCalibration) -> None:
+    found = replace(RECIPE, left_out=("pose-03",)).fit(bench, NoProgress())
+    assert [pose.name for pose in found.poses] == ["Pose 1", "Pose 2", "Pose 4", "Pose 5", "Pose 6"]
+    assert [(each.name, each.reason) for each in found.left_out] == [("Pose 3", "A person left it out.")]
+    assert found.camera != record.camera
+    assert all(RECIPE.is_captured(bench, step) for step in RECIPE.steps(bench))
+    with pytest.raises(CalibrationError, match="There is no pose pose-99 to leave out; there are pose-01"):
+        replace(RECIPE, left_out=("pose-99",)).fit(bench, NoProgress())
+    with pytest.raises(CalibrationError, match="2 poses are too few"):
+        replace(RECIPE, left_out=("pose-01", "pose-02", "pose-03", "pose-04")).fit(bench, NoProgress())
+
+
+def test_corners_are_kept_to_show_what_they_cover(record: GeometryCalibration) -> None:
+    for pose in record.poses:
+        corners = np.array(pose.corners_px)
+        assert corners.shape == (pose.corners, 2)
+        assert ((corners > 0) & (corners < (222, 145))).all()
+
+
 def test_figures_pass_and_say_how_good_it_is(record: GeometryCalibration) -> None:
     figures = {figure.name: figure for figure in RECIPE.figures(record)}
     assert all(figure.passed for figure in figures.values())
