@@ -14,15 +14,10 @@ from app.panels.result_layers import DEPTH, GREY, colour_map, spread_of
 from app.state.compare import CompareState, Pair, Shown
 from app.state.results import Pixel
 from app.theme import DARK, Theme
+from app.widgets.arrow_keys import arrow_step, moved_within
 
 #: Differences: white is none, blue below, red above; lightness changes evenly.
 DIFFERENCE = "CET-D1A"
-_STEPS = {
-    Qt.Key.Key_Left: (-1, 0),
-    Qt.Key.Key_Right: (1, 0),
-    Qt.Key.Key_Up: (0, -1),
-    Qt.Key.Key_Down: (0, 1),
-}
 
 
 class CompareView(QWidget):
@@ -82,16 +77,13 @@ class CompareView(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Arrow keys move the cursor, with Shift by ten."""
-        step, pair = _STEPS.get(Qt.Key(event.key())), self._state.pair.value
+        step, pair = arrow_step(event), self._state.pair.value
         if step is None or pair is None:
             super().keyPressEvent(event)
             return
         height, width = pair.first.arrays.shape
-        x, y = self._state.cursor.value or (width // 2, height // 2)
-        by = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
-        self.pointed.emit(
-            (min(max(x + by * step[0], 0), width - 1), min(max(y + by * step[1], 0), height - 1))
-        )
+        at = self._state.cursor.value or (width // 2, height // 2)
+        self.pointed.emit(moved_within(at, step, (width, height)))
 
     # Paint -----------------------------------------------------------------------------------------
 

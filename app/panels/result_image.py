@@ -13,14 +13,9 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from app.panels.result_layers import Layer, Layers, colour_map
 from app.state.results import Mark, Pixel, ResultsState, Tool
 from app.theme import DARK, Theme
+from app.widgets.arrow_keys import arrow_step
 from app.widgets.outline_box import OutlineBox
 
-_ARROWS = {
-    Qt.Key.Key_Left: (-1, 0),
-    Qt.Key.Key_Right: (1, 0),
-    Qt.Key.Key_Up: (0, -1),
-    Qt.Key.Key_Down: (0, 1),
-}
 #: Moves of the mouse are looked at no more often than this, Hz.
 CURSOR_HZ = 60
 # pyqtgraph's own limit drops moves, so that the cursor would stay behind where the mouse comes to rest.
@@ -128,10 +123,9 @@ class ResultImage(QWidget):
 
     def _key(self, event: QKeyEvent) -> None:
         key = Qt.Key(event.key())
-        if key in _ARROWS:
-            step = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
-            dx, dy = _ARROWS[key]
-            self.moved.emit(step * dx, step * dy)
+        step = arrow_step(event)
+        if step is not None:
+            self.moved.emit(*step)
         elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_P):
             if self.box.is_drawing:
                 self.box.close_outline()

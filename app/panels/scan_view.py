@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.state.scan import LivePicture
 from app.theme import Theme
+from app.widgets.arrow_keys import arrow_step
 from app.widgets.forms import label
 from app.widgets.plots import calm_plot, theme_plots
 from dsl_core.capture.growth import IntensityGraph
@@ -23,12 +24,6 @@ HINT = "No frame yet. Start a scan and move over its picture to follow the inten
 #: Columns of the published projector: an axis before there is anything to draw.
 PUBLISHED_COLUMNS = 640
 _ROLES = {"code": "code", "spectral": "pattern", "white": "white", "black": "black"}
-_STEPS = {
-    Qt.Key.Key_Left: (-1, 0),
-    Qt.Key.Key_Right: (1, 0),
-    Qt.Key.Key_Up: (0, -1),
-    Qt.Key.Key_Down: (0, 1),
-}
 
 
 class FramePicture(QWidget):
@@ -93,8 +88,8 @@ class FramePicture(QWidget):
             self.pointed.emit((x, y))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Arrow keys move the pixel."""
-        step = _STEPS.get(Qt.Key(event.key()))
+        """Arrow keys move the pixel, with Shift by ten times as much."""
+        step = arrow_step(event)
         if step is None or self._shown is None:
             super().keyPressEvent(event)
             return

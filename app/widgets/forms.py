@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QWidget
 
+# A class has one base of Qt at most, so at run time the mixin is a plain class.
+if TYPE_CHECKING:
+    _Base = QWidget
+else:
+    _Base = object
 
-class NumberBox(QDoubleSpinBox):
-    """A number with its unit; the wheel changes it only while it has the focus."""
+
+class CalmWheel(_Base):
+    """Mixin before a widget class: the wheel changes the value only while the widget has the focus."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Leave the wheel to the page unless the widget has the focus."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class NumberBox(CalmWheel, QDoubleSpinBox):
+    """A number with its unit."""
 
     def __init__(
         self,
@@ -31,16 +50,9 @@ class NumberBox(QDoubleSpinBox):
         if unit:
             self.setSuffix(f" {unit}")
 
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the page unless the box has the focus."""
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
-
-class WholeBox(QSpinBox):
-    """A whole number; the wheel changes it only while it has the focus."""
+class WholeBox(CalmWheel, QSpinBox):
+    """A whole number with its unit."""
 
     def __init__(self, name: str, low: int, high: int, value: int, unit: str = "", tip: str = "") -> None:
         super().__init__()
@@ -52,29 +64,15 @@ class WholeBox(QSpinBox):
         if unit:
             self.setSuffix(f" {unit}")
 
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the page unless the box has the focus."""
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
-
-class ChoiceBox(QComboBox):
-    """A choice; the wheel changes it only while it has the focus."""
+class ChoiceBox(CalmWheel, QComboBox):
+    """A choice of a list."""
 
     def __init__(self, name: str, tip: str = "") -> None:
         super().__init__()
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(name)
         self.setToolTip(tip or name)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the page unless the box has the focus."""
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
 
 def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
