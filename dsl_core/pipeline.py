@@ -38,11 +38,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Options:
-    """How to reconstruct: bands, correspondence (auto, grating, hybrid, grid), refinement, torch device."""
+    """How to reconstruct: bands, correspondence (auto, grating, hybrid, grid), refinement, torch device.
+
+    ``surface_window_px`` is the window of normals; None takes it from the image's width, which is wrong for a
+    piece cut out of a larger image.
+    """
 
     grid: WavelengthGrid = field(default_factory=WavelengthGrid)
     correspondence: str = "auto"
     refine_columns: bool = True
+    surface_window_px: int | None = None
     spectra: bool = True
     device: str = "cpu"
 
@@ -149,7 +154,14 @@ def reconstruct(
         stack = stack_lines(merged, progress)
     with timer.stage("columns, depth, normals"):
         geometry = reconstruct_geometry(
-            rig, plan, code, white, stack, refine_columns=options.refine_columns, device=options.device
+            rig,
+            plan,
+            code,
+            white,
+            stack,
+            refine_columns=options.refine_columns,
+            surface_window_px=options.surface_window_px,
+            device=options.device,
         )
         require_pixels(geometry.flags)
     spectra = None

@@ -13,6 +13,7 @@ from dsl_core.reconstruction.spectral_solver import (
     Prior,
     Spectra,
     band_mean,
+    parabola_peak,
     roughness,
     within_band,
 )
@@ -28,19 +29,17 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
     shape = banded.to_dense(roughness(bands, data)[..., None])[0]
     ridge = torch.eye(bands).to(data) * prior.level_std**-2
     right = right + prior.level * prior.level_std**-2
-    best = torch.full_like(right[:, 0], -torch.inf)
-    tau, mean = torch.full_like(best, prior.taus[0]), torch.zeros_like(right)
+    evidence = []
     for candidate in prior.taus:
         weights = shape * candidate**-2 + ridge
         factor = torch.linalg.cholesky(data + weights)
-        x = torch.cholesky_solve(right[..., None], factor)[..., 0]
-        evidence = torch.logdet(weights.double()).to(best) - 2 * _log_diagonal(factor) + (right * x).sum(1)
-        better = evidence > best
-        best = torch.where(better, evidence, best)
-        tau = torch.where(better, candidate, tau)
-        mean = torch.where(better[:, None], x, mean)
+        half = torch.linalg.solve_triangular(factor, right[..., None], upper=False)[..., 0]
+        volume = torch.logdet(weights.double()).to(right)
+        evidence.append(volume - 2 * _log_diagonal(factor) + (half * half).sum(1))
+    tau = parabola_peak(torch.stack(evidence), torch.as_tensor(prior.taus).to(right).log()).exp()
     matrix = data + shape * tau[:, None, None] ** -2 + ridge
     factor = torch.linalg.cholesky(matrix)
+    mean = torch.cholesky_solve(right[..., None], factor)[..., 0]
     variance = _band_mean_variance(torch.cholesky_inverse(factor))
     nodes, active = _bounded(matrix, right, mean, prior.bounds)
     nodes = nodes.T

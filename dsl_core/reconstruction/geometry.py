@@ -55,9 +55,13 @@ def reconstruct_geometry(
     stack: LineStack,
     *,
     refine_columns: bool = True,
+    surface_window_px: int | None = None,
     device: str = "cpu",
 ) -> Geometry:
-    """Refine decoded columns on the line frames, triangulate, and fit the surface."""
+    """Refine decoded columns on the line frames, triangulate, and fit the surface.
+
+    ``surface_window_px`` is the window of the plane fits; by default it follows from the image's width.
+    """
     shape = code.column.shape
     # Also where a bit is undecided: its two answers are neighbours, and the refinement tells them apart.
     coarse = code.likely_column.astype(np.float32).ravel()
@@ -88,7 +92,7 @@ def reconstruct_geometry(
     good = (flags & int(Flag.NO_LIGHT | Flag.CODE_UNSURE | Flag.OUT_OF_RANGE | Flag.NON_FINITE)) == 0
     depth_mm = np.where(good, depth, np.nan).reshape(shape)
     depth_std = np.where(good, dq * slope, np.nan).reshape(shape)
-    surface = reconstruct_surface(rig, depth_mm, depth_std)
+    surface = reconstruct_surface(rig, depth_mm, depth_std, surface_window_px)
     edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
     q, a, da, offset = (maps[name].reshape(shape) for name in ("q", "a", "da", "offset"))
     q = np.where(good.reshape(shape), q, np.float32(np.nan))
