@@ -10,10 +10,10 @@ import typer
 from dsl_core.cli.guidance import answer, figures_json, print_figures
 from dsl_core.cli.options import Force, Json, OverrideCalibration, RigName, RigOptions, parse_options
 from dsl_core.cli.output import Output
-from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.errors import CalibrationError
 
 if TYPE_CHECKING:
-    from dsl_core.io.calibration_library import LibraryEntry, LibraryLine
+    from dsl_core.io.calibration_library import LibraryLine
     from dsl_core.model.rig import Rig
 
 calibrations = typer.Typer(help="The calibrated rigs of this computer.", no_args_is_help=True)
@@ -133,10 +133,11 @@ def export(
     json: Json = False,
 ) -> None:
     """Write a calibration for another computer or program."""
+    from dsl_core.campaign.entry_files import export_entry
     from dsl_core.io.calibration_library import CalibrationLibrary
 
     output, entry = Output(json), CalibrationLibrary().find(name)
-    files = _export(entry, target, form, force)
+    files = export_entry(entry, target, form, force)
     output.say(f"Written: {', '.join(map(str, files))}")
     output.put(files=[str(file) for file in files])
     output.finish()
@@ -151,34 +152,13 @@ def import_(
     json: Json = False,
 ) -> None:
     """Take a calibration into the library, as the current version of its name."""
-    from dsl_core.io.calibration_library import CalibrationLibrary, read_entry
-    from dsl_core.io.rig_file import load_rig
+    from dsl_core.campaign.entry_files import import_entry
+    from dsl_core.io.calibration_library import CalibrationLibrary
 
-    output, found = Output(json), read_entry(source)
-    rig = load_rig(source) if found is None else found.rig
-    own = rig.name if found is None else found.name
-    accepted, history = ((), ()) if found is None else (found.accepted, found.history)
-    entry = CalibrationLibrary().store(name or own, rig, accepted, history)
+    output, entry = Output(json), import_entry(source, CalibrationLibrary(), name or "")
     output.say(f"{entry.name} is in the library, version {entry.stamp}.")
     output.put(name=entry.name, version=entry.stamp)
     output.finish()
-
-
-def _export(entry: LibraryEntry, target: Path, form: str, force: bool) -> list[Path]:
-    from dsl_core.io.published import export_calibration
-    from dsl_core.io.rig_file import save_rig
-    from dsl_core.io.staging import staged
-
-    match form:
-        case "entry":
-            with staged([target], overwrite=force) as (draft,):
-                draft.write_text(entry.model_dump_json(indent=1) + "\n", encoding="utf-8")
-            return [target]
-        case "rig":
-            return [save_rig(entry.rig, target, overwrite=force)]
-        case "published":
-            return export_calibration(entry.rig, target, overwrite=force)
-    raise StoreError(f"--form must be entry, rig or published, not {form!r}.")
 
 
 def _row(line: LibraryLine) -> tuple[str, ...]:

@@ -69,25 +69,8 @@ class ConsoleGuide:
 
 def print_figures(output: Output, figures: Sequence[Figure]) -> None:
     """A table of figures with their limits and verdicts."""
-    rows = [(str(figure), limits(figure), verdict(figure)) for figure in figures]
+    rows = [(str(figure), figure.limits, verdict(figure)) for figure in figures]
     output.table(("figure", "wanted", ""), rows)
-
-
-def limits(figure: Figure) -> str:
-    """The limits of a figure as people write them.
-
-    >>> limits(Figure(name="gamma", value=2.2, unit="1", low=1.8, high=2.6))
-    '1.8 to 2.6'
-    """
-    match figure.low, figure.high:
-        case None, None:
-            return ""
-        case None, high:
-            return f"at most {high:.4g}"
-        case low, None:
-            return f"at least {low:.4g}"
-        case low, high:
-            return f"{low:.4g} to {high:.4g}"
 
 
 def verdict(figure: Figure) -> str:

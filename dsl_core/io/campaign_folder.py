@@ -98,6 +98,13 @@ class CampaignFolder:
         _make(self.path)
         _write(self.path / CAMPAIGN_NAME, self.info)
 
+    def with_settings(self, name: str, values: Mapping[str, str]) -> Self:
+        """The campaign with these settings of a calibration, and no others of it; `save` writes them down."""
+        settings = {key: each for key, each in self.info.settings.items() if key != name}
+        if values:
+            settings[name] = dict(values)
+        return type(self)(self.path, self.info.model_copy(update={"settings": settings}))
+
     def home(self, name: str) -> Path:
         """Where the captures of a calibration lie."""
         return self.path / name

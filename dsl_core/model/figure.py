@@ -25,6 +25,23 @@ class Figure(Record):
         """Whether the value lies within its limits."""
         return (self.low is None or self.value >= self.low) and (self.high is None or self.value <= self.high)
 
+    @property
+    def limits(self) -> str:
+        """The limits as people write them, empty where there are none.
+
+        >>> Figure(name="gamma", value=2.2, unit="1", low=1.8, high=2.6).limits
+        '1.8 to 2.6'
+        """
+        match self.low, self.high:
+            case None, None:
+                return ""
+            case None, high:
+                return f"at most {high:.4g}"
+            case low, None:
+                return f"at least {low:.4g}"
+            case low, high:
+                return f"{low:.4g} to {high:.4g}"
+
     def __str__(self) -> str:
         """The figure as people write it, such as ``gamma 2.210 ± 0.004``."""
         digits = _decimals(self.std if self.std else abs(self.value) / 100)
