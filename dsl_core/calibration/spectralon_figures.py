@@ -10,16 +10,14 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectralon import SpectralonCalibration
 from dsl_core.optics.sensor import bayer_channels
 
-#: Limits: scatter of blocks in the middle (%), tilt (degrees), rms about the plane (mm), other light (%).
-UNEVEN, TILT_DEG, OTHER_LIGHT = 1.0, 15.0, 20.0
+#: Limits: scatter of blocks in the middle (%), tilt (degrees).
+UNEVEN, TILT_DEG = 1.0, 15.0
 LOOK_UNEVEN = 25.0
 _LEDS = ("red", "green", "blue")
 
 
-def look_figures(
-    picture: NDArray[np.float64], rig: Rig, brightest: float, ambient: float
-) -> tuple[Figure, ...]:
-    """Brightness, evenness of the middle half, and other light, from a white mosaic (DN per ms)."""
+def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
+    """How far the middle half of a white mosaic (DN per ms) is from even, the worst colour."""
     rows, columns = (slice(n // 4, 3 * n // 4) for n in picture.shape)
     colour = bayer_channels(rig.sensor.bayer, *picture.shape)[rows, columns]
     inner = picture[rows, columns]
@@ -27,28 +25,12 @@ def look_figures(
     for c in range(3):
         low, middle, high = np.quantile(inner[colour == c], (0.05, 0.5, 0.95))
         spread = max(spread, float((high - low) / max(middle, 1e-9)))
-    return (
-        Figure(
-            name="white after one LED cycle",
-            value=brightest * rig.frame_period_ms,
-            unit="DN",
-            low=0.5,
-            advice="The picture is dark. Check lens cap, aperture and projector.",
-        ),
-        Figure(
-            name="unevenness of the middle",
-            value=100 * spread,
-            unit="%",
-            high=LOOK_UNEVEN,
-            advice="Let the Spectralon alone fill the middle half of the picture; keep shadows off.",
-        ),
-        Figure(
-            name="other light",
-            value=100 * ambient,
-            unit="% of white",
-            high=OTHER_LIGHT,
-            advice="Darken the room or shade the target.",
-        ),
+    return Figure(
+        name="unevenness of the middle",
+        value=100 * spread,
+        unit="%",
+        high=LOOK_UNEVEN,
+        advice="Let the Spectralon alone fill the middle half of the picture; keep shadows off.",
     )
 
 

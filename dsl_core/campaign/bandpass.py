@@ -6,9 +6,7 @@ each pixel sees; through each filter, lines that tile the frame show how much li
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -20,44 +18,31 @@ from dsl_core.calibration.bandpass import (
     plane_profile,
 )
 from dsl_core.calibration.chain import LineScan
-from dsl_core.calibration.filter_check import colour_shift
 from dsl_core.calibration.order_light import filter_light
 from dsl_core.calibration.zero_order import ZeroOrderFit
+from dsl_core.campaign.bandpass_figures import bandpass_figures
 from dsl_core.campaign.diffuser_lines import diffuser_lines
 from dsl_core.campaign.exposures import WhiteLevel, bracket, bright_setting, measure_white
+from dsl_core.campaign.filter_in_beam import FilterNote, colour_figure, note_of_filter, require_filter
+from dsl_core.campaign.light_look import film_light
 from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.step_scan import is_complete, naming, scan_of, scan_step
 from dsl_core.errors import CalibrationError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.campaign_folder import read_record
-from dsl_core.io.session_manifest import MANIFEST_NAME
-from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.bandpass import BandpassCalibration, apply_bandpass
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
-from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import Progress
 
 PLANE = "plane"
-SCAN_NAME, CURVE_NAME = "scan.dsl", "filter.json"
+CURVE_NAME = "filter.json"
 FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
-#: A filter whose colours fit another one so many nm away so much better (chi-square) is another one.
-COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
-#: White without a filter is so many times brighter than through one, at least.
-OPEN_FACTOR = 3.0
 #: The longer exposure of the scan without filter, which shows the halo, over the shorter one.
 LONG_RATIO = 6.0
-
-
-class FilterNote(Record):
-    """The filter of a step: nominal centre, transmission, and whether that was measured."""
-
-    filter_nm: float
-    transmission: SpectralCurve
-    measured: bool
 
 
 @dataclass(frozen=True)
@@ -124,57 +109,19 @@ class BandpassRecipe:
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Brightness, other light and, through a filter, whether its colours are those of the right one."""
         white = measure_white(bench.devices, bench.rig)
-        figures = [
-            Figure(
-                name="white after one LED cycle",
-                value=white.brightest * bench.rig.frame_period_ms,
-                unit="DN",
-                low=0.5,
-                advice="The picture is dark. Check lens cap, aperture, projector and filter.",
-            ),
-            Figure(
-                name="other light",
-                value=100 * white.ambient,
-                unit="% of white",
-                high=20.0,
-                advice="Darken the room or shade the target.",
-            ),
-        ]
-        if step.placement.filter_nm is not None:
-            shift, gain = colour_shift(bench.rig, white.mean, self._note(bench, step).transmission)
-            figures.append(
-                Figure(
-                    name="filter by its colours",
-                    value=shift if gain > COLOUR_GAIN else 0.0,
-                    unit="nm from the one asked for",
-                    low=-COLOUR_NM,
-                    high=COLOUR_NM,
-                    advice=f"Put the filter of {step.placement.filter_nm:g} nm before the camera.",
-                )
-            )
-        return tuple(figures)
+        figures = film_light(white, bench.rig)
+        nm = step.placement.filter_nm
+        if nm is None:
+            return figures
+        return (*figures, colour_figure(bench.rig, white, note_of_filter(bench.devices, nm)))
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether the scan of a step is complete."""
-        folder = bench.step_folder(step) / SCAN_NAME
-        return (folder / MANIFEST_NAME).exists() and not SessionReader(folder).missing()
+        return is_complete(bench.step_folder(step))
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and scan; a scan that was begun goes on with its own exposures."""
-        from dsl_core import pipeline
-
-        folder = bench.step_folder(step)
-        scan = folder / SCAN_NAME
-        if (scan / MANIFEST_NAME).exists():
-            plan = SessionReader(scan).plan
-        else:
-            white = measure_white(bench.devices, bench.rig)
-            self._require_filter(bench, step, white)
-            plan = pipeline.fit_plan(self._plan(bench.rig, step, white), bench.devices)
-            folder.mkdir(parents=True, exist_ok=True)
-            if step.placement.filter_nm is not None:
-                write_atomic(folder / CURVE_NAME, self._note(bench, step).model_dump_json(indent=1).encode())
-        pipeline.scan(bench.devices, plan, scan, progress)
+        scan_step(bench.devices, bench.step_folder(step), lambda: self._begin(bench, step), progress)
 
     def fit(self, bench: Bench, progress: Progress) -> BandpassCalibration:
         """Calibrate from the captures of all steps."""
@@ -198,30 +145,19 @@ class BandpassRecipe:
         assert isinstance(record, BandpassCalibration)
         return apply_bandpass(record, rig)
 
-    def _note(self, bench: Bench, step: Step) -> FilterNote:
-        nm = step.placement.filter_nm
-        assert nm is not None
-        curve = bench.devices.filters.get(nm)
-        return FilterNote(filter_nm=nm, transmission=curve or nominal_filter(nm), measured=curve is not None)
-
-    def _require_filter(self, bench: Bench, step: Step, white: WhiteLevel) -> None:
-        """Raise `CalibrationError` when a test shot shows another filter than the step's, or none."""
+    def _begin(self, bench: Bench, step: Step) -> CapturePlan:
+        """The plan of a step by a test shot; keeps what is known of its filter."""
+        white = measure_white(bench.devices, bench.rig)
         nm = step.placement.filter_nm
         if nm is None:
-            return
-        note = self._note(bench, step)
+            return self._plan(bench.rig, step, white)
+        note, folder = note_of_filter(bench.devices, nm), bench.step_folder(step)
         open_white = self._white_of(bench, self.steps(bench)[0])
-        if open_white is not None and white.brightest * OPEN_FACTOR > open_white:
-            raise CalibrationError(
-                f"{step.title}: the picture is about as bright as without a filter. Put the filter of {nm:g}"
-                " nm before the camera and capture the step again."
-            )
-        shift, gain = colour_shift(bench.rig, white.mean, note.transmission)
-        if gain > COLOUR_GAIN and abs(shift) > COLOUR_NM:
-            raise CalibrationError(
-                f"{step.title}: the colours are those of a filter of about {nm + shift:.0f} nm. Put the"
-                f" filter of {nm:g} nm before the camera and capture the step again."
-            )
+        require_filter(bench.rig, white, note, step.title, open_white)
+        plan = self._plan(bench.rig, step, white)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / CURVE_NAME, note.model_dump_json(indent=1).encode())
+        return plan
 
     def _white_of(self, bench: Bench, step: Step) -> float | None:
         """Brightness of a captured step's white frame (DN per ms at full drive), None if not captured."""
@@ -229,7 +165,7 @@ class BandpassRecipe:
             return None
         from dsl_core.reconstruction.merge import MergedScan
 
-        frame = MergedScan(SessionReader(bench.step_folder(step) / SCAN_NAME), bench.rig).merge("white", 0)
+        frame = MergedScan(scan_of(bench.step_folder(step)), bench.rig).merge("white", 0)
         return float(np.quantile(frame.radiance, 0.995))
 
     def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
@@ -256,16 +192,17 @@ class BandpassRecipe:
         )
 
     def _plane(self, bench: Bench, step: Step, progress: Progress) -> tuple[LineScan, ZeroOrderFit]:
-        source = SessionReader(bench.step_folder(step) / SCAN_NAME)
-        scan = _named(step, lambda: diffuser_lines(source, bench.rig, progress, self.pixels))
-        return scan, _named(step, lambda: plane_profile(bench.rig, scan))
+        source = scan_of(bench.step_folder(step))
+        with naming(step):
+            scan = diffuser_lines(source, bench.rig, progress, self.pixels)
+            return scan, plane_profile(bench.rig, scan)
 
     def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
         from dsl_core.reconstruction.merge import MergedScan, check_source
 
         folder = bench.step_folder(step)
         note = read_record(folder / CURVE_NAME, FilterNote)
-        source = SessionReader(folder / SCAN_NAME)
+        source = scan_of(folder)
         plan = check_source(source, rig)
         lines = plan.spectral
         assert isinstance(lines, ScanLines)
@@ -291,78 +228,3 @@ class BandpassRecipe:
                 " the step again with nothing changed since the test shot."
             )
         return SeenFilter(note.filter_nm, note.transmission, note.measured, light)
-
-
-def bandpass_figures(record: BandpassCalibration) -> tuple[Figure, ...]:
-    """What a person judges the calibration by."""
-    centres = np.array([each.effective_nm for each in record.filters])
-    figures = [
-        Figure(
-            name=f"efficiency of order {order:+d}, deviation",
-            value=100 * float(np.median(_relative_std(record.efficiency[order], centres))),
-            unit="%",
-            high=2.0,
-            advice="Use more filters, or a longer second exposure (long_ratio).",
-        )
-        for order in (1, -1)
-    ]
-    figures += [
-        Figure(
-            name=f"response of {colour}, deviation",
-            value=100 * float(np.median(_relative_std(curve, centres[_bright(curve, centres)]))),
-            unit="%",
-            high=5.0,
-            advice="Measure the filters' transmissions, or calibrate with a Color Checker first.",
-        )
-        for colour, curve in zip(("red", "green", "blue"), record.response, strict=True)
-    ]
-    halo = 200 * record.halo_decay_px
-    figures += [
-        _plain(
-            "second orders",
-            "% of first",
-            100 * record.second_order_share,
-            100 * record.second_order_share_std,
-        ),
-        _plain("halo", "% of zero order", halo * record.halo_peak_per_px, halo * record.halo_peak_std_per_px),
-        Figure(
-            name="blur of the projector",
-            value=record.blur_px,
-            unit="px",
-            std=record.blur_std_px,
-            high=2.0,
-            advice="Focus the projector on the target.",
-        ),
-        Figure(
-            name="filters in doubt",
-            value=float(len(record.warnings)),
-            unit="",
-            high=0.0,
-            advice=". ".join(record.warnings),
-        ),
-    ]
-    return tuple(figures)
-
-
-def _plain(name: str, unit: str, value: float, std: float) -> Figure:
-    return Figure(name=name, value=value, unit=unit, std=std)
-
-
-def _relative_std(curve: SpectralCurve, nm: Any) -> Any:
-    std = curve.std or (0.0,) * len(curve.values)
-    return np.interp(nm, curve.wavelengths_nm, std) / np.maximum(np.abs(curve.at(nm)), 1e-12)
-
-
-def _bright(curve: SpectralCurve, nm: Any) -> Any:
-    """Wavelengths at which a response is not negligible."""
-    return curve.at(nm) > 0.05 * max(curve.values)
-
-
-def _named(step: Step, task: Callable[[], Any]) -> Any:
-    """Do a task of a step, whose errors then name it."""
-    from dsl_core.errors import DslError
-
-    try:
-        return task()
-    except DslError as error:
-        raise CalibrationError(f"{step.title}: {error}") from error

@@ -8,6 +8,7 @@ from dsl_core.calibration.geometry_diagnosis import board_normal
 from dsl_core.calibration.projector_corners import refine_corners
 from dsl_core.calibration.targets import find_corners, grey_of
 from dsl_core.campaign.exposures import WhiteLevel
+from dsl_core.campaign.light_look import other_light
 from dsl_core.model.board import Board, corner_positions_mm
 from dsl_core.model.figure import Figure
 from dsl_core.model.pose_frames import PoseFrames
@@ -17,8 +18,8 @@ from dsl_core.model.rig import Rig
 LEAST_CORNERS = 0.6
 #: Edges blurred by more (standard deviation, px) are out of focus or moved.
 MOST_BLUR_PX = 1.5
-#: Least share of the view between the outermost corners, and most light of the room, %.
-LEAST_VIEW, MOST_AMBIENT = 8.0, 20.0
+#: Least share of the view between the outermost corners, %.
+LEAST_VIEW = 8.0
 
 
 def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str) -> tuple[Figure, ...]:
@@ -64,12 +65,6 @@ def look_at_board(white: WhiteLevel, board: Board, rig: Rig, title: str) -> tupl
             high=0.0,
             advice="Close the aperture or dim the projector: its darkest white is too bright.",
         ),
-        Figure(
-            name="other light",
-            value=100 * white.ambient,
-            unit="% of white",
-            high=MOST_AMBIENT,
-            advice="Darken the room.",
-        ),
+        other_light(white),
         Figure(name="tilt", value=float(np.degrees(np.arccos(min(abs(normal[2]), 1.0)))), unit="°"),
     )

@@ -19,10 +19,11 @@ from dsl_core.campaign.flat_target import (
     LIGHTS,
     WHITE,
     capture_flat_target,
-    is_complete,
     read_flat_target,
 )
+from dsl_core.campaign.light_look import other_light
 from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.step_scan import is_complete
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.base import Record
 from dsl_core.model.color_checker import ColorCheckerCalibration
@@ -99,13 +100,7 @@ class ColorCheckerRecipe:
             Figure(
                 name=f"chart {_UPRIGHT[pose.quarter_turns]}", value=90.0 * pose.quarter_turns, unit="degrees"
             ),
-            Figure(
-                name="other light",
-                value=100 * white.ambient,
-                unit="% of white",
-                high=20.0,
-                advice="Darken the room or shade the chart.",
-            ),
+            other_light(white, "chart"),
         )
 
     def is_captured(self, bench: Bench, step: Step) -> bool:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TypeVar
 
 from dsl_core.calibration.depth_stage import StageData, StageFilter, calibrate_depth_stage
 from dsl_core.calibration.line_samples import LineFrames
+from dsl_core.calibration.tiles import ColumnSamples
 from dsl_core.campaign.depth_stage_figures import depth_stage_figures
 from dsl_core.campaign.exposures import LONGEST_MS, WhiteLevel, bracket, bright_setting, measure_white
+from dsl_core.campaign.filter_in_beam import note_of_filter
+from dsl_core.campaign.light_look import film_light
 from dsl_core.campaign.recipe import Bench, Step
 from dsl_core.campaign.stage_scans import lines_on_plane, zero_order_columns
-from dsl_core.errors import CalibrationError, DslError
+from dsl_core.campaign.step_scan import is_complete, naming, scan_of, scan_step
+from dsl_core.errors import CalibrationError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.campaign_folder import read_record
-from dsl_core.io.session_manifest import MANIFEST_NAME
 from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.chain import ChainCorrection
@@ -26,15 +26,13 @@ from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.filters import nominal_filter
 from dsl_core.progress import Progress
 
-SCAN_NAME, NOTE_NAME = "scan.dsl", "stage.json"
+NOTE_NAME = "stage.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
 LONGER = 3.0
 #: The longer exposure of the scan without filter, which shows the first orders, over the shorter one.
 LONG_RATIO = 6.0
-T = TypeVar("T")
 
 
 class StageNote(Record):
@@ -101,44 +99,16 @@ class DepthStageRecipe:
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Brightness and other light."""
         self._move(bench, step)
-        white = measure_white(bench.devices, bench.rig)
-        return (
-            Figure(
-                name="white after one LED cycle",
-                value=white.brightest * bench.rig.frame_period_ms,
-                unit="DN",
-                low=0.5,
-                advice="The picture is dark. Check lens cap, aperture, projector and filter.",
-            ),
-            Figure(
-                name="other light",
-                value=100 * white.ambient,
-                unit="% of white",
-                high=20.0,
-                advice="Darken the room or shade the target.",
-            ),
-        )
+        return film_light(measure_white(bench.devices, bench.rig), bench.rig)
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether the scan of a step is complete."""
-        folder = bench.step_folder(step) / SCAN_NAME
-        return (folder / MANIFEST_NAME).exists() and not SessionReader(folder).missing()
+        return is_complete(bench.step_folder(step))
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Move the stage, choose exposures by a test shot, and scan; goes on with a scan that was begun."""
-        from dsl_core import pipeline
-
-        folder = bench.step_folder(step)
-        scan = folder / SCAN_NAME
         note = self._move(bench, step)
-        if (scan / MANIFEST_NAME).exists():
-            plan = SessionReader(scan).plan
-        else:
-            white = measure_white(bench.devices, bench.rig)
-            plan = pipeline.fit_plan(self._plan(bench.rig, step, white), bench.devices)
-            folder.mkdir(parents=True, exist_ok=True)
-            write_atomic(folder / NOTE_NAME, note.model_dump_json(indent=1).encode())
-        pipeline.scan(bench.devices, plan, scan, progress)
+        scan_step(bench.devices, bench.step_folder(step), lambda: self._begin(bench, step, note), progress)
 
     def fit(self, bench: Bench, progress: Progress) -> DepthStageCalibration:
         """Calibrate from the captures of all steps."""
@@ -149,10 +119,7 @@ class DepthStageRecipe:
         data = StageData(
             positions_mm=tuple(note.position_mm for note in notes),
             stage_std_mm=self.stage_std_mm,
-            columns=tuple(
-                _named(step, partial(zero_order_columns, _scan(bench, step), bench.rig, progress))
-                for step in plain
-            ),
+            columns=tuple(self._columns(bench, step, progress) for step in plain),
             filters=tuple(_filter_of(_note_of(bench, step)) for step in filtered[:count]),
             frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
             exposures=sum(_scan(bench, step).plan.shot_count for step in steps),
@@ -179,13 +146,21 @@ class DepthStageRecipe:
             position = bench.devices.stage.move_to(position)
         if nm is None:
             return StageNote(position_mm=position)
-        curve = bench.devices.filters.get(nm)
+        known = note_of_filter(bench.devices, nm)
         return StageNote(
             position_mm=position,
             filter_nm=nm,
-            transmission=curve or nominal_filter(nm),
-            measured=curve is not None,
+            transmission=known.transmission,
+            measured=known.measured,
         )
+
+    def _begin(self, bench: Bench, step: Step, note: StageNote) -> CapturePlan:
+        """The plan of a step by a test shot; keeps where the stage is and which filter this is."""
+        plan = self._plan(bench.rig, step, measure_white(bench.devices, bench.rig))
+        folder = bench.step_folder(step)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / NOTE_NAME, note.model_dump_json(indent=1).encode())
+        return plan
 
     def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
         if step.placement.filter_nm is None:
@@ -206,8 +181,13 @@ class DepthStageRecipe:
             code_settings=(0,),
         )
 
+    def _columns(self, bench: Bench, step: Step, progress: Progress) -> ColumnSamples:
+        with naming(step):
+            return zero_order_columns(_scan(bench, step), bench.rig, progress)
+
     def _lines(self, bench: Bench, step: Step) -> LineFrames:
-        return _named(step, partial(lines_on_plane, _scan(bench, step), bench.rig))
+        with naming(step):
+            return lines_on_plane(_scan(bench, step), bench.rig)
 
     def _chain(
         self, bench: Bench, plain: list[Step], found: DepthStageCalibration, progress: Progress
@@ -217,7 +197,10 @@ class DepthStageRecipe:
         from dsl_core.campaign.diffuser_lines import diffuser_lines
 
         rig = apply_depth_stage(found, bench.rig)
-        scans = [_named(step, partial(diffuser_lines, _scan(bench, step), rig, progress)) for step in plain]
+        scans = []
+        for step in plain:
+            with naming(step):
+                scans.append(diffuser_lines(_scan(bench, step), rig, progress))
         progress.report("chain", 0, 1)
         return chain_correction(rig, scans, reflectance=self.reflectance)
 
@@ -245,7 +228,7 @@ def _filtered(position_mm: float, filters_nm: list[float]) -> list[Step]:
 
 
 def _scan(bench: Bench, step: Step) -> SessionReader:
-    return SessionReader(bench.step_folder(step) / SCAN_NAME)
+    return scan_of(bench.step_folder(step))
 
 
 def _note_of(bench: Bench, step: Step) -> StageNote:
@@ -256,11 +239,3 @@ def _filter_of(note: StageNote) -> StageFilter:
     assert note.filter_nm is not None
     assert note.transmission is not None
     return StageFilter(note.filter_nm, note.transmission, note.measured)
-
-
-def _named(step: Step, task: Callable[[], T]) -> T:
-    """Do a task of a step, whose errors then name it."""
-    try:
-        return task()
-    except DslError as error:
-        raise CalibrationError(f"{step.title}: {error}") from error

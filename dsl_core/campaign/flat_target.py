@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from dsl_core.calibration.plane import PlaneFit, fit_plane
 from dsl_core.campaign.exposures import bracket, measure_white
 from dsl_core.campaign.recipe import Bench
-from dsl_core.io.session_manifest import MANIFEST_NAME
-from dsl_core.io.session_reader import SessionReader
+from dsl_core.campaign.step_scan import scan_of, scan_step
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
-SCAN_NAME = "scan.dsl"
 #: Drive of red, green and blue in each uniform picture.
 LIGHTS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
 WHITE = 3
@@ -47,39 +45,28 @@ class FlatTarget:
         return fit_plane(rig, self.depth_mm, self.lit if within is None else self.lit & within, start)
 
 
-def is_complete(folder: Path) -> bool:
-    """Whether the scan in a step's folder is complete."""
-    scan = folder / SCAN_NAME
-    return (scan / MANIFEST_NAME).exists() and not SessionReader(scan).missing()
-
-
 def capture_flat_target(bench: Bench, folder: Path, name: str, ratio: float, progress: Progress) -> None:
     """Code and uniform pictures into the step's folder; a scan that was begun goes on as it was planned.
 
     Exposures follow a test shot; ``ratio`` above one adds an exposure that much longer, for dark patches.
     """
-    from dsl_core import pipeline
+    width = bench.devices.projector.info.width_px
 
-    scan = folder / SCAN_NAME
-    if (scan / MANIFEST_NAME).exists():
-        plan = SessionReader(scan).plan
-    else:
-        width = bench.devices.projector.info.width_px
-        plan = CapturePlan(
+    def plan() -> CapturePlan:
+        return CapturePlan(
             name=name,
             code=GrayCode(rows=False),
             spectral=Columns(levels=tuple((light,) * width for light in LIGHTS)),
             settings=bracket(bench.rig, measure_white(bench.devices, bench.rig), name, ratio),
             code_settings=(0,),
         )
-        plan = pipeline.fit_plan(plan, bench.devices)
-        folder.mkdir(parents=True, exist_ok=True)
-    pipeline.scan(bench.devices, plan, scan, progress)
+
+    scan_step(bench.devices, folder, plan, progress)
 
 
 def read_flat_target(folder: Path, rig: Rig, progress: Progress) -> FlatTarget:
     """The captures of a step; raises `DecodeError` and `StoreError`."""
-    return flat_target(SessionReader(folder / SCAN_NAME), rig, progress)
+    return flat_target(scan_of(folder), rig, progress)
 
 
 def flat_target(source: FrameSource, rig: Rig, progress: Progress) -> FlatTarget:

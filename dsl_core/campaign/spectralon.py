@@ -7,12 +7,14 @@ from pathlib import Path
 
 from dsl_core.calibration.emission import measured_emission
 from dsl_core.calibration.spectralon import UniformPictures, measure_white, spectralon_calibration
-from dsl_core.calibration.spectralon_figures import look_figures, spectralon_figures
+from dsl_core.calibration.spectralon_figures import spectralon_figures, unevenness_of_middle
 from dsl_core.calibration.white_match import match_whites
 from dsl_core.campaign import exposures
 from dsl_core.campaign.emission_readings import is_read, load_readings, read_emission
-from dsl_core.campaign.flat_target import capture_flat_target, is_complete, middle, read_flat_target
+from dsl_core.campaign.flat_target import capture_flat_target, middle, read_flat_target
+from dsl_core.campaign.light_look import brightness, other_light
 from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.step_scan import is_complete
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.io.spectrum_file import read_spectrum
 from dsl_core.model.base import Record
@@ -79,7 +81,11 @@ class SpectralonRecipe:
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the middle is bright, even and free of other light."""
         white = exposures.measure_white(bench.devices, bench.rig)
-        return look_figures(white.picture, bench.rig, white.brightest, white.ambient)
+        return (
+            brightness(white, bench.rig, "lens cap, aperture and projector"),
+            unevenness_of_middle(white.picture, bench.rig),
+            other_light(white, "target"),
+        )
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether all spectra are read, or the scan is complete."""

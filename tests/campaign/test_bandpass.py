@@ -2,64 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dsl_core.campaign.bandpass import SCAN_NAME, BandpassRecipe
-from dsl_core.campaign.recipe import Bench, Step
-from dsl_core.devices.base import DeviceRig
+from dsl_core.campaign.bandpass import BandpassRecipe
+from dsl_core.campaign.recipe import Bench
+from dsl_core.campaign.step_scan import scan_of
 from dsl_core.errors import CalibrationError
-from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.bandpass import BandpassCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
-from dsl_core.model.rig import Rig
 from dsl_core.progress import NoProgress
-from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from tests.cases.film_bench import film_bench, place, take, take_all, truth_of, without
 
 RECIPE = BandpassRecipe(filters_nm=(450.0, 480.0, 540.0, 590.0, 610.0, 640.0), pixels=4000)
 INSIDE_NM = np.arange(450.0, 641.0, 10.0)
 
 
-def truth_of(devices: DeviceRig) -> Rig:
-    assert isinstance(devices.camera, SimCamera)
-    return devices.camera.world.rig
-
-
-def bench_of(devices: DeviceRig, folder: Path) -> Bench:
-    """Geometry, emission and gamma are known by earlier calibrations; film and response by data sheets."""
-    truth, nominal = truth_of(devices), devices.nominal
-    assert nominal is not None
-    same = ("camera", "projector", "pose", "emission", "sensor", "flat_field")
-    known = nominal.model_copy(update={name: getattr(truth, name) for name in same})
-    response = truth.projector_response.model_copy(
-        update={"blur_px": 0.6, "halo_peak_per_px": 0.0, "halo_decay_px": 30.0}
-    )
-    return Bench(devices, folder, known.model_copy(update={"projector_response": response}))
-
-
-def place(bench: Bench, placement: Placement) -> None:
-    assert bench.devices.place is not None
-    bench.devices.place(placement)
-
-
-def capture(bench: Bench, step: Step, recipe: BandpassRecipe = RECIPE) -> None:
-    place(bench, step.placement)
-    recipe.capture(bench, step, NoProgress())
+#: What earlier calibrations found; film and response are known by data sheets.
+KNOWN = ("camera", "projector", "pose", "emission", "sensor", "flat_field")
 
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """All steps captured on a drawn rig."""
-    devices = open_twin({"truth": "4", "size": "112x72"})
-    bench = bench_of(devices, tmp_path_factory.mktemp("bandpass"))
-    for step in RECIPE.steps(bench):
-        assert not RECIPE.is_captured(bench, step)
-        capture(bench, step)
-        assert RECIPE.is_captured(bench, step)
-    return bench
+    bench = film_bench(tmp_path_factory.mktemp("bandpass"), 4, KNOWN)
+    response = truth_of(bench.devices).projector_response.model_copy(
+        update={"blur_px": 0.6, "halo_peak_per_px": 0.0, "halo_decay_px": 30.0}
+    )
+    return take_all(RECIPE, replace(bench, rig=bench.rig.model_copy(update={"projector_response": response})))
 
 
 @pytest.fixture(scope="module")
@@ -113,9 +87,9 @@ def test_figures_pass_and_record_goes_through_json(record: BandpassCalibration) 
 
 def test_finished_scan_is_not_taken_again(bench: Bench) -> None:
     step = RECIPE.steps(bench)[1]
-    before = SessionReader(bench.step_folder(step) / SCAN_NAME).entries
-    capture(bench, step)
-    assert SessionReader(bench.step_folder(step) / SCAN_NAME).entries == before
+    before = scan_of(bench.step_folder(step)).entries
+    take(RECIPE, bench, step)
+    assert scan_of(bench.step_folder(step)).entries == before
 
 
 def test_wrong_filter_is_refused_before_anything_is_stored(bench: Bench, tmp_path: Path) -> None:
@@ -142,12 +116,8 @@ def test_missing_filter_is_refused(bench: Bench) -> None:
 def test_neighbouring_filter_is_found_by_the_places_of_its_orders(bench: Bench, tmp_path: Path) -> None:
     # So near that colours do not tell: 550 where 540 was asked for.
     step = next(step for step in RECIPE.steps(bench) if step.placement.filter_nm == 540.0)
-    other = Bench(bench.devices, tmp_path, bench.rig)
-    for each in RECIPE.steps(bench):
-        if each.key != step.key:
-            other.step_folder(each).symlink_to(bench.step_folder(each))
-    place(other, step.placement.model_copy(update={"filter_nm": 550.0}))
-    RECIPE.capture(other, step, NoProgress())
+    other = without(bench, tmp_path, step)
+    take(RECIPE, other, step, filter_nm=550.0)
     with pytest.raises(
         CalibrationError, match=r"filter of 540 nm: its first orders stand where 5\d\d nm belongs"
     ):

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from dsl_core.campaign.depth_stage import NOTE_NAME, SCAN_NAME, DepthStageRecipe
-from dsl_core.campaign.recipe import Bench, Step
-from dsl_core.devices.base import DeviceRig
+from dsl_core.campaign.depth_stage import NOTE_NAME, DepthStageRecipe
+from dsl_core.campaign.recipe import Bench
+from dsl_core.campaign.step_scan import scan_of
 from dsl_core.errors import CalibrationError
-from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
-from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel, correspondence, zero_order
 from dsl_core.progress import NoProgress
 from dsl_core.reconstruction.depth import triangulate
-from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from tests.cases.board_calibrated import board_calibrated
+from tests.cases.film_bench import film_bench, take, take_all, truth_of, without
 
 RECIPE = DepthStageRecipe(
     positions_mm=(620.0, 850.0), filters_nm=(450.0, 540.0, 640.0), code_step_px=5, chain=False
@@ -31,48 +29,16 @@ SAME = ("emission", "sensor", "flat_field", "response", "white_scale", "projecto
 FILTERED = 6
 
 
-def truth_of(devices: DeviceRig) -> Rig:
-    assert isinstance(devices.camera, SimCamera)
-    return devices.camera.world.rig
-
-
-def bench_of(folder: Path, seed: int = 1, **options: str) -> Bench:
-    """Film unknown, geometry as a board tells it, the rest true."""
-    devices = open_twin({"truth": str(seed), "size": "112x72", **options})
-    truth, nominal = truth_of(devices), devices.nominal
-    assert nominal is not None
-    known = nominal.model_copy(update={name: getattr(truth, name) for name in SAME})
-    return Bench(devices, folder, board_calibrated(truth, known, seed))
-
-
-def capture(bench: Bench, step: Step, filter_nm: float | None = None) -> None:
-    assert bench.devices.place is not None
-    placed = step.placement
-    bench.devices.place(placed.model_copy(update={"filter_nm": filter_nm}) if filter_nm else placed)
-    RECIPE.capture(bench, step, NoProgress())
-
-
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """All steps captured."""
-    bench = bench_of(tmp_path_factory.mktemp("depth-stage"))
-    for step in RECIPE.steps(bench):
-        assert not RECIPE.is_captured(bench, step)
-        capture(bench, step)
-        assert RECIPE.is_captured(bench, step)
-    return bench
+    """All steps captured; film unknown, geometry as a board tells it, the rest true."""
+    bench = film_bench(tmp_path_factory.mktemp("depth-stage"), 1, SAME)
+    return take_all(RECIPE, replace(bench, rig=board_calibrated(truth_of(bench.devices), bench.rig, 1)))
 
 
 @pytest.fixture(scope="module")
 def record(bench: Bench) -> DepthStageCalibration:
     return RECIPE.fit(bench, NoProgress())
-
-
-def copied(bench: Bench, folder: Path, without: Step) -> Bench:
-    """The campaign's captures but for one step, somewhere else."""
-    shutil.copytree(bench.folder, folder, dirs_exist_ok=True)
-    shutil.rmtree(folder / without.key)
-    return Bench(bench.devices, folder, bench.rig)
 
 
 def test_first_orders_and_depth_are_found(bench: Bench, record: DepthStageCalibration) -> None:
@@ -109,9 +75,9 @@ def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibra
 
 def test_finished_scan_is_not_taken_again(bench: Bench) -> None:
     step = RECIPE.steps(bench)[FILTERED]
-    before = SessionReader(bench.step_folder(step) / SCAN_NAME).entries
-    capture(bench, step)
-    assert SessionReader(bench.step_folder(step) / SCAN_NAME).entries == before
+    before = scan_of(bench.step_folder(step)).entries
+    take(RECIPE, bench, step)
+    assert scan_of(bench.step_folder(step)).entries == before
 
 
 def test_stage_notes_where_it_was(bench: Bench) -> None:
@@ -121,18 +87,16 @@ def test_stage_notes_where_it_was(bench: Bench) -> None:
 
 def test_a_wrong_filter_is_named(bench: Bench, tmp_path: Path) -> None:
     step = RECIPE.steps(bench)[FILTERED]
-    other = copied(bench, tmp_path, step)
-    capture(other, step, filter_nm=560.0)
+    other = without(bench, tmp_path, step)
+    take(RECIPE, other, step, filter_nm=560.0)
     with pytest.raises(CalibrationError, match=r"850 mm, filter of 540 nm: .* \+(19|2[01])\.\d nm off"):
         RECIPE.fit(other, NoProgress())
 
 
 def test_a_capture_without_first_orders_is_named(bench: Bench, tmp_path: Path) -> None:
     step = RECIPE.steps(bench)[FILTERED]
-    other = copied(bench, tmp_path, step)
-    assert other.devices.place is not None
-    other.devices.place(step.placement.model_copy(update={"film": False}))
-    RECIPE.capture(other, step, NoProgress())
+    other = without(bench, tmp_path, step)
+    take(RECIPE, other, step, film=False)
     with pytest.raises(CalibrationError, match="850 mm, filter of 540 nm: no first orders were found"):
         RECIPE.fit(other, NoProgress())
 
