@@ -11,11 +11,10 @@ from PySide6.QtWidgets import QCheckBox, QDialog, QVBoxLayout, QWidget
 from app.state.results import ResultsState
 from app.theme import DARK, Theme
 from app.widgets.forms import label
+from app.widgets.plots import RGB_COLOURS
 from dsl_core.inspection import IntensityGraph
 
 CHANNELS = ("R", "G", "B")
-#: Red, green and blue that are told apart on both themes.
-COLOURS = ("#e0524d", "#2fa84f", "#4c8dff")
 #: Wavelengths that are labelled along the first orders, nm.
 LABELLED_NM = 50.0
 ORDER_NAMES = {1: "+1", -1: "−1"}
@@ -60,11 +59,11 @@ class IntensityWindow(QDialog):
                 symbolBrush=colour,
                 name=f"{name} measured",
             )
-            for name, colour in zip(CHANNELS, COLOURS, strict=True)
+            for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)
         ]
         self.model = [
             self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model")
-            for name, colour in zip(CHANNELS, COLOURS, strict=True)
+            for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)
         ]
         self.faint = QCheckBox("Scale to the first orders")
         self.faint.setToolTip(

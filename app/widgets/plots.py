@@ -9,6 +9,9 @@ import pyqtgraph as pg
 
 from app.theme import Theme
 
+#: Red, green and blue that are told apart on both themes.
+RGB_COLOURS = ("#e0524d", "#2fa84f", "#4c8dff")
+
 
 def calm_plot(name: str, tip: str, left: str, bottom: str, left_width: int = 52) -> Any:
     """A plot widget without menus and buttons that keeps its axes in place."""

@@ -246,6 +246,7 @@ def _sample(each: SeenFilter, place: PlacedFilter, found: tuple[float, float] | 
         filter_nm=each.filter_nm,
         effective_nm=place.effective_nm,
         found_nm=None if found is None else found[0],
+        found_std_nm=None if found is None else found[1],
         curve_measured=each.measured_curve,
         zero_dn_per_ms=(red, green, blue),
         orders=tuple(orders),

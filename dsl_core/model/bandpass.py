@@ -22,12 +22,14 @@ class OrderSample(Record):
 class FilterSample(Record):
     """One filter: nominal centre, effective wavelength of what it passes, zero order (DN per ms) and orders.
 
-    ``found_nm`` is where the orders' places say the filter is, None where it was not found.
+    ``found_nm`` is where the orders' places say the filter is, with its deviation, None where it was not
+    found.
     """
 
     filter_nm: float
     effective_nm: float
     found_nm: float | None = None
+    found_std_nm: float | None = Field(default=None, ge=0)
     curve_measured: bool
     zero_dn_per_ms: tuple[float, float, float]
     orders: tuple[OrderSample, ...]
