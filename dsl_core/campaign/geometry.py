@@ -17,9 +17,8 @@ from dsl_core.campaign.board_look import look_at_board
 from dsl_core.campaign.board_poses import default_poses
 from dsl_core.campaign.exposures import bracket, measure_white
 from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.step_scan import is_complete, scan_of, scan_step
 from dsl_core.errors import CalibrationError
-from dsl_core.io.session_manifest import MANIFEST_NAME
-from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.board import Board, Checkerboard
 from dsl_core.model.figure import Figure
@@ -29,7 +28,6 @@ from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
-SCAN_NAME = "scan.dsl"
 #: Limits of a good calibration, camera pixels of the unbinned sensor and projector pixels.
 RMS_PX, PLANE_SHARE, SQUARE_SHARE, COVERAGE = 0.5, 5e-4, 0.005, 0.35
 #: Why a pose is left out that could be used.
@@ -86,8 +84,7 @@ class GeometryRecipe:
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether the scan of the pose is complete."""
-        scan = bench.step_folder(step) / SCAN_NAME
-        return (scan / MANIFEST_NAME).exists() and not SessionReader(scan).missing()
+        return is_complete(bench.step_folder(step))
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose an exposure by a test shot and capture the code; a scan that was begun goes on.
@@ -95,25 +92,9 @@ class GeometryRecipe:
         Raises `CalibrationError` naming the pose when the board or the code on it cannot be read, or white is
         saturated.
         """
-        from dsl_core import pipeline
-
-        scan = bench.step_folder(step) / SCAN_NAME
-        if (scan / MANIFEST_NAME).exists():
-            plan = SessionReader(scan).plan
-        else:
-            white = measure_white(bench.devices, bench.rig)
-            settings = bracket(bench.rig, white, f"The board of {step.title}", self.ratio)
-            plan = CapturePlan(
-                name=step.title,
-                code=GrayCode(),
-                spectral=NoSpectral(),
-                settings=settings,
-                code_settings=tuple(range(len(settings))),
-            )
-            plan = pipeline.fit_plan(plan, bench.devices)
-            scan.parent.mkdir(parents=True, exist_ok=True)
-        pipeline.scan(bench.devices, plan, scan, progress)
-        frames = read_pose(bench.step_folder(step), step.title, bench.rig)
+        folder = bench.step_folder(step)
+        plan = scan_step(bench.devices, folder, lambda: self._plan(bench, step), progress)
+        frames = read_pose(folder, step.title, bench.rig)
         doubt = exposure_warning(frames, observe_pose(frames, self.board, plan.projector_size_px))
         if doubt:
             raise CalibrationError(doubt)
@@ -137,7 +118,7 @@ class GeometryRecipe:
                 progress.report("find the board", index, len(steps))
                 yield read_pose(bench.step_folder(step), step.title, bench.rig)
 
-        plan = SessionReader(bench.step_folder(steps[0]) / SCAN_NAME).plan
+        plan = scan_of(bench.step_folder(steps[0])).plan
         series = observe_series(pictures(), self.board, plan.projector_size_px)
         progress.report("adjust lenses and pose", 0, 1)
         record = calibrate_geometry(
@@ -170,6 +151,18 @@ class GeometryRecipe:
         )
         return known.model_copy(update={"column_std_px": open_columns_px(known)})
 
+    def _plan(self, bench: Bench, step: Step) -> CapturePlan:
+        """The plan of a pose by a test shot."""
+        white = measure_white(bench.devices, bench.rig)
+        settings = bracket(bench.rig, white, f"The board of {step.title}", self.ratio)
+        return CapturePlan(
+            name=step.title,
+            code=GrayCode(),
+            spectral=NoSpectral(),
+            settings=settings,
+            code_settings=tuple(range(len(settings))),
+        )
+
 
 def open_columns_px(rig: Rig) -> float:
     """What the geometry's covariance leaves open in zero-order columns, px, rms over the image and depths."""
@@ -186,7 +179,7 @@ def read_pose(folder: Path, name: str, rig: Rig) -> PoseFrames:
     """Pictures of a captured pose in linear light, all settings merged, black subtracted."""
     from dsl_core.reconstruction.merge import MergedScan
 
-    reader = SessionReader(folder / SCAN_NAME)
+    reader = scan_of(folder)
     scan = MergedScan(reader, rig)
     pairs = [scan.merge("code", index).radiance for index in range(reader.plan.code_count)]
     white = scan.merge("white", 0)
