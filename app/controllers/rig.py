@@ -40,7 +40,7 @@ class RigController:
         self.state, self._runner, self._notifier = state, runner, notifier
         self._wrap = wrap_projector
         self._live_job: Job[None] | None = None
-        self._waiting: list[Job[Any]] = []
+        self._waiting: list[tuple[Job[Any], Callable[[str], object]]] = []
         self._mail: Frame | None = None
         self._lock = threading.Lock()
         self.frames_seen = 0
@@ -144,8 +144,8 @@ class RigController:
         self._live_job = None
         self.state.live.set(False)
         waiting, self._waiting = self._waiting, []
-        for job in waiting:
-            self.run(job)
+        for job, refused in waiting:
+            self.run(job, refused)
 
     def _live_failed(self, error: Exception) -> None:
         self.state.link.set(Link.LOST)
@@ -155,18 +155,25 @@ class RigController:
 
     # Use -------------------------------------------------------------------------------------------
 
-    def run(self, job: Job[Any]) -> bool:
-        """Run a job that uses the rig, after the live view has stopped; False when another one uses it."""
+    def run(self, job: Job[Any], refused: Callable[[str], object] | None = None) -> bool:
+        """Run a job that uses the rig, after the live view has stopped; False when another one uses it.
+
+        ``refused`` is told why, now or when the live view has stopped; else the person at the window is.
+        """
+        refused = refused or self._tell_refused
         if self._live_job is not None:
-            self._waiting.append(job)
+            self._waiting.append((job, refused))
             self.stop_live()
             return True
         try:
             self._runner.submit(job)
         except DslError as error:
-            self._notifier.tell("warning", str(error))
+            refused(str(error))
             return False
         return True
+
+    def _tell_refused(self, text: str) -> None:
+        self._notifier.tell("warning", text)
 
     def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
         """Project a trial picture; the live view goes on meanwhile."""
