@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from dsl_core.campaign.assembly import accepted_calibrations, campaign_recipes
 from dsl_core.campaign.recipe import Recipe
+from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import save_rig
 from dsl_core.io.staging import staged
@@ -36,10 +37,12 @@ def write_products(
     library_name: str | None,
     costs: Sequence[StageCost] = (),
     recipes: Sequence[Recipe] | None = None,
+    library: CalibrationLibrary | None = None,
 ) -> Products:
     """Write ``rig.json`` and ``report.html`` anew and store the rig in the library; raises `StoreError`.
 
-    A rig that equals the library's current one but for its date is not stored a second time.
+    ``library`` is that of this computer if not given. A rig that equals its current one but for the date
+    is not stored a second time.
     """
     recipes = campaign_recipes(campaign) if recipes is None else recipes
     accepted = tuple(accepted_calibrations(campaign, recipes).values())
@@ -47,7 +50,7 @@ def write_products(
     path = save_rig(rig, campaign.path / RIG_NAME, overwrite=True)
     report = write_calibration_report(campaign.path / REPORT_NAME, rig, accepted, history, costs)
     if library_name is not None:
-        _store(library_name, rig, accepted, history)
+        _store(library or CalibrationLibrary(), library_name, rig, accepted, history)
     return Products(path, report, library_name)
 
 
@@ -68,11 +71,12 @@ def write_calibration_report(
 
 
 def _store(
-    name: str, rig: Rig, accepted: tuple[AcceptedCalibration, ...], history: tuple[AcceptedCalibration, ...]
+    library: CalibrationLibrary,
+    name: str,
+    rig: Rig,
+    accepted: tuple[AcceptedCalibration, ...],
+    history: tuple[AcceptedCalibration, ...],
 ) -> None:
-    from dsl_core.io.calibration_library import CalibrationLibrary
-
-    library = CalibrationLibrary()
     same = {"provenance": rig.provenance}
     if name in library.names() and library.find(name).rig.model_copy(update=same) == rig:
         return
