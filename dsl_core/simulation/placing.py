@@ -23,7 +23,9 @@ class Mishaps:
 
     ``wrong_filter_nm`` is in the beam whichever was asked for; filters are tilted by ``filter_tilt_deg``;
     diffusers bulge by ``bow_mm`` over 300 mm; the stage moves ``stage_scale`` times as far from 700 mm as it
-    says; a chart is turned by ``roll_deg`` more than asked.
+    says; a chart is turned by ``roll_deg`` more than asked; a board stands ``shift_mm`` to the right of where
+    it should and is printed ``print_scale`` times as large; with ``missing`` there is a wall instead of a
+    board or a chart.
     """
 
     wrong_filter_nm: float | None = None
@@ -31,6 +33,9 @@ class Mishaps:
     bow_mm: float = 0.0
     stage_scale: float = 1.0
     roll_deg: float = 0.0
+    shift_mm: float = 0.0
+    print_scale: float = 1.0
+    missing: bool = False
 
 
 @dataclass
@@ -70,13 +75,26 @@ class TwinHand:
             case "spectralon":
                 position = _position_mm(options)
                 return lambda position_mm: self._diffuser(position_mm, options), position
+            case "color-checker" | "board" if self.mishaps.missing:
+                return lambda position_mm: make_scene("plane", depth_mm=position_mm), STAGE_MM
             case "color-checker":
                 turn = (float(options.pop("roll_deg", 0.0)) + self.mishaps.roll_deg + 180) % 360 - 180
                 return lambda position_mm: make_scene("color-checker", roll_deg=turn, **options), STAGE_MM
             case "board":
                 position = _position_mm(options)
-                return lambda mm: make_scene("board", depth_mm=self._carried_to(mm), **options), position
+                printed = {**options, **self._mistaken(options)}
+                return lambda mm: make_scene("board", depth_mm=self._carried_to(mm), **printed), position
         raise DeviceError(f"The twin has no target {placement.target!r}.")
+
+    def _mistaken(self, options: dict[str, float | str]) -> dict[str, float]:
+        """Options of a board that differ from what was asked."""
+        found = {}
+        if self.mishaps.shift_mm:
+            found["x_mm"] = float(options.get("x_mm", 0.0)) + self.mishaps.shift_mm
+        if self.mishaps.print_scale != 1:
+            sizes = [name for name in ("square_mm", "marker_mm") if name in options]
+            found |= {name: float(options[name]) * self.mishaps.print_scale for name in sizes}
+        return found
 
     def _diffuser(self, position_mm: float, options: dict[str, float | str]) -> Scene:
         depth = self._carried_to(position_mm)

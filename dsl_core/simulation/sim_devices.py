@@ -173,8 +173,9 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
 
     For calibrations: ``truth`` (a number draws a rig around the published one, whose calibration nobody
     knows), ``led_cycle_hz`` (the LEDs flash in turn instead of shining steadily), ``ambient_dn_per_ms``. For
-    mishaps: ``defocus_px``, ``wrong_filter_nm``, ``filter_tilt_deg``, ``bow_mm``, ``stage_scale``,
-    ``chart_roll_deg``.
+    mishaps: ``defocus_px``, ``brightness`` (the light is so many times as bright), ``wrong_filter_nm``,
+    ``filter_tilt_deg``, ``bow_mm``, ``stage_scale``, ``chart_roll_deg``, ``board_shift_mm``, ``print_scale``,
+    ``target_missing`` (``on``, ``off``).
 
     Raises `DeviceError` for a value that makes no sense.
     """
@@ -196,6 +197,9 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         rig = rig.model_copy(
             update={"sensor": rig.sensor.model_copy(update={"read_noise_dn": float(noise_dn)})}
         )
+    brightness = _number("brightness", rest.pop("brightness", "1"))
+    if brightness != 1:
+        rig = rig.model_copy(update={"white_scale": rig.white_scale * brightness})
     mishaps = _mishaps(rest)
     name = rest.pop("scene", "color-checker")
     world = World(
@@ -232,6 +236,9 @@ def _mishaps(options: dict[str, str]) -> Mishaps:
         _number("bow_mm", options.pop("bow_mm", "0")),
         _number("stage_scale", options.pop("stage_scale", "1")),
         _number("chart_roll_deg", options.pop("chart_roll_deg", "0")),
+        _number("board_shift_mm", options.pop("board_shift_mm", "0")),
+        _number("print_scale", options.pop("print_scale", "1")),
+        _switch("target_missing", options.pop("target_missing", "off")),
     )
 
 

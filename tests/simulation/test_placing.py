@@ -193,6 +193,28 @@ def test_a_chart_can_hang_upside_down() -> None:
     assert world.truth.materials.names[upright[14, 22]] == world.truth.materials.names[turned[43, 66]]
 
 
+def test_a_board_can_be_elsewhere_larger_or_missing() -> None:
+    asked = Placement(target="board", film=False, options={"square_mm": 20.0, "x_mm": 6.0, "depth_mm": 700.0})
+    worlds = {}
+    for mishap, value in (("size", "222x145"), ("board_shift_mm", "40"), ("print_scale", "1.1")):
+        rig, worlds[mishap] = twin(**{"size": "222x145", mishap: value})
+        place(rig, asked)
+    paper = {mishap: world.truth.material < 2 for mishap, world in worlds.items()}
+    columns = {mishap: np.flatnonzero(seen.any(0)) for mishap, seen in paper.items()}
+    moved_px = worlds["size"].rig.camera.fx_px * 40 / 700
+    assert columns["board_shift_mm"][0] - columns["size"][0] == pytest.approx(moved_px, abs=1.5)
+    # The margin around the squares is not printed.
+    assert paper["print_scale"].sum() == pytest.approx(paper["size"].sum() * 1.18, rel=0.03)
+    rig, world = twin(target_missing="on")
+    place(rig, asked)
+    assert world.truth.materials.names == ("diffuser",)
+
+
+def test_light_can_be_brighter_or_dimmer() -> None:
+    dim = shine(twin(brightness="0.5")[0]).mean()
+    assert dim == pytest.approx(0.5 * shine(twin()[0]).mean(), rel=0.01)
+
+
 def test_defocus_softens_what_is_seen() -> None:
     rows = {}
     for defocus in ("0", "3"):
