@@ -31,7 +31,8 @@ from dsl_core.optics.light_path import zero_order_profile
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.pattern_table import PatternTable
-from dsl_core.simulation.truth import SceneTruth
+from dsl_core.simulation.surface_light import surface_shading
+from dsl_core.simulation.truth import Parts, SceneTruth
 
 ORDERS = (1, -1, 2, -2)
 THREADS = 2
@@ -77,18 +78,32 @@ class OrderTables:
 
 
 class Renderer:
-    """Expected signal of one scene on one rig, in DN per ms above black."""
+    """Expected signal of one scene on one rig, in DN per ms above black.
 
-    def __init__(self, rig: Rig, truth: SceneTruth, *, film: bool = True, device: str = "cpu") -> None:
+    ``parts`` are what light comes from as `SceneTruth.parts` lists it, which is what they are if not given;
+    ``orders`` those of the film beside the zero order.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        truth: SceneTruth,
+        *,
+        film: bool = True,
+        device: str = "cpu",
+        orders: tuple[int, ...] = ORDERS,
+        shaded: bool = True,
+        parts: Parts | None = None,
+    ) -> None:
         self.rig = self._bare = rig
         self.device = torch.device(device)
         self.shape = truth.depth_mm.shape
-        pixel, material, share = truth.parts()
+        pixel, material, share = truth.parts() if parts is None else parts
         self.pixels = self._tensor(pixel, torch.int64)
         depth = self._tensor(truth.depth_mm.ravel()[pixel])
         channel = bayer_channels(rig.sensor.bayer, *self.shape).ravel()[pixel]
         self.material_channel = self._tensor(material.astype(np.int64) * 3 + channel, torch.int64)
-        self.shading = self._tensor(self._shading(truth).ravel()[pixel] * share)
+        self.shading = self._tensor(surface_shading(rig, truth, shaded).ravel()[pixel] * share)
         self.column, self.row = zero_order(rig, self.pixels, depth)
         w, h = rig.projector.width_px, rig.projector.height_px
         inside = (self.row > -0.5) & (self.row < h - 0.5) & (self.column > -1.5) & (self.column < w + 0.5)
@@ -96,7 +111,7 @@ class Renderer:
         self._reflectance = truth.materials.at(NM)
         self.slicing = BROAD
         self.zero_table = self._zero_table()
-        self.orders = [self._order(m, depth) for m in ORDERS] if film else []
+        self.orders = [self._order(m, depth) for m in orders] if film else []
         halo = (
             rig.projector_response
             if film
@@ -104,11 +119,12 @@ class Renderer:
         )
         self.response = halo
         self._white: Tensor | None = None
+        self._colours: tuple[Renderer, ...] = ()
 
     def through(self, transmission: SpectralCurve | None) -> Renderer:
         """The same view through a filter before the camera (None: without); the geometry is shared."""
         other = copy.copy(self)
-        other.rig, other.slicing, other._white = self._bare, BROAD, None
+        other.rig, other.slicing, other._white, other._colours = self._bare, BROAD, None, ()
         if transmission is not None:
             passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
             # On the renderer's own grid, as the rig's may be too coarse for a narrow band.
@@ -132,18 +148,6 @@ class Renderer:
 
     def _tensor(self, array: NDArray[Any], dtype: torch.dtype = torch.float32) -> Tensor:
         return torch.as_tensor(np.ascontiguousarray(array), device=self.device, dtype=dtype)
-
-    def _shading(self, truth: SceneTruth) -> NDArray[np.float64]:
-        """Cosine of incidence times inverse square distance times gain, zero in shadow, (rows, columns)."""
-        from dsl_core.optics.flat_field import relative_gain
-        from dsl_core.optics.pinhole import pixel_rays
-
-        points = pixel_rays(self.rig.camera) * np.nan_to_num(truth.depth_mm, nan=1.0)
-        to_light = self.rig.pose.projector_centre_mm[:, None, None] - points
-        distance = np.linalg.norm(to_light, axis=0)
-        cosine = (np.nan_to_num(truth.normals) * to_light).sum(0) / distance
-        light = cosine.clip(min=0) * (self.rig.reference_distance_mm / distance) ** 2 * truth.lit
-        return np.asarray(light * relative_gain(self.rig))
 
     def _order(self, order: int, depth: Tensor) -> OrderTables:
         nodes = chebyshev_nodes(NM[0], NM[-1])
@@ -209,12 +213,29 @@ class Renderer:
     def expected(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Signal (rows, columns), DN per ms, of drive levels (height, width, 3) or (height, width)."""
         colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
+        out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
+        out.index_add_(0, self.pixels, self.of_parts(colour))
+        return out.reshape(self.shape).cpu().numpy()
+
+    def planes(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Signal as a camera without a mosaic would see it, DN per ms, shape (3, rows, columns)."""
+        if not self._colours:
+            self._colours = tuple(self._of_colour(channel) for channel in range(3))
+        return np.stack([colour.expected(image) for colour in self._colours])
+
+    def _of_colour(self, channel: int) -> Renderer:
+        """The same view, every pixel of which sees one colour; the geometry is shared."""
+        other = copy.copy(self)
+        other.material_channel = self.material_channel.div(3, rounding_mode="floor") * 3 + channel
+        other._white, other._colours = None, ()
+        return other
+
+    def of_parts(self, colour: NDArray[np.uint8]) -> Tensor:
+        """Signal (parts,), DN per ms, of drive levels (height, width, 3)."""
         runs = _white_runs(colour)
         most = MAX_RUNS if self.slicing is BROAD else MAX_RUNS_FILTERED
         signal = self._any(colour) if runs is None or len(runs) > most else self._lines(runs)
-        out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
-        out.index_add_(0, self.pixels, signal * self.shading)
-        return out.reshape(self.shape).cpu().numpy()
+        return signal * self.shading
 
     def _black(self) -> Tensor | float:
         """Light of a dark projector: its black level times the signal of white."""

@@ -1,4 +1,4 @@
-"""Targets with relief: steps, sphere, open box, relief and face."""
+"""Targets with relief: steps, sphere, wax, open box, relief and face."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.simulation import materials as spectra
+from dsl_core.simulation.finish import SKIN, WAX, Finish
 from dsl_core.simulation.height_field import height_field
 from dsl_core.simulation.options import ENDLESS, IMAGE_CENTRE_MM, check_range
 from dsl_core.simulation.surfaces import Block, Rectangle, Sphere, tilted, uniform
@@ -39,16 +40,38 @@ def steps(depth_mm: float = 640.0, step_mm: float = 25.0, count: int = 5) -> Sce
     return Scene("steps", f"{count} steps of {step_mm:g} mm", (*blocks, _wall(back, 1)), palette)
 
 
-def sphere(radius_mm: float = 60.0, depth_mm: float = 720.0) -> Scene:
-    """A matte ball, its centre at a depth, before a white wall that its shadow falls on."""
+def sphere(
+    radius_mm: float = 60.0, depth_mm: float = 720.0, gloss: float = 0.0, roughness: float = 0.25
+) -> Scene:
+    """A ball, matte or glossy, its centre at a depth, before a white wall that its shadow falls on.
+
+    ``gloss`` is the reflectance of its varnish at normal incidence, 0.04 for glass.
+    """
     check_range("depth_mm", depth_mm, 300, 2000, "mm")
     check_range("radius_mm", radius_mm, 1, 0.4 * depth_mm, "mm")
+    check_range("gloss", gloss, 0, 1)
+    check_range("roughness", roughness, 0.05, 1)
     ball = Sphere(np.array([_CX, _CY, depth_mm]), radius_mm, uniform(0))
     palette = Materials.of(
-        {"yellow": spectra.pigment(0.08, 0.75, 520.0), "diffuser": spectra.flat(spectra.SPECTRALON)}
+        {"yellow": spectra.pigment(0.08, 0.75, 520.0), "diffuser": spectra.flat(spectra.SPECTRALON)},
+        finishes={"yellow": Finish(gloss=gloss, roughness=roughness)},
     )
     description = f"ball of radius {radius_mm:g} mm before a white wall"
     return Scene("sphere", description, (ball, _wall(depth_mm + radius_mm + 10.0, 1)), palette)
+
+
+def wax(depth_mm: float = 700.0) -> Scene:
+    """A block and a ball of wax before a dark wall: light leaves them beside where it entered."""
+    check_range("depth_mm", depth_mm, 400, 2000, "mm")
+    block = Block(
+        np.array([_CX - 110.0, _CY - 70.0, depth_mm]), np.array([_CX, _CY + 70.0, depth_mm + 60]), 0
+    )
+    ball = Sphere(np.array([_CX + 65.0, _CY, depth_mm + 45.0]), 45.0, uniform(0))
+    palette = Materials.of(
+        {"wax": spectra.pigment(0.45, 0.75, 480.0, 40.0), "wall": spectra.flat(0.1)}, ("wall",), {"wax": WAX}
+    )
+    surfaces = (block, ball, _wall(depth_mm + 100.0, 1))
+    return Scene("wax", f"block and ball of wax at {depth_mm:g} mm", surfaces, palette)
 
 
 def box(depth_mm: float = 760.0, deep_mm: float = 110.0, reflectance: float = 0.85) -> Scene:
@@ -161,6 +184,7 @@ def face(depth_mm: float = 690.0) -> Scene:
             "hair": spectra.hair(),
             "wall": spectra.flat(0.25),
             "cheek": spectra.skin(blood=0.008),
-        }
+        },
+        finishes=dict.fromkeys(("skin", "lips", "cheek"), SKIN),
     )
     return Scene("face", f"face-like surface at {depth_mm:g} mm", (surface,), palette)

@@ -21,6 +21,7 @@ _BUILDERS: dict[str, Callable[..., Scene]] = {
     "steps": scene_solid.steps,
     "sphere": scene_solid.sphere,
     "box": scene_solid.box,
+    "wax": scene_solid.wax,
     "color-checker": scene_flat.color_checker,
     "board": scene_board.board,
     "filters": scene_flat.filters,

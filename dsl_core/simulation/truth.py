@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.geometry import Lens
 from dsl_core.optics.pinhole import pixel_rays, rays_at
+from dsl_core.simulation.finish import Finish
 from dsl_core.simulation.surfaces import Surface, materials_along, trace
 
 #: Fine grid of all palettes, nm: 400 to 700 in steps of 1, shape (301,).
 FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
 FINE_NM.setflags(write=False)
+
+#: What light comes from: pixel, material and share of the pixel, each (n,).
+Parts = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]
 
 #: Rays into a pixel on an edge, which tell the shares of its two materials.
 EDGE_RAYS = 256
@@ -24,18 +29,25 @@ class Materials:
     """A palette of reflectance spectra on the Spectralon scale.
 
     ``wavelengths_nm`` has shape (L,), ``reflectance`` shape (M, L), 0..1, one row per name.
-    ``surroundings`` names the materials that are in view but not what the scene is about.
+    ``surroundings`` names the materials that are in view but not what the scene is about; ``finishes`` says
+    which materials are glossy or translucent, by name. All others are matte and opaque.
     """
 
     names: tuple[str, ...]
     wavelengths_nm: NDArray[np.float64]
     reflectance: NDArray[np.float64]
     surroundings: tuple[str, ...] = ()
+    finishes: Mapping[str, Finish] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, spectra: dict[str, NDArray[np.float64]], surroundings: tuple[str, ...] = ()) -> Materials:
+    def of(
+        cls,
+        spectra: dict[str, NDArray[np.float64]],
+        surroundings: tuple[str, ...] = (),
+        finishes: Mapping[str, Finish] | None = None,
+    ) -> Materials:
         """Make a palette from named spectra on the fine grid, in the order of the dictionary."""
-        return cls(tuple(spectra), FINE_NM, np.stack(list(spectra.values())), surroundings)
+        return cls(tuple(spectra), FINE_NM, np.stack(list(spectra.values())), surroundings, finishes or {})
 
     @property
     def targets(self) -> tuple[int, ...]:
@@ -74,7 +86,7 @@ class SceneTruth:
     lit: NDArray[np.bool_]
     mixed: MixedPixels | None = None
 
-    def parts(self) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+    def parts(self) -> Parts:
         """What light comes from: pixel, material and share of the pixel, (n,); mixed pixels come twice."""
         solid = np.flatnonzero(np.isfinite(self.depth_mm) & (self.material >= 0))
         material, share = self.material.ravel()[solid], np.ones(self.depth_mm.size)

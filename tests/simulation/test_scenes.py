@@ -29,7 +29,7 @@ def points(truth: SceneTruth) -> NDArray[np.float64]:
 
 
 def test_every_scene_is_on_offer() -> None:
-    expected = "plane bowed stage steps sphere box color-checker board filters leaves relief face"
+    expected = "plane bowed stage steps sphere box wax color-checker board filters leaves relief face"
     assert set(NAMES) == set(expected.split())
     assert all(entry.description for entry in scene_catalogue())
 
