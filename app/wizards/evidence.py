@@ -58,7 +58,11 @@ class PlainEvidence(Evidence):
 
 
 #: Module and class by the name of the recipe; imported when they are first wanted.
-_WIDGETS: dict[str, tuple[str, str]] = {}
+_WIDGETS = {
+    "geometry": ("app.wizards.geometry_evidence", "GeometryEvidence"),
+    "spectralon": ("app.wizards.spectralon_evidence", "SpectralonEvidence"),
+    "bandpass": ("app.wizards.bandpass_evidence", "BandpassEvidence"),
+}
 
 
 def make_evidence(name: str) -> Evidence:

@@ -30,8 +30,6 @@ from dsl_core.progress import Progress
 
 #: Limits of a good calibration, camera pixels of the unbinned sensor and projector pixels.
 RMS_PX, PLANE_SHARE, SQUARE_SHARE, COVERAGE = 0.5, 5e-4, 0.005, 0.35
-#: Why a pose is left out that could be used.
-BY_HAND = "A person left it out."
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,11 @@ class GeometryRecipe:
         steps = [step for step in every if step.key not in self.left_out]
         if len(steps) < MIN_POSES:
             raise CalibrationError(f"{len(steps)} poses are too few; {MIN_POSES} are needed, 10 are good.")
-        unwanted = [LeftOut(name=s.title, reason=BY_HAND) for s in every if s.key in self.left_out]
+        unwanted = [
+            LeftOut(name=step.title, reason="A person left it out.", by_hand=True)
+            for step in every
+            if step.key in self.left_out
+        ]
 
         def pictures() -> Iterator[PoseFrames]:
             for index, step in enumerate(steps):

@@ -60,10 +60,11 @@ class PoseQuality(Record):
 
 
 class LeftOut(Record):
-    """A pose that could not be used, or that a person did without, and why."""
+    """A pose that could not be used, or (``by_hand``) that a person did without, and why."""
 
     name: str
     reason: str
+    by_hand: bool = False
 
 
 class GeometryCalibration(Record):

@@ -91,7 +91,7 @@ def test_columns_of_the_drawn_rig_come_back(bench: Bench, record: GeometryCalibr
 def test_a_pose_that_a_person_left_out_is_not_in_the_fit(bench: Bench, record: GeometryCalibration) -> None:
     found = replace(RECIPE, left_out=("pose-03",)).fit(bench, NoProgress())
     assert [pose.name for pose in found.poses] == ["Pose 1", "Pose 2", "Pose 4", "Pose 5", "Pose 6"]
-    assert [(each.name, each.reason) for each in found.left_out] == [("Pose 3", "A person left it out.")]
+    assert [(each.name, each.by_hand) for each in found.left_out] == [("Pose 3", True)]
     assert found.camera != record.camera
     assert all(RECIPE.is_captured(bench, step) for step in RECIPE.steps(bench))
     with pytest.raises(CalibrationError, match="There is no pose pose-99 to leave out; there are pose-01"):

@@ -1,0 +1,215 @@
+"""What evidence is made of: plots with a caption and a legend, tables of numbers, and reading aside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
+from PySide6.QtGui import QColor, QFont
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QLabel,
+    QStackedLayout,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.theme import DARK, Theme
+from app.widgets.forms import label
+from app.widgets.plots import calm_plot, theme_plots
+
+Floats = NDArray[np.floating[Any]]
+#: A name of the legend with its colour (``#rrggbb``) and the sign that stands for it.
+Key = tuple[str, str, str]
+LINE, DOT, BAR = "━", "●", "■"
+
+
+class ChartBox(QWidget):
+    """A plot under its title and legend; a sentence in its place while there is nothing to draw."""
+
+    def __init__(self, title: str, tip: str, left: str, bottom: str, left_width: int = 52) -> None:
+        super().__init__()
+        self._theme = DARK
+        self.title = label(title, "heading")
+        self.plot = calm_plot(title, tip, left, bottom, left_width)
+        self.plot.setMouseEnabled(False, False)
+        self.plot.setMinimumHeight(90)
+        self.item = self.plot.getPlotItem()
+        self.legend = QLabel()
+        self.legend.setWordWrap(True)
+        self.legend.setTextFormat(Qt.TextFormat.RichText)
+        self.legend.setAccessibleName(f"Legend of {title}")
+        self.sentence = label("", "muted")
+        self.sentence.setWordWrap(True)
+        self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self._stack = QStackedLayout()
+        self._stack.addWidget(self.plot)
+        self._stack.addWidget(self.sentence)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(2)
+        column.addWidget(self.title)
+        column.addWidget(self.legend)
+        column.addLayout(self._stack, 1)
+
+    def begin(self) -> None:
+        """Forget what was drawn and show the plot."""
+        self.item.clear()
+        self.legend.clear()
+        self.legend.hide()
+        self._stack.setCurrentWidget(self.plot)
+
+    def say(self, sentence: str) -> None:
+        """Show a sentence in place of the plot."""
+        self.begin()
+        self.sentence.setText(sentence)
+        self._stack.setCurrentWidget(self.sentence)
+
+    def name_curves(self, keys: Sequence[Key]) -> None:
+        """Show a legend of colours and names."""
+        self.legend.setText(
+            " &nbsp; ".join(
+                f'<span style="color:{colour}">{sign}</span>&nbsp;{escape(name).replace(" ", "&nbsp;")}'
+                for name, colour, sign in keys
+            )
+        )
+        self.legend.show()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme; what is drawn keeps its own."""
+        self._theme = theme
+        theme_plots((self.plot,), theme)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number or words of a table; ``role`` is good, warn, bad or muted."""
+
+    text: str
+    role: str = ""
+
+
+class NumberTable(QTableWidget):
+    """Rows of numbers in figures of equal width, right-aligned below their heads; nothing to edit."""
+
+    def __init__(self, name: str, heads: Sequence[tuple[str, str]], words: Sequence[int] = (0,)) -> None:
+        """``heads`` are names and tool tips of the columns; ``words`` are those that hold words."""
+        super().__init__(0, len(heads))
+        self._theme, self._words, self._rows = DARK, set(words), list[list[Cell]]()
+        self.setAccessibleName(name)
+        self.setHorizontalHeaderLabels([head for head, _ in heads])
+        for column, (_, tip) in enumerate(heads):
+            head = self.horizontalHeaderItem(column)
+            assert head is not None
+            head.setToolTip(tip)
+            side = Qt.AlignmentFlag.AlignLeft if column in self._words else Qt.AlignmentFlag.AlignRight
+            head.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setTabKeyNavigation(False)
+        self.setShowGrid(False)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(22)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setStretchLastSection(len(heads) - 1 in self._words)
+        self.setStyleSheet("QTableView::item { padding: 0px 6px; }")
+        font = self.font()
+        font.setFeature(QFont.Tag("tnum"), 1)
+        self.setFont(font)
+
+    def fill(self, rows: Sequence[Sequence[Cell | str]]) -> None:
+        """Show other rows; typographic minus signs throughout."""
+        self._rows = [[each if isinstance(each, Cell) else Cell(each) for each in row] for row in rows]
+        self.setRowCount(len(rows))
+        for i, row in enumerate(self._rows):
+            for column, cell in enumerate(row):
+                words = column in self._words
+                item = QTableWidgetItem(cell.text if words else cell.text.replace("-", "−"))
+                side = Qt.AlignmentFlag.AlignLeft if words else Qt.AlignmentFlag.AlignRight
+                item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+                item.setToolTip(cell.text if words else "")
+                self.setItem(i, column, item)
+        self._colour()
+
+    def row_texts(self, row: int) -> list[str]:
+        """What a row says."""
+        found = [self.item(row, column) for column in range(self.columnCount())]
+        return [each.text() if each is not None else "" for each in found]
+
+    def _colour(self) -> None:
+        theme = self._theme
+        colours = {"": theme.text, "good": theme.good, "warn": theme.warn, "bad": theme.bad}
+        for i, row in enumerate(self._rows):
+            for column, cell in enumerate(row):
+                item = self.item(i, column)
+                if item is not None:
+                    item.setForeground(QColor(colours.get(cell.role, theme.muted)))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self._colour()
+
+
+def with_spread(value: float, std: float) -> str:
+    """A value and its deviation with two digits of the deviation.
+
+    >>> with_spread(210.8184, 0.0204), with_spread(3.0, 0.0)
+    ('210.818 ± 0.020', '3')
+    """
+    if std <= 0:
+        return f"{value:g}"
+    digits = min(max(1 - int(np.floor(np.log10(std))), 0), 6)
+    return f"{value:.{digits}f} ± {std:.{digits}f}"
+
+
+class Aside(QObject):
+    """Reads something in another thread and hands it over in the window's; only the latest is handed over."""
+
+    _ended = Signal(int, object, object)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._number = 0
+        self._show: Callable[[Any], object] | None = None
+        self._ended.connect(self._finish)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something is still being read."""
+        return self._show is not None
+
+    def read(self, work: Callable[[], Any], show: Callable[[Any], object]) -> None:
+        """Call ``show`` with what ``work`` returns, or with the exception that it raised."""
+        self._number, self._show = self._number + 1, show
+        number = self._number
+
+        def run() -> None:
+            try:
+                found, trouble = work(), None
+            except Exception as error:  # told in the window, never lost in a thread
+                found, trouble = None, error
+            # The widget may have been closed meanwhile; then nobody waits for it.
+            if self._is_alive():
+                self._ended.emit(number, found, trouble)
+
+        QThreadPool.globalInstance().start(run)
+
+    def _is_alive(self) -> bool:
+        from shiboken6 import isValid
+
+        return bool(isValid(self))
+
+    def _finish(self, number: int, found: object, trouble: Exception | None) -> None:
+        if number != self._number or self._show is None:
+            return
+        show, self._show = self._show, None
+        show(found if trouble is None else trouble)
