@@ -211,8 +211,8 @@ def test_a_board_can_be_elsewhere_larger_or_missing() -> None:
 
 
 def test_light_can_be_brighter_or_dimmer() -> None:
-    dim = shine(twin(brightness="0.5")[0]).mean()
-    assert dim == pytest.approx(0.5 * shine(twin()[0]).mean(), rel=0.01)
+    dim, right = (shine(twin(brightness=value)[0], 20.0).mean() for value in ("0.5", "1"))
+    assert dim == pytest.approx(0.5 * right, rel=0.02)
 
 
 def test_defocus_softens_what_is_seen() -> None:
