@@ -40,12 +40,12 @@ class About:
 
 #: By name and in order.
 ABOUT = {
-    "selftest": About("Self-test", "Camera, projector, timing, focus and room are good enough"),
-    "geometry": About("Geometry", "Both lenses and how they stand, from a printed board"),
-    "spectralon": About("Spectralon", "Light of the LEDs, evenness, and the white of all reflectance"),
-    "color-checker": About("Color Checker", "Finer response and emission, from 24 known patches"),
-    "bandpass": About("Bandpass filters", "How bright the film's orders are at each wavelength"),
-    "depth-stage": About("Depth stage", "Where the film stands, how it bends, what no formula says"),
+    "selftest": About("Self-test", "Camera, projector, focus and room"),
+    "geometry": About("Geometry", "Lenses and pose, from a printed board"),
+    "spectralon": About("Spectralon", "Light of the LEDs, evenness, white"),
+    "color-checker": About("Color Checker", "Response and emission, from patches"),
+    "bandpass": About("Bandpass filters", "Brightness of the film's orders"),
+    "depth-stage": About("Depth stage", "Where the film stands, how it bends"),
 }
 
 

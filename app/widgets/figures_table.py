@@ -1,0 +1,89 @@
+"""Figures beside their limits, with what to do about those that miss them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
+
+from app.theme import DARK, Theme
+from dsl_core.model.figure import Figure
+
+_COLUMNS = ("", "Figure", "Value", "Wanted", "What to do")
+_MARK_PX = 26
+
+
+class FiguresTable(QTableWidget):
+    """A row a figure: whether it passes, value ± standard deviation with unit, limits, advice."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(0, len(_COLUMNS))
+        self._theme, self._figures = DARK, tuple[Figure, ...]()
+        self.setAccessibleName(name)
+        self.setToolTip("Values with their standard deviation, against their limits")
+        self.setHorizontalHeaderLabels(_COLUMNS)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setTabKeyNavigation(False)
+        self.setWordWrap(True)
+        self.setShowGrid(False)
+        self.verticalHeader().hide()
+        header = self.horizontalHeader()
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
+        header.resizeSection(0, _MARK_PX)
+        header.setSectionResizeMode(4, QHeaderView.ResizeMode.Stretch)
+        header.sectionResized.connect(lambda *_: self.resizeRowsToContents())
+
+    def show_figures(self, figures: Sequence[Figure]) -> None:
+        """Show figures in their order."""
+        self._figures = tuple(figures)
+        self.setRowCount(len(self._figures))
+        for row, figure in enumerate(self._figures):
+            for column, item in enumerate(self._items(figure)):
+                self.setItem(row, column, item)
+        self.resizeRowsToContents()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.show_figures(self._figures)
+
+    def _items(self, figure: Figure) -> tuple[QTableWidgetItem, ...]:
+        theme, limited = self._theme, bool(figure.limits)
+        colour = theme.text if not limited else (theme.good if figure.passed else theme.bad)
+        mark = "" if not limited else ("✓" if figure.passed else "✗")
+        advice = "" if figure.passed else figure.advice
+        first = _item(mark, colour)
+        first.setData(
+            Qt.ItemDataRole.AccessibleTextRole,
+            "" if not limited else ("passed" if figure.passed else "missed"),
+        )
+        return (
+            first,
+            _item(figure.name, theme.text),
+            _item(value_words(figure), colour if not figure.passed else theme.text),
+            _item(figure.limits.replace("-", "−"), theme.muted),
+            _item(advice, theme.text),
+        )
+
+
+def value_words(figure: Figure) -> str:
+    """Value ± standard deviation and unit, with a typographic minus.
+
+    >>> value_words(Figure(name="shift", value=-1.25, std=0.04, unit="nm"))
+    '−1.250 ± 0.040 nm'
+    """
+    return str(figure).removeprefix(figure.name).strip().replace("-", "−")
+
+
+def _item(text: str, colour: str) -> QTableWidgetItem:
+    item = QTableWidgetItem(text)
+    item.setForeground(QColor(colour))
+    item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    if text:
+        item.setToolTip(text)
+    return item
