@@ -59,6 +59,7 @@ class PlainEvidence(Evidence):
 
 #: Module and class by the name of the recipe; imported when they are first wanted.
 _WIDGETS = {
+    "selftest": ("app.wizards.selftest_evidence", "SelfTestEvidence"),
     "geometry": ("app.wizards.geometry_evidence", "GeometryEvidence"),
     "spectralon": ("app.wizards.spectralon_evidence", "SpectralonEvidence"),
     "bandpass": ("app.wizards.bandpass_evidence", "BandpassEvidence"),

@@ -75,18 +75,18 @@ class ChartBox(QWidget):
 
     def name_curves(self, keys: Sequence[Key]) -> None:
         """Show a legend of colours and names."""
-        self.legend.setText(
-            " &nbsp; ".join(
-                f'<span style="color:{colour}">{sign}</span>&nbsp;{escape(name).replace(" ", "&nbsp;")}'
-                for name, colour, sign in keys
-            )
-        )
+        self.legend.setText(" &nbsp; ".join(_legend(*key) for key in keys))
         self.legend.show()
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme; what is drawn keeps its own."""
         self._theme = theme
         theme_plots((self.plot,), theme)
+
+
+def _legend(name: str, colour: str, sign: str) -> str:
+    words = escape(name).replace(" ", "&nbsp;")
+    return f'<span style="color:{colour}">{sign}</span>&nbsp;{words}' if sign else words
 
 
 @dataclass(frozen=True)
@@ -160,15 +160,15 @@ class NumberTable(QTableWidget):
 
 
 def with_spread(value: float, std: float) -> str:
-    """A value and its deviation with two digits of the deviation.
+    """A value and its deviation with two digits of the deviation, down to a ten-thousandth.
 
     >>> with_spread(210.8184, 0.0204), with_spread(3.0, 0.0)
     ('210.818 ± 0.020', '3')
     """
     if std <= 0:
         return f"{value:g}"
-    digits = min(max(1 - int(np.floor(np.log10(std))), 0), 6)
-    return f"{value:.{digits}f} ± {std:.{digits}f}"
+    digits = min(max(1 - int(np.floor(np.log10(std))), 0), 4)
+    return f"{value:.{digits}f} ± {max(std, 10.0**-digits):.{digits}f}"
 
 
 class Aside(QObject):

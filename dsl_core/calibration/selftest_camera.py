@@ -102,15 +102,16 @@ def check_camera(
     ``hot`` are hot pixels and all pixels. Raises `CalibrationError` when a channel has too few unclipped
     exposures.
     """
-    lines = [_line(series, channel, dark, transfer, sizes) for channel in range(3)]
-    intercepts, stds = np.array([line[0] for line in lines]), np.array([line[1] for line in lines])
+    lines = [exposure_line(series, channel, dark, transfer, sizes) for channel in range(3)]
+    intercepts, stds = np.array([(line.intercept.value, line.intercept.std) for line in lines]).T
+    red, green, blue = (line.largest_percent(sizes.full_scale_dn) for line in lines)
     weight = stds**-2 / (stds**-2).sum()
     count, total = hot
     return CameraCheck(
         bit_depth=sizes.bit_depth,
         black_level_dn=dark.level_dn,
         intercept_dn=Measured(value=float(weight @ intercepts), std=float((stds**-2).sum() ** -0.5)),
-        linearity_percent=(lines[0][2], lines[1][2], lines[2][2]),
+        linearity_percent=(red, green, blue),
         useful_dn=float(series.mean_dn[series.unclipped].max()),
         saturation_dn=_saturation(saturated, sizes),
         electrons_per_dn=transfer.electrons_per_dn,
@@ -137,10 +138,33 @@ def count_hot_pixels(first: NDArray[np.uint16], second: NDArray[np.uint16], nois
     return count
 
 
-def _line(
+@dataclass(frozen=True)
+class ExposureLine:
+    """Signal of one channel against exposure, (n,), and the straight line through it.
+
+    ``residual_dn`` are distances from the line, ``std_dn`` their deviations; ``intercept`` is where the line
+    meets an exposure of zero.
+    """
+
+    exposure_ms: Floats
+    value_dn: Floats
+    residual_dn: Floats
+    std_dn: Floats
+    intercept: Measured
+
+    def largest_percent(self, full_scale_dn: float) -> Measured:
+        """The largest distance from the line in percent of full scale."""
+        worst = int(np.abs(self.residual_dn).argmax())
+        percent = 100 / full_scale_dn
+        return Measured(
+            value=float(abs(self.residual_dn[worst]) * percent), std=float(self.std_dn[worst] * percent)
+        )
+
+
+def exposure_line(
     series: Readings, channel: int, dark: Dark, transfer: Transfer, sizes: RegionSizes
-) -> tuple[float, float, Measured]:
-    """Intercept with standard deviation, and the largest residual in percent of full scale."""
+) -> ExposureLine:
+    """The line of a channel through its unclipped readings; raises `CalibrationError` for too few of them."""
     used = series.unclipped[:, channel]
     exposure, value = series.exposure_ms[used], series.mean_dn[used, channel]
     if len(np.unique(exposure)) < _MIN_EXPOSURES:
@@ -151,11 +175,8 @@ def _line(
     signal = value - dark.level_dn.value
     std = np.hypot(transfer.mean_std(signal, sizes.pixels[channel]), STEADINESS * signal)
     found, covariance = line_fit(np.stack([np.ones_like(exposure), exposure], 1), value, std)
-    residual = np.abs(value - found[0] - found[1] * exposure)
-    worst = int(residual.argmax())
-    percent = 100 / sizes.full_scale_dn
-    largest = Measured(value=float(residual[worst] * percent), std=float(std[worst] * percent))
-    return float(found[0]), float(np.sqrt(covariance[0, 0])), largest
+    intercept = Measured(value=float(found[0]), std=float(np.sqrt(covariance[0, 0])))
+    return ExposureLine(exposure, value, value - found[0] - found[1] * exposure, std, intercept)
 
 
 def _saturation(saturated: Readings, sizes: RegionSizes) -> Measured:

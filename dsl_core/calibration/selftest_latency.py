@@ -38,7 +38,7 @@ def check_latency(readings: Readings, claimed_ms: float, has_times: bool, show_s
     when even the longest wait was too short.
     """
     right = is_right(readings)
-    judged, asked, stale = _trials(readings, right)
+    judged, asked, stale = trials(readings, right)
     failed = asked[~right[judged]]
     longest = asked.max()
     if len(failed) and failed.max() >= longest:
@@ -60,12 +60,12 @@ def check_latency(readings: Readings, claimed_ms: float, has_times: bool, show_s
 
 def first_failing(readings: Readings, right: NDArray[np.bool_]) -> float | None:
     """The longest wait that was too short at least once, ms; None when none was."""
-    judged, asked, _ = _trials(readings, right)
+    judged, asked, _ = trials(readings, right)
     failed = asked[~right[judged]]
     return float(failed.max()) if len(failed) else None
 
 
-def _trials(
+def trials(
     readings: Readings, right: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], int]:
     """Rows that are judged, the wait before each, and how many stale frames there were.

@@ -37,7 +37,7 @@ def check_projector(
     that of d with one slope for all channels. A channel that clips leaves the fit at that level only: a lit
     LED is seen, weaker, by the other two as well.
     """
-    fits = {colour: _fit_ramp(_select(ramps, colour), colour, dark, transfer, sizes) for colour in RAMPS}
+    fits = {colour: _fit_ramp(ramp_of(ramps, colour), colour, dark, transfer, sizes) for colour in RAMPS}
     values = np.array([check.gamma.value for check, _, _ in fits.values()])
     stds = np.array([check.gamma.std for check, _, _ in fits.values()])
     gamma, covariance = line_fit(np.ones((len(values), 1)), values, stds)
@@ -52,7 +52,7 @@ def check_projector(
     return projector, _ambient(dark, white)
 
 
-def _select(ramps: Readings, colour: Colour) -> Readings:
+def ramp_of(ramps: Readings, colour: Colour) -> Readings:
     """The frames in which exactly these LEDs are driven."""
     return ramps[((ramps.drive > 0) == np.array(RAMPS[colour], bool)).all(1)]
 
