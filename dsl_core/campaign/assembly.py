@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from dsl_core.campaign.recipe import Recipe
 from dsl_core.campaign.recipes import load_recipe, recipe_names
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.accepted import AcceptedCalibration
@@ -114,6 +115,18 @@ def require_needs(recipe: Recipe, accepted: Accepted) -> None:
             f"The calibration {recipe.name} needs {' and '.join(lacking)}, which no one accepted yet."
             f" Calibrate {lacking[0]} first."
         )
+
+
+def require_same_devices(accepted: Accepted, devices: DeviceRig) -> None:
+    """Raise `CalibrationError` when what a calibration builds on was captured with other devices."""
+    now = current_conditions(devices)
+    for name, each in accepted.items():
+        found = () if each.conditions is None else differences(each.conditions, now)
+        if found:
+            raise CalibrationError(
+                f"The calibration {name} was captured with other devices or settings: {'; '.join(found)}."
+                f" Set them back, calibrate {name} again, or begin a new campaign."
+            )
 
 
 def record_of(recipe: Recipe, accepted: AcceptedCalibration) -> Record:

@@ -93,7 +93,7 @@ class ColorCheckerRecipe:
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the chart is found, and how it is turned."""
         white = measure_white(bench.devices, bench.rig)
-        pose = self._pose(white.picture.astype(np.float32), bench.rig, "the test shot")
+        pose = self._pose(white.picture.astype(np.float32), bench.rig, f"the test shot of {step.title}")
         patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
         return (
             Figure(name="patches found", value=24, unit="", low=24, high=24),

@@ -238,4 +238,11 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             advice=more,
         ),
         Figure(name="picture covered, projector", value=100 * record.projector_coverage, unit="%"),
+        Figure(
+            name="doubts about poses and print",
+            value=float(len(record.warnings)),
+            unit="",
+            high=0.0,
+            advice=" ".join(record.warnings),
+        ),
     )

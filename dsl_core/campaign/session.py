@@ -20,6 +20,7 @@ from dsl_core.campaign.assembly import (
     nominal_rig,
     record_of,
     require_needs,
+    require_same_devices,
 )
 from dsl_core.campaign.captures import (
     CaptureNote,
@@ -41,6 +42,8 @@ from dsl_core.model.figure import Figure
 from dsl_core.progress import NoProgress, Progress
 
 State = Literal["missing", "captured", "refused"]
+#: What an accepted calibration says beside the settings of its recipe.
+ADDED_SETTINGS = ("rig", "exposures")
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,8 @@ class CalibrationSession:
     ) -> None:
         """``recipes`` are all calibrations in order, those of this installation if not given.
 
-        Raises `CalibrationError` when a calibration that this one needs is missing from the campaign, or
-        when nothing is known of the rig to start from.
+        Raises `CalibrationError` when a calibration that this one needs is missing from the campaign, when
+        one before it was captured with other devices or settings, or when nothing is known of the rig.
         """
         self.recipe, self.devices, self.campaign = recipe, devices, campaign
         recipes = campaign_recipes(campaign) if recipes is None else recipes
@@ -73,6 +76,7 @@ class CalibrationSession:
         before = recipes[: names.index(recipe.name)] if recipe.name in names else recipes
         accepted = accepted_calibrations(campaign, before)
         require_needs(recipe, accepted)
+        require_same_devices(accepted, devices)
         self.based_on = {name: each.accepted for name, each in accepted.items()}
         rig = apply_records(accepted, nominal_rig(devices), before)
         self.bench = Bench(devices, campaign.home(recipe.name), rig)
@@ -186,9 +190,13 @@ class CalibrationSession:
         self.campaign.discard(self.recipe.name)
 
     def accepted(self) -> AcceptedCalibration | None:
-        """The accepted calibration while it is good: complete, and fitted on the calibrations before it."""
+        """The accepted calibration while it is good: fitted on those before it and with these settings."""
         found = self.campaign.accepted(self.recipe.name)
-        return found if found is not None and found.based_on == self.based_on else None
+        if found is None or found.based_on != self.based_on:
+            return None
+        # What the session adds to the recipe's settings follows from captures, which are looked at elsewhere.
+        own = {name: text for name, text in found.settings.items() if name not in ADDED_SETTINGS}
+        return found if own == self.campaign.info.settings.get(self.recipe.name, {}) else None
 
     def _folder(self, step: Step) -> Path:
         return self.bench.step_folder(step)
@@ -208,7 +216,7 @@ class CalibrationSession:
     def _settings(self) -> dict[str, str]:
         """Rig, its options, the recipe's settings and the exposures: what a repetition needs."""
         info = self.campaign.info
-        found = {"rig": " ".join([info.rig, *(f"{key}={value}" for key, value in info.options.items())])}
-        found |= info.settings.get(self.recipe.name, {})
-        exposures = scan_settings(self.bench.folder)
-        return found | ({"exposures": ", ".join(exposures)} if exposures else {})
+        rig = " ".join([info.rig, *(f"{key}={value}" for key, value in info.options.items())])
+        exposures = ", ".join(scan_settings(self.bench.folder))
+        added = dict(zip(ADDED_SETTINGS, (rig, exposures), strict=True))
+        return info.settings.get(self.recipe.name, {}) | {name: text for name, text in added.items() if text}

@@ -32,9 +32,12 @@ class ConsoleGuide:
     tolerant: bool = False
 
     def begins(self, session: CalibrationSession, missing: int) -> None:
-        """Say what is to come."""
+        """Say what is to come, and why captures that are there are not good enough."""
         steps = len(session.steps)
         self.output.say(f"{session.recipe.title}: {missing} of {steps} steps to capture, then the fit.")
+        for each in session.statuses():
+            if each.state == "refused":
+                self.output.say(f"  {each.step.title} is captured anew: {each.reason}")
 
     def place(self, step: Step) -> None:
         """Ask a person to place the target."""

@@ -265,6 +265,33 @@ def test_what_was_fitted_on_a_superseded_calibration_is_fitted_again(
     assert new.record == old.record
 
 
+def test_other_settings_are_fitted_again_from_the_same_captures(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    recipe = FakeRecipe()
+    old = run_calibration(session(devices, campaign, recipe), Willing(), NoProgress())
+    captured = list(recipe.captured)
+    other = campaign.with_settings("fake", {"largest_dn": "3000"})
+    assert session(devices, other, recipe).accepted() is None
+    new = run_calibration(session(devices, other, recipe), Willing(), NoProgress())
+    assert recipe.captured == captured
+    assert new.accepted > old.accepted
+    assert new.settings["largest_dn"] == "3000"
+    assert session(devices, other, recipe).accepted() == new
+
+
+def test_nothing_is_calibrated_on_what_another_rig_was_captured_with(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    recipes = chain()
+    run_calibration(CalibrationSession(recipes[0], devices, campaign, recipes), Willing(), NoProgress())
+    another_camera(devices, serial="B")
+    with pytest.raises(CalibrationError, match=r"first was captured .* number was TWIN-C and is B"):
+        CalibrationSession(recipes[1], devices, campaign, recipes)
+    run_calibration(CalibrationSession(recipes[0], devices, campaign, recipes), Willing(), NoProgress())
+    assert CalibrationSession(recipes[1], devices, campaign, recipes).next_step() is not None
+
+
 def test_accepted_calibrations_of_two_rigs_are_not_assembled(
     devices: DeviceRig, campaign: CampaignFolder
 ) -> None:

@@ -155,7 +155,7 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
     content["conditions"]["camera"]["serial"] = "A"
     path.write_text(json.dumps(content))
     ending = give("calibrate", "all", folder, "--yes")
-    assert "selftest and geometry were captured with different devices or settings" in ending.sentence
+    assert "The calibration selftest was captured with other devices or settings" in ending.sentence
     assert "the camera's serial number was A and is TWIN-C" in ending.sentence
 
 
