@@ -62,6 +62,7 @@ _WIDGETS = {
     "selftest": ("app.wizards.selftest_evidence", "SelfTestEvidence"),
     "geometry": ("app.wizards.geometry_evidence", "GeometryEvidence"),
     "spectralon": ("app.wizards.spectralon_evidence", "SpectralonEvidence"),
+    "color-checker": ("app.wizards.color_checker_evidence", "ColorCheckerEvidence"),
     "bandpass": ("app.wizards.bandpass_evidence", "BandpassEvidence"),
 }
 

@@ -1,0 +1,34 @@
+"""The chart of a campaign as the camera saw it, for people to judge a fit by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.chart_colours import patch_colours
+from dsl_core.calibration.patches import chart_picture
+from dsl_core.campaign.flat_target import WHITE
+from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.step_scan import scan_of
+from dsl_core.model.color_checker import ColorCheckerCalibration
+
+
+@dataclass(frozen=True)
+class ChartView:
+    """The white picture, RGB (rows, columns, 3), and colours of the patches over white, (24, 3) each."""
+
+    picture: NDArray[np.uint8]
+    measured: NDArray[np.float64]
+    expected: NDArray[np.float64]
+
+
+def chart_view(record: ColorCheckerCalibration, bench: Bench, step: Step) -> ChartView:
+    """Read the white picture of the chart's step; raises `StoreError` when the captures are gone."""
+    from dsl_core.reconstruction.merge import MergedScan
+
+    scan = MergedScan(scan_of(bench.step_folder(step)), bench.rig)
+    white = scan.merge("spectral", WHITE).radiance
+    picture = chart_picture(white, bench.rig.sensor.bayer)
+    return ChartView(np.ascontiguousarray(picture[..., ::-1]), *patch_colours(record, bench.rig))
