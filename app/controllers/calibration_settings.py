@@ -69,10 +69,16 @@ def _kind(value: Any) -> str:
 
 
 def _doc(kind: type[Any], name: str) -> str:
-    """The sentence of the class's docstring that speaks of a field; empty when none does."""
+    """What the class's docstring says of a field, as a sentence of its own; empty when it says nothing."""
     text = " ".join((inspect.getdoc(kind) or "").split())
     for sentence in re.split(r"(?<=\.)\s+(?=[`A-Z])|;\s+", text):
-        if f"``{name}``" in sentence:
-            plain = sentence.replace("``", "").strip().rstrip(".")
-            return f"{plain[0].upper()}{plain[1:]}."
+        _, found, rest = sentence.partition(f"``{name}``")
+        if not found:
+            continue
+        # Up to where the sentence turns to another field.
+        own = re.split(r",?\s+(?:or|and)?\s*``\w+``", rest)[0]
+        plain = re.sub(r"^(?:is|are)\s+", "", own.replace("``", "").strip(" ,.;"))
+        if not plain:
+            plain = sentence.replace(f"``{name}``", "this").strip(" ,.;")
+        return f"{plain[0].upper()}{plain[1:]}."
     return ""

@@ -12,6 +12,8 @@ from dsl_core.model.frames import Frame
 
 #: Frames darker than so much of the brightest lately are those between patterns; they would only flicker.
 DARK_SHARE = 0.5
+#: A frame with a larger share of saturated pixels is shown only where there is no other.
+MANY_SATURATED = 0.005
 #: How long the brightest frame is remembered, s.
 MEMORY_S = 3.0
 
@@ -41,13 +43,19 @@ class WatchedCamera(Camera):
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         """Take a frame and keep it to be looked at."""
         frame = self._camera.snap(timeout_ms)
-        brightness, now = float(np.mean(frame.pixels[::8, ::8])), time.monotonic()
+        worth, now = self._worth(frame), time.monotonic()
         with self._lock:
-            if brightness > self._best or now - self._best_at > MEMORY_S:
-                self._best, self._best_at = brightness, now
-            if brightness >= DARK_SHARE * self._best:
+            if worth > self._best or now - self._best_at > MEMORY_S:
+                self._best, self._best_at = worth, now
+            if worth >= DARK_SHARE * self._best:
                 self._frame = frame
         return frame
+
+    def _worth(self, frame: Frame) -> float:
+        """How well a frame shows the target: bright, but not saturated."""
+        thin = frame.pixels[::7, ::7]
+        saturated = float(np.mean(thin >= 2**self.info.bit_depth - 1))
+        return float(np.mean(thin)) * (0.01 if saturated > MANY_SATURATED else 1.0)
 
     def take_frame(self) -> Frame | None:
         """The latest frame since last time; None without one."""

@@ -110,6 +110,10 @@ class WizardController:
     def go_to(self, page: int) -> None:
         """Show a page; checks follow to the step that is shown."""
         state = self.state
+        if state.doing.value is Doing.OPENING:
+            # Settings are being read, which takes a moment; nobody should have to click twice.
+            self._jobs.after_look(lambda: self.go_to(page))
+            return
         if state.doing.value.is_long or not 0 <= page <= state.last or page == state.at.value:
             return
         was_checking = state.is_checking.value
@@ -277,6 +281,7 @@ class WizardController:
                 self.fit()
 
         def refused(error: Exception) -> None:
+            self._jobs.forget_queued()
             self.state.settings_trouble.set(sentence_of(error))
             if then_fit:
                 self._jobs.fail(error)

@@ -59,13 +59,17 @@ class WizardJobs:
             self._runner.submit(job)
 
     def after_look(self, then: Callable[[], object]) -> None:
-        """Do something now, or when the look at hand has ended; while anything else runs it is ignored."""
+        """Do something now, or when the look or the reading at hand has ended; else it is ignored."""
         if self.is_free:
             self.state.is_checking.set(False)
             then()
-        elif self.state.doing.value is Doing.LOOKING:
+        elif self.state.doing.value in (Doing.LOOKING, Doing.OPENING):
             self.state.is_checking.set(False)
             self._queued = then
+
+    def forget_queued(self) -> None:
+        """Do not do what waits for the end of the job at hand."""
+        self._queued = None
 
     def take_news(self) -> None:
         """Say how far the job at hand is."""
@@ -115,7 +119,7 @@ class WizardJobs:
         self.state.trouble.set(text)
 
     def _give_up(self) -> None:
-        self._queued = None
+        self.forget_queued()
         self.state.is_checking.set(False)
         self.state.is_automatic.set(False)
 

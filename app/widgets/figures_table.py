@@ -76,7 +76,11 @@ def value_words(figure: Figure) -> str:
 
     >>> value_words(Figure(name="shift", value=-1.25, std=0.04, unit="nm"))
     '−1.250 ± 0.040 nm'
+    >>> value_words(Figure(name="corners", value=77.0, unit=""))
+    '77'
     """
+    if figure.std is None and figure.unit == "" and figure.value == round(figure.value):
+        return f"{figure.value:.0f}".replace("-", "−")
     return str(figure).removeprefix(figure.name).strip().replace("-", "−")
 
 

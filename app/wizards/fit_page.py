@@ -1,0 +1,114 @@
+"""The fit: evidence, figures against their limits, and whether to accept it."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
+
+from app.state.wizard import Doing, Fit, WizardState
+from app.theme import DARK, Theme
+from app.widgets.figures_table import FiguresTable
+from app.widgets.forms import label, set_role
+from app.wizards.evidence import Evidence, make_evidence
+from dsl_core.model.figure import failures
+
+
+class FitPage(QWidget):
+    """Follows the fit of a wizard; ``settings_wanted`` passes on what a person changed on the evidence."""
+
+    settings_wanted = Signal(dict)
+    #: Tells that the person allows, or no longer allows, figures outside their limits.
+    allowed = Signal()
+
+    def __init__(self, state: WizardState) -> None:
+        super().__init__()
+        self._state, self._theme = state, DARK
+        self._shown: Fit | None = None
+        self.evidence: Evidence | None = None
+        self.verdict = label("", "heading")
+        self.verdict.setWordWrap(True)
+        self.verdict.setAccessibleName("Verdict on the fit")
+        self.figures = FiguresTable("Key figures of the fit")
+        self.figures.setMinimumHeight(120)
+        self.allow = QCheckBox("Accept although figures are outside their limits")
+        self.allow.setToolTip("The report and the library keep showing these figures as missed")
+        self.allow.toggled.connect(lambda _: self.allowed.emit())
+        self._split = QSplitter(Qt.Orientation.Vertical)
+        self._split.setChildrenCollapsible(False)
+        self._split.addWidget(self.figures)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(8, 0, 0, 0)
+        column.addWidget(self.verdict)
+        column.addWidget(self._split, 1)
+        column.addWidget(self.allow)
+        self.stops = [
+            state.fit.follow(self._show_fit),
+            state.statuses.follow(lambda _: self._show_verdict()),
+            state.doing.follow(lambda _: self._show_verdict()),
+        ]
+
+    @property
+    def may_accept(self) -> bool:
+        """Whether there is a fit to accept, and nothing speaks against it that nobody allowed."""
+        fit = self._state.fit.value
+        if fit is None or fit.is_accepted:
+            return False
+        return not failures(fit.fitted.figures) or self.allow.isChecked()
+
+    def _show_fit(self, fit: Fit | None) -> None:
+        if fit is not None and fit is not self._shown:
+            if self.evidence is None:
+                self._make_evidence()
+            assert self.evidence is not None
+            self.figures.show_figures(fit.fitted.figures)
+            self.evidence.show_fit(fit.fitted, fit.record, fit.session)
+        if fit is None or self._shown is None or fit.fitted.figures != self._shown.fitted.figures:
+            self.allow.setChecked(False)
+        self._shown = fit
+        for widget in (self.evidence, self.figures):
+            if widget is not None:
+                widget.setVisible(fit is not None)
+        self._show_verdict()
+
+    def _make_evidence(self) -> None:
+        self.evidence = make_evidence(self._state.name)
+        self.evidence.apply_theme(self._theme)
+        self.evidence.settings_wanted.connect(self.settings_wanted)
+        self.evidence.setMinimumHeight(200)
+        self._split.insertWidget(0, self.evidence)
+        self._split.setStretchFactor(0, 3)
+        self._split.setStretchFactor(1, 1)
+        self._split.setSizes([420, 150])
+
+    def _show_verdict(self) -> None:
+        fit, doing = self._state.fit.value, self._state.doing.value
+        self.allow.setVisible(fit is not None and not fit.is_accepted and bool(failures(fit.fitted.figures)))
+        if self.evidence is not None:
+            self.evidence.setEnabled(not doing.is_long)
+        text, role = self._words(fit, doing)
+        self.verdict.setText(text)
+        set_role(self.verdict, role)
+
+    def _words(self, fit: Fit | None, doing: Doing) -> tuple[str, str]:
+        if doing is Doing.FITTING:
+            return "Fitting…", "muted"
+        if fit is None:
+            lacking = self._state.lacking
+            if not lacking:
+                return "All steps are captured. Fit them to see how good they are.", "muted"
+            titles = [self._state.statuses.value[page - 1].step.title for page in lacking]
+            named = ", ".join(titles[:4]) + (f" and {len(titles) - 4} more" if len(titles) > 4 else "")
+            return f"Not all steps are captured yet: {named}.", "warn"
+        limited = [figure for figure in fit.fitted.figures if figure.limits]
+        wrong = len(failures(fit.fitted.figures))
+        count = f"{len(limited) - wrong} of {len(limited)} figures are within their limits."
+        if fit.is_accepted:
+            return f"✓ Accepted. {count}", "good" if not wrong else "warn"
+        return (f"✓ {count} Accept the fit to use it.", "good") if not wrong else (f"✗ {count}", "bad")
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.figures.apply_theme(theme)
+        if self.evidence is not None:
+            self.evidence.apply_theme(theme)
