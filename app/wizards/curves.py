@@ -49,14 +49,14 @@ def draw_curves(box: ChartBox, curves: Sequence[Named]) -> list[SpectrumCurve]:
 def draw_points(
     box: ChartBox, x: Floats, y: Floats, std: Floats | None, colour: str, symbol: str = "o", size: int = 7
 ) -> Any:
-    """Points with error bars of 95 % in a colour; returns the points."""
+    """Points with error bars of 95 % in a colour; returns the points. Those that are NaN are not drawn."""
+    known = np.isfinite(np.asarray(y))
+    x, y, std = np.asarray(x)[known], np.asarray(y)[known], None if std is None else np.asarray(std)[known]
     if std is not None:
-        half = COVER * np.asarray(std)
-        bars = pg.ErrorBarItem(x=np.asarray(x), y=np.asarray(y), height=2 * half, beam=0.0, pen=colour)
+        half = COVER * std
+        bars = pg.ErrorBarItem(x=x, y=y, height=2 * half, beam=0.0, pen=colour)
         box.item.addItem(bars)
-    points = pg.ScatterPlotItem(
-        x=np.asarray(x), y=np.asarray(y), size=size, symbol=symbol, brush=colour, pen=None
-    )
+    points = pg.ScatterPlotItem(x=x, y=y, size=size, symbol=symbol, brush=colour, pen=None)
     box.item.addItem(points)
     return points
 

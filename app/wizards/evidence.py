@@ -64,6 +64,7 @@ _WIDGETS = {
     "spectralon": ("app.wizards.spectralon_evidence", "SpectralonEvidence"),
     "color-checker": ("app.wizards.color_checker_evidence", "ColorCheckerEvidence"),
     "bandpass": ("app.wizards.bandpass_evidence", "BandpassEvidence"),
+    "depth-stage": ("app.wizards.depth_stage_evidence", "DepthStageEvidence"),
 }
 
 

@@ -1,0 +1,82 @@
+"""Every calibration has its evidence, made without the heavy libraries and with names for everybody."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.wizards.evidence import PlainEvidence, make_evidence
+from app.wizards.evidence_parts import Aside, NumberTable, with_spread
+from dsl_core.campaign.recipes import recipe_names
+from tests.app.evidence_bench import THEMES
+
+MAKE_ALL = """
+import sys
+from PySide6.QtWidgets import QApplication
+application = QApplication([])
+from app.theme import DARK
+from app.wizards.evidence import make_evidence
+for name in sys.argv[1:]:
+    make_evidence(name).apply_theme(DARK)
+heavy = {"torch", "scipy", "cv2", "zarr", "xarray", "colour", "matplotlib", "pyvista"} & set(sys.modules)
+assert not heavy, heavy
+"""
+
+
+def test_evidence_is_made_without_heavy_libraries() -> None:
+    command = [sys.executable, "-c", MAKE_ALL, *recipe_names()]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_everything_has_a_name_and_a_tip(qtbot: QtBot, name: str) -> None:
+    widget = make_evidence(name)
+    qtbot.addWidget(widget)
+    assert not isinstance(widget, PlainEvidence)
+    # Themes come before the first fit as well as after it.
+    for theme in THEMES:
+        widget.apply_theme(theme)
+    wanted = (QPushButton, QTabWidget, QTableWidget)
+    own = [child for child in widget.findChildren(QWidget) if isinstance(child, wanted)]
+    assert [child for child in own if not child.accessibleName()] == []
+    assert [child for child in own if isinstance(child, QPushButton) and not child.toolTip()] == []
+
+
+def test_a_calibration_without_evidence_says_so(qtbot: QtBot) -> None:
+    from dsl_core.model.accepted import AcceptedCalibration
+    from dsl_core.model.base import Record
+    from tests.app.evidence_bench import session_of
+
+    widget = make_evidence("of another package")
+    qtbot.addWidget(widget)
+    widget.show_fit(AcceptedCalibration(name="other", title="Other"), Record(), session_of({}))
+    assert "Other has nothing to draw" in widget.findChildren(QLabel)[0].text()
+
+
+def test_only_the_latest_of_what_is_read_is_shown(qtbot: QtBot) -> None:
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    aside, shown = Aside(widget), list[object]()
+    for number in range(5):
+        aside.read(lambda number=number: number, shown.append)  # type: ignore[misc]
+    qtbot.waitUntil(lambda: not aside.is_busy)
+    qtbot.wait(50)
+    assert shown == [4]
+    aside.read(lambda: 1 / 0, shown.append)
+    qtbot.waitUntil(lambda: not aside.is_busy)
+    assert isinstance(shown[1], ZeroDivisionError)
+
+
+def test_numbers_are_written_as_people_do(qtbot: QtBot) -> None:
+    assert with_spread(210.8184, 0.0204) == "210.818 ± 0.020"
+    assert with_spread(2.06581, 0.000024) == "2.0658 ± 0.0001"
+    assert with_spread(1234.5, 123.0) == "1234 ± 123"
+    table = NumberTable("Numbers", [("Name", "Words"), ("Value", "Number")])
+    qtbot.addWidget(table)
+    table.fill([["a-b", "-1.5"]])
+    assert table.row_texts(0) == ["a-b", "−1.5"]
