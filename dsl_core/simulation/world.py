@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,10 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.led_cycle import led_weights
 from dsl_core.optics.sensor import digitise
-from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.effects.catalogue import EXTRAS, USUAL_CHOICE, Choice, with_effects
+from dsl_core.simulation.effects.path import LightPath, View
+from dsl_core.simulation.effects.planner import ONE_DN, EffectPlan, Tolerance, plan_effects
+from dsl_core.simulation.effects.view import make_view
 from dsl_core.simulation.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread
 
@@ -49,6 +52,8 @@ class World:
     only on the seed, on what stands where (``noise_key``), on the shot and the attempt, never on what was
     captured before, so that an interrupted scan continues bit for bit.
 
+    ``effects`` says what of all that happens is rendered, within a ``tolerance`` where the scene decides.
+
     With ``led_cycle_ms`` the projector flashes its LEDs one after the other, running freely on the world's
     clock; None is steady light. Light of a dark projector is taken as steady.
     """
@@ -65,11 +70,15 @@ class World:
     defocus_px: float = 0.0
     noise_key: tuple[int, ...] = ()
     device: str = "cpu"
+    effects: Choice = USUAL_CHOICE
+    tolerance: Tolerance = ONE_DN
     clock: Clock = field(default_factory=Clock)
     image: NDArray[np.uint8] | None = None
+    _scene: Scene | None = None
     _truth: SceneTruth | None = None
-    _bare: Renderer | None = None
-    _renderer: Renderer | None = None
+    _path: LightPath | None = None
+    _bare: View | None = None
+    _renderer: View | None = None
     _rates: dict[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def show(self, image: NDArray[np.uint8]) -> None:
@@ -90,28 +99,61 @@ class World:
     def insert(self, film: bool, filter: SpectralCurve | None) -> None:
         """Change what is in the beams; a new filter costs far less than a new film."""
         if film != self.film:
-            self.film, self._bare = film, None
+            self.film, self._path, self._bare = film, None, None
         self.filter, self._renderer, self._rates = filter, None, {}
 
     def _forget(self) -> None:
-        self._truth, self._bare, self._renderer, self._rates = None, None, None, {}
+        self._scene, self._truth, self._path = None, None, None
+        self._bare, self._renderer, self._rates = None, None, {}
+
+    @property
+    def scene(self) -> Scene:
+        """What stands before the camera."""
+        if self._scene is None:
+            self._scene = self.scene_at(self.position_mm)
+        return self._scene
 
     @property
     def truth(self) -> SceneTruth:
         """Depth, normals, materials and shadow of the scene as it stands."""
         if self._truth is None:
-            self._truth = self.scene_at(self.position_mm).render(
-                self.rig.camera, self.rig.pose.projector_centre_mm
-            )
+            self._truth = self.scene.render(self.rig.camera, self.rig.pose.projector_centre_mm)
         return self._truth
 
+    def everything(self) -> LightPath:
+        """All that happens to light before the scene as it stands."""
+        return replace(self._usual(), extras=EXTRAS)
+
+    def _usual(self) -> LightPath:
+        """What the plain renderer has."""
+        return LightPath(
+            self.rig, self.scene, self.truth, self.film, self.device, led_cycle_ms=self.led_cycle_ms,
+            ambient_dn_per_ms=self.ambient_dn_per_ms, defocus_px=self.defocus_px,
+        )  # fmt: skip
+
+    def effect_plan(self) -> EffectPlan:
+        """Which effects are rendered of the scene as it stands, and why."""
+        return plan_effects(self.everything(), self.tolerance, only=self.effects.names)
+
     @property
-    def renderer(self) -> Renderer:
+    def path(self) -> LightPath:
+        """What is rendered of the scene as it stands."""
+        if self.effects == USUAL_CHOICE:
+            return self._usual()
+        if self._path is None:
+            names = self.effects.names
+            if names is None:
+                names = self.effect_plan().names
+            self._path = with_effects(self.everything(), names)
+        return self._path
+
+    @property
+    def renderer(self) -> View:
         """Renderer of the scene as it stands."""
         if self._renderer is None:
             with one_kernel_thread():
                 if self._bare is None:
-                    self._bare = Renderer(self.rig, self.truth, film=self.film, device=self.device)
+                    self._bare = make_view(self.path)
                 self._renderer = self._bare.through(self.filter) if self.filter else self._bare
         return self._renderer
 
@@ -129,11 +171,11 @@ class World:
                 np.zeros(shape, np.uint8) if self.image is None else np.broadcast_to(self._colour(), shape)
             )
             with one_kernel_thread():
-                rate = self.renderer.expected(choose(image)) + np.float32(self.ambient_dn_per_ms)
-            if self.defocus_px:
+                rate = self.renderer.expected(choose(image)) + np.float32(self.path.ambient_dn_per_ms)
+            if self.path.defocus_px:
                 from scipy.ndimage import gaussian_filter
 
-                rate = gaussian_filter(rate, self.defocus_px, mode="nearest")
+                rate = gaussian_filter(rate, self.path.defocus_px, mode="nearest")
             self._rates[key] = rate
         return self._rates[key]
 
@@ -147,9 +189,10 @@ class World:
 
     def _light(self, exposure_ms: float, jitter_ms: float) -> NDArray[np.float32]:
         """Expected signal of an exposure that starts now, DN per ms."""
-        if self.led_cycle_ms is None:
+        cycle_ms = self.path.led_cycle_ms
+        if cycle_ms is None:
             return self.rate()
-        weights = led_weights(1000 * self.clock.now_s + jitter_ms, exposure_ms, self.led_cycle_ms)
+        weights = led_weights(1000 * self.clock.now_s + jitter_ms, exposure_ms, cycle_ms)
         if (weights == 1).all():
             return self.rate()
         dark = self._rendered("dark", np.zeros_like)
@@ -163,4 +206,4 @@ class World:
         rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt, *self._noise_key()]))
         jitter_ms = JITTER_MS * rng.random() if self.led_cycle_ms else 0.0
         signal = self._light(exposure_ms, jitter_ms) * np.float32(exposure_ms)
-        return digitise(self.rig.sensor, signal, rng if self.noise else None)
+        return digitise(self.path.rig.sensor, signal, rng if self.noise else None)

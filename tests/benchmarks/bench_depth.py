@@ -26,6 +26,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.scenes import make_scene
 from dsl_core.simulation.world import World
 from tests.benchmarks.common import NoisyScan, options, print_table, render_plan, with_noise, write_json
@@ -64,6 +65,7 @@ def render(rig: Rig, position_mm: float) -> Position:
 def lit(world: World) -> NDArray[np.bool_]:
     """Pixels that the projector's centre sees and whose zero order comes from inside its frame."""
     renderer, projector = world.renderer, world.rig.projector
+    assert isinstance(renderer, Renderer)
     inside = np.zeros(world.truth.lit.size, bool)
     column, row = renderer.column.numpy(), renderer.row.numpy()
     inside[renderer.pixels.numpy()] = (

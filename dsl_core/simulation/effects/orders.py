@@ -1,0 +1,90 @@
+"""The orders of the film: zero and first ones, which everything rests on, and second ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import torch
+
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.limits import Limits
+from dsl_core.simulation.effects.path import LightPath
+from dsl_core.simulation.renderer import NM
+
+FIRST, SECOND = (1, -1), (2, -2)
+#: Pixels at which orders are traced, across and down, and how far columns may lie beside those between, px.
+_RASTER, _MARGIN_PX = (25, 17), 20.0
+
+
+class Orders(Effect):
+    """Zero and first orders: what the method measures."""
+
+    name = "orders"
+    summary = "zero and first orders of the film"
+    needed = True
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"film": f"{path.rig.film.lines_per_mm:g} lines/mm" if path.film else "none"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """All light there is."""
+        return limits.of_share(1.0, "they are what is measured")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """Nothing is left without them."""
+        return path
+
+
+class SecondOrders(Effect):
+    """Light through the second orders: faint, and mostly outside the projector's frame."""
+
+    name = "second-orders"
+    summary = "second orders of the film"
+    ns_per_pixel = 20.0
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        shares = [max(path.rig.efficiency[m].values, default=0.0) for m in SECOND if m in path.rig.efficiency]
+        return {"efficiency": f"at most {100 * max(shares, default=0.0):.2g} % of the zero order"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """All their light if any of it comes from inside the projector's frame."""
+        if not limits.path.film:
+            return limits.of_dn(0.0, "there is no film")
+        if not reaches(limits.path, SECOND):
+            return limits.of_dn(0.0, "their columns lie outside the projector's frame")
+        reflectance = limits.path.truth.materials.at(NM)
+        share = limits.white(reflectance, SECOND) / limits.from_orders(reflectance, limits.path.orders)
+        return limits.of_share(float(share.max()), "their columns reach into the projector's frame")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, orders=tuple(m for m in path.orders if m not in SECOND))
+
+
+def reaches(path: LightPath, orders: tuple[int, ...]) -> bool:
+    """Whether any pixel sees light of some orders from inside the projector's frame, or nearly.
+
+    Traced on a raster of pixels; columns vary so smoothly that the margin covers what lies between.
+    """
+    lens, depth = path.rig.camera, path.truth.depth_mm
+    across, down = (
+        np.linspace(0, size - 1, count).round().astype(int)
+        for size, count in zip((lens.width_px, lens.height_px), _RASTER, strict=True)
+    )
+    known = depth[np.isfinite(depth)]
+    if not len(known):
+        return False
+    flat = torch.as_tensor((down[:, None] * lens.width_px + across).ravel())
+    grating, width = GratingModel(path.rig), path.rig.projector.width_px
+    for z_mm in (known.min(), known.max()):
+        at = torch.full((len(flat),), float(z_mm), dtype=torch.float64)
+        for order in orders:
+            columns = grating.exact(flat, at, order, NM[[0, -1]]).columns
+            low, high = columns.amin(0), columns.amax(0)
+            if ((high > -0.5 - _MARGIN_PX) & (low < width - 0.5 + _MARGIN_PX)).any():
+                return True
+    return False

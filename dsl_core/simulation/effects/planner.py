@@ -1,0 +1,166 @@
+"""Which effects a scene calls for: the costliest are left out first, as far as their bounds allow."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from dsl_core.errors import DeviceError
+from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.catalogue import EFFECTS
+from dsl_core.simulation.effects.limits import Limits
+from dsl_core.simulation.effects.machine import slowness
+from dsl_core.simulation.effects.path import LightPath
+
+#: CPU time of a pixel of the plain renderer in one colour, on the machine of `machine`.
+PLAIN_NS_PER_PIXEL = 60.0
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a picture may be from that with all effects, in counts or in noise of a dark pixel."""
+
+    value: float = 1.0
+    unit: str = "DN"
+
+    @classmethod
+    def of(cls, text: str) -> Tolerance:
+        """A tolerance from ``1``, ``0.5 DN`` or ``2 sigma``; raises `DeviceError`.
+
+        >>> Tolerance.of("0.5 sigma")
+        Tolerance(value=0.5, unit='sigma')
+        """
+        match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(DN|sigmas?)?\s*", text, re.IGNORECASE)
+        if match is None:
+            raise DeviceError(
+                f"The tolerance of effects must be a number of DN or of sigmas, like 1, 0.5DN or 2sigma, not"
+                f" {text!r}."
+            )
+        return cls(float(match[1]), "sigma" if (match[2] or "").lower().startswith("sigma") else "DN")
+
+    def of_bound(self, bound: EffectBound) -> float:
+        """A bound in the tolerance's unit."""
+        return bound.sigmas if self.unit == "sigma" else bound.dn
+
+    def __str__(self) -> str:
+        return f"{self.value:g} {self.unit}"
+
+
+ONE_DN = Tolerance()
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Whether an effect is rendered, and why.
+
+    What it costs is seconds of computing a frame, beside the rendering in three ``colours`` that some share.
+    """
+
+    effect: Effect
+    bound: EffectBound
+    cost_s: float
+    colours: bool
+    on: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class EffectPlan:
+    """A decision on every effect; what is left out changes no pixel by the tolerance or more."""
+
+    tolerance: Tolerance
+    decisions: tuple[Decision, ...]
+    colour_s: float
+
+    @property
+    def names(self) -> frozenset[str]:
+        """What is rendered."""
+        return frozenset(decision.effect.name for decision in self.decisions if decision.on)
+
+    @property
+    def left_out(self) -> tuple[Decision, ...]:
+        """What is not."""
+        return tuple(decision for decision in self.decisions if not decision.on)
+
+    @property
+    def left_out_bound(self) -> float:
+        """The most that everything left out changes, in the tolerance's unit."""
+        return sum(self.tolerance.of_bound(decision.bound) for decision in self.left_out)
+
+    def frame_s(self, names: Collection[str]) -> float:
+        """Seconds of computing a frame with some effects."""
+        chosen = [d for d in self.decisions if d.effect.name in names]
+        colours = 3 if any(d.colours for d in chosen) else 1
+        return colours * self.colour_s + sum(d.cost_s for d in chosen)
+
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Seconds of a frame with what is rendered, and with everything."""
+        return self.frame_s(self.names), self.frame_s([d.effect.name for d in self.decisions])
+
+
+def plan_effects(
+    path: LightPath,
+    tolerance: Tolerance = ONE_DN,
+    settings: Sequence[Setting] = CapturePlan().settings,
+    only: Collection[str] | None = None,
+) -> EffectPlan:
+    """Decide on every effect of a path in which everything happens.
+
+    ``settings`` are those of the plan. With ``only``, those effects are on and all others off.
+    """
+    limits = Limits(path, settings)
+    bounds = {effect.name: effect.bound(limits) for effect in EFFECTS}
+    costs = {effect.name: effect.cost_s(limits) for effect in EFFECTS}
+    reasons = _forced(only, bounds) if only is not None else _weighed(bounds, costs, tolerance)
+    decisions = tuple(
+        Decision(
+            effect,
+            bounds[effect.name],
+            costs[effect.name],
+            effect.needs_colours(path),
+            *reasons[effect.name],
+        )
+        for effect in EFFECTS
+    )
+    return EffectPlan(tolerance, decisions, 1e-9 * PLAIN_NS_PER_PIXEL * limits.pixel_count * slowness())
+
+
+def _weighed(
+    bounds: dict[str, EffectBound], costs: dict[str, float], tolerance: Tolerance
+) -> dict[str, tuple[bool, str]]:
+    """On or off and why, by name: what costs most is left out first, then what changes least."""
+    reasons, spent = {}, 0.0
+    order = sorted(EFFECTS, key=lambda e: (-costs[e.name], tolerance.of_bound(bounds[e.name])))
+    for effect in order:
+        bound, most = bounds[effect.name], tolerance.of_bound(bounds[effect.name])
+        if effect.needed:
+            reasons[effect.name] = (True, _sentence(f"{bound.reason}; it cannot be left out"))
+        elif most == 0:
+            reasons[effect.name] = (False, _sentence(bound.reason))
+        elif spent + most < tolerance.value:
+            spent += most
+            reasons[effect.name] = (
+                False, _sentence(f"{bound.reason}, which is {most:.2g} of the {tolerance} allowed"),
+            )  # fmt: skip
+        else:
+            over = "alone" if most >= tolerance.value else "with what is left out already"
+            why = f"{bound.reason}, up to {most:.3g} {tolerance.unit}: {over} more than {tolerance}"
+            reasons[effect.name] = (True, _sentence(why))
+    return reasons
+
+
+def _forced(only: Collection[str], bounds: dict[str, EffectBound]) -> dict[str, tuple[bool, str]]:
+    return {
+        name: (
+            name in only,
+            _sentence(f"asked for; {bound.reason}" if name in only else f"not asked for; {bound.reason}"),
+        )
+        for name, bound in bounds.items()
+    }
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."

@@ -1,0 +1,148 @@
+"""What the projector does to a pattern: blur, halo in the film, black level, gamma, and LEDs in turn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dsl_core.optics.led_cycle import LEDS
+from dsl_core.simulation.effects.base import Effect, EffectBound, with_response
+from dsl_core.simulation.effects.limits import Limits
+from dsl_core.simulation.effects.path import LightPath
+
+#: A blur that no sample of the twin shows.
+_SHARP_PX = 1e-3
+
+
+class Blur(Effect):
+    """Blur of the projected pixels where they are in focus."""
+
+    name = "blur"
+    summary = "blur of the projector"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"sigma": f"{path.rig.projector_response.blur_px:g} projector px"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """At the edge of a line all of its light."""
+        return limits.of_share(1.0, "edges of lines turn from soft to hard")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_response(path, blur_px=_SHARP_PX)
+
+
+class Halo(Effect):
+    """Light of the zero order that the film scatters sideways."""
+
+    name = "halo"
+    summary = "halo of the zero order"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        response = path.rig.projector_response
+        return {
+            "peak": f"{response.halo_peak_per_px:.2g} per px",
+            "decay": f"{response.halo_decay_px:g} px",
+        }
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """Its share of white."""
+        if limits.halo == 0:
+            return limits.of_dn(0.0, "there is no film, or it does not scatter")
+        share = limits.halo / (1 + limits.halo)
+        return limits.of_share(share, f"it holds {100 * limits.halo:.2g} % of the light of a white pattern")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_response(path, halo_peak_per_px=0.0)
+
+
+class BlackLevel(Effect):
+    """Light of a projector that shows black."""
+
+    name = "black-level"
+    summary = "light of a dark projector"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"share": f"{path.rig.projector_response.black_fraction:g} of white"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """Its share of white over the longest exposure."""
+        black = limits.path.rig.projector_response.black_fraction
+        reason = f"black is {100 * black:.2g} % of white" if black else "the projector has a perfect black"
+        return limits.of_dn(black * limits.ceiling * limits.exposure_ms, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_response(path, black_fraction=0.0)
+
+
+class Gamma(Effect):
+    """Radiance as a power of the drive level; without it, it is proportional."""
+
+    name = "gamma"
+    summary = "gamma of the projector"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"exponent": f"{path.rig.projector_response.gamma:g}"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """The largest difference of radiance up to the level of each setting."""
+        gamma = limits.path.rig.projector_response.gamma
+        worst_ms = max(
+            s.exposure_ms * float(np.abs(levels - levels**gamma).max())
+            for s in limits.settings
+            for levels in [np.arange(round(255 * s.level) + 1) / 255]
+        )
+        reason = "the projector is linear" if gamma == 1 else f"radiance rises with a power of {gamma:.3g}"
+        return limits.of_dn(worst_ms * limits.ceiling, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_response(path, gamma=1.0)
+
+
+class LedCycle(Effect):
+    """LEDs that flash one after the other, so that exposures catch more of one than of another."""
+
+    name = "led-cycle"
+    summary = "LEDs that flash in turn"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"period": "steady light" if path.led_cycle_ms is None else f"{path.led_cycle_ms:.4g} ms"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """The largest deviation of an LED's light in an exposure, whenever it starts."""
+        period_ms = limits.path.led_cycle_ms
+        if period_ms is None:
+            return limits.of_dn(0.0, "the LEDs shine steadily")
+        response = limits.path.rig.projector_response
+        worst_ms = max(
+            s.exposure_ms * float(response.radiance(s.level)) * largest_deviation(s.exposure_ms / period_ms)
+            for s in limits.settings
+        )
+        reason = "exposures last no whole number of cycles" if worst_ms else "exposures last whole cycles"
+        return limits.of_dn(worst_ms * limits.ceiling, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, led_cycle_ms=None)
+
+
+def largest_deviation(periods: float) -> float:
+    """The most by which an LED's share of an exposure of so many periods differs from one.
+
+    Of a remaining part f of a period an LED is on at least ``f - 2/3`` and at most ``1/3``.
+    """
+    whole = round(periods)
+    if whole > 0 and abs(periods - whole) < 1e-9 * periods:
+        return 0.0
+    rest = periods - np.floor(periods)
+    on = np.array([max(rest - 1 + 1 / LEDS, 0.0), min(rest, 1 / LEDS)])
+    return float(np.abs(LEDS * (np.floor(periods) / LEDS + on) / periods - 1).max())

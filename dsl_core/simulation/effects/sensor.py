@@ -1,0 +1,148 @@
+"""What happens on the way to digital numbers: room light, blur, noise, rounding and saturation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dsl_core.simulation.effects.base import Effect, EffectBound, with_sensor
+from dsl_core.simulation.effects.limits import Limits
+from dsl_core.simulation.effects.path import LightPath
+
+#: Normal noise beyond so many standard deviations comes about once in 10^15 pixels, a million scans.
+TAIL_SIGMAS = 8.0
+#: So many electrons make a DN that shot noise vanishes; so many bits that nothing saturates.
+_MANY_ELECTRONS, _CONTAINER_BITS = 1e12, 16
+
+
+class Ambient(Effect):
+    """Light of the room."""
+
+    name = "ambient"
+    summary = "ambient light"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"light": f"{path.ambient_dn_per_ms:g} DN/ms"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """That of the longest exposure."""
+        ambient = limits.path.ambient_dn_per_ms
+        reason = f"the room adds {ambient:.2g} DN/ms" if ambient else "the room is dark"
+        return limits.of_dn(ambient * limits.exposure_ms, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, ambient_dn_per_ms=0.0)
+
+
+class Defocus(Effect):
+    """A camera lens set wrongly: the same blur everywhere."""
+
+    name = "defocus"
+    summary = "wrongly focused camera"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"sigma": f"{path.defocus_px:g} px"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """Any pixel may turn from black to white."""
+        if limits.path.defocus_px == 0:
+            return limits.of_dn(0.0, "the camera is focused")
+        return limits.of_share(1.0, "edges in the image turn from soft to hard")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, defocus_px=0.0)
+
+
+class ShotNoise(Effect):
+    """Light comes in quanta."""
+
+    name = "shot-noise"
+    summary = "shot noise"
+    ns_per_pixel = 2.0
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"gain": f"{path.rig.sensor.electrons_per_dn:g} electrons/DN"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """Eight standard deviations at the brightest signal that does not saturate."""
+        sensor = limits.path.rig.sensor
+        signal = min(limits.ceiling * limits.light_ms, sensor.full_scale_dn - sensor.black_level_dn)
+        noise_dn = float(np.sqrt(signal / sensor.electrons_per_dn))
+        return limits.of_dn(TAIL_SIGMAS * noise_dn, f"its standard deviation is up to {noise_dn:.2g} DN")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_sensor(path, electrons_per_dn=_MANY_ELECTRONS)
+
+
+class ReadNoise(Effect):
+    """Noise of the electronics."""
+
+    name = "read-noise"
+    summary = "read noise"
+    ns_per_pixel = 2.0
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"std": f"{path.rig.sensor.read_noise_dn:g} DN"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """Eight standard deviations."""
+        noise_dn = limits.path.rig.sensor.read_noise_dn
+        reason = f"its standard deviation is {noise_dn:.2g} DN" if noise_dn else "the sensor has none"
+        return limits.of_dn(TAIL_SIGMAS * noise_dn, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_sensor(path, read_noise_dn=0.0)
+
+
+class Saturation(Effect):
+    """Numbers end at full scale; without it, at what the container holds."""
+
+    name = "saturation"
+    summary = "saturation of the sensor"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"full scale": f"{path.rig.sensor.full_scale_dn} DN"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """What the brightest signal exceeds full scale by."""
+        sensor, path = limits.path.rig.sensor, limits.path
+        brightest = limits.ceiling * limits.light_ms + path.ambient_dn_per_ms * limits.exposure_ms
+        excess = max(brightest + sensor.black_level_dn - sensor.full_scale_dn, 0.0)
+        reason = (
+            f"white would read {brightest:.3g} DN above black" if excess else "no pattern reaches full scale"
+        )
+        return EffectBound(excess, excess / limits.floor_dn, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return with_sensor(path, bit_depth=_CONTAINER_BITS)
+
+
+class Quantisation(Effect):
+    """Frames hold whole numbers."""
+
+    name = "quantisation"
+    summary = "rounding to whole numbers"
+    needed = True
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"bits": f"{path.rig.sensor.bit_depth}"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """Half a count."""
+        return limits.of_dn(0.5, "frames hold whole numbers")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """A frame cannot hold anything else."""
+        return path

@@ -1,0 +1,94 @@
+"""How surfaces stand in the light: shading and cast shadow; and the camera's uneven gain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dsl_core.optics.flat_field import relative_gain
+from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.limits import SLACK, Limits
+from dsl_core.simulation.effects.path import LightPath
+from dsl_core.simulation.surface_light import surface_shading
+
+
+class Shading(Effect):
+    """Cosine of incidence and inverse square of the distance."""
+
+    name = "shading"
+    summary = "cosine of incidence and distance"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"reference distance": f"{path.rig.reference_distance_mm:g} mm"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """The largest deviation from the light on a surface that faces the projector at 700 mm."""
+        path = limits.path
+        shaded, flat = (surface_shading(path.rig, path.truth, how) for how in (True, False))
+        most = float(np.abs(shaded - flat).max())
+        reason = (
+            f"light on the surfaces differs by up to {100 * most:.3g} % of that at the reference distance"
+        )
+        return limits.of_light(SLACK * most * limits.brightest * limits.amplification, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, shaded=False)
+
+
+class Shadow(Effect):
+    """Points that something hides from the projector."""
+
+    name = "shadow"
+    summary = "cast shadow"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        return {"in shadow": f"{100 * float(self._hidden(path).mean()):.2g} % of the pixels"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """The light on the brightest point that is hidden."""
+        hidden = self._hidden(limits.path)
+        if not hidden.any():
+            return limits.of_dn(0.0, "the projector sees all that the camera sees")
+        path = self.leave_out(limits.path)
+        # Not less than without shading, so that the two may be left out together.
+        shading = np.maximum(
+            surface_shading(path.rig, path.truth), surface_shading(path.rig, path.truth, False)
+        )
+        most = float(limits.per_pixel(np.where(hidden, shading, 0.0)).max())
+        reason = f"{100 * float(hidden.mean()):.2g} % of the pixels lie in shadow"
+        return limits.of_light(SLACK * most * limits.amplification, reason)
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, truth=replace(path.truth, lit=np.isfinite(path.truth.depth_mm)))
+
+    def _hidden(self, path: LightPath) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+        return np.asarray(np.isfinite(path.truth.depth_mm) & ~path.truth.lit)
+
+
+class Vignetting(Effect):
+    """Gain of the camera that differs from pixel to pixel."""
+
+    name = "vignetting"
+    summary = "uneven gain of the camera"
+
+    def parameters(self, path: LightPath) -> dict[str, str]:
+        """See `Effect`."""
+        gain = relative_gain(path.rig)
+        return {"gain": f"{float(gain.min()):.3g} to {float(gain.max()):.3g}"}
+
+    def bound(self, limits: Limits) -> EffectBound:
+        """The largest deviation of the gain from one."""
+        if limits.path.rig.flat_field is None:
+            return limits.of_dn(0.0, "the camera has an even gain")
+        gain = relative_gain(limits.path.rig)
+        most = float(np.abs(gain - 1).max())
+        return limits.of_share(most / float(gain.min()), f"gains differ from one by up to {100 * most:.2g} %")
+
+    def leave_out(self, path: LightPath) -> LightPath:
+        """See `Effect`."""
+        return replace(path, rig=path.rig.model_copy(update={"flat_field": None}))
