@@ -20,7 +20,7 @@ from dsl_core.reconstruction.line_set import LineSet
 
 ITERATIONS = 6
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
-MODEL_ERROR = 0.004
+MODEL_ERROR = 0.0015
 #: The same for combs, where the first orders of other lines lie under the peak.
 COMB_ERROR = 0.05
 #: A refined column this far from the decoded one is not the same peak.

@@ -200,6 +200,8 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     brightness = _number("brightness", rest.pop("brightness", "1"))
     if brightness != 1:
         rig = rig.model_copy(update={"white_scale": rig.white_scale * brightness})
+    # What is true leaves nothing open in its columns.
+    rig = rig.model_copy(update={"column_std_px": 0.0})
     mishaps = _mishaps(rest)
     name = rest.pop("scene", "color-checker")
     world = World(
