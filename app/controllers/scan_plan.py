@@ -131,11 +131,14 @@ class ScanPlanController:
             return tuple(found), tuple(troubles)
 
         def done(read: tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]) -> None:
-            self.state.calibrations.set((self.state.calibrations.value[0], *read[0]))
+            chosen = self.state.calibration.value
+            # An older version in use is no name of the library, but stays in the list.
+            older = (chosen,) if "@" in chosen.key else ()
+            self.state.calibrations.set((self.state.calibrations.value[0], *read[0], *older))
             for trouble in read[1]:
                 self._notifier.tell("warning", trouble)
 
-        self._runner.submit(Job("Read the calibrations", work, done, self._tell))
+        self._runner.submit(Job("Read the calibrations", work, done, self._tell, is_minor=True))
 
     def choose_calibration(self, choice: CalibrationChoice) -> None:
         """Scan with another calibration."""
@@ -149,6 +152,9 @@ class ScanPlanController:
 
         def done(rig: Rig) -> None:
             self._chosen = rig
+            known = self.state.calibrations.value
+            if choice.key not in [each.key for each in known]:
+                self.state.calibrations.set((*known, choice))
             self.state.calibration.set(choice)
             self.refresh()
 

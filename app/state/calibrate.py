@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.state.evented import Event, Value
 from app.state.rig import RigChoice
-from dsl_core.io.calibration_library import LibraryLine
-from dsl_core.model.figure import Figure
+
+if TYPE_CHECKING:
+    from dsl_core.io.calibration_library import LibraryLine
+    from dsl_core.model.figure import Figure
 
 
 class RowState(Enum):
