@@ -77,6 +77,7 @@ class WizardController:
         state = self.state
         state.places_itself.set(found.places_itself)
         state.settings.set(found.settings)
+        state.misfit.set(None)
         state.statuses.set(found.statuses)
         state.fit.set(found.fit)
         is_new = all(each.state == "missing" for each in found.statuses)
@@ -203,6 +204,7 @@ class WizardController:
             self._jobs.fail(found.error)
             return
         state.fit.set(None)
+        state.misfit.set(None)
         if state.is_automatic.value:
             self._go_on_automatically()
             return
@@ -223,10 +225,17 @@ class WizardController:
     def fit(self) -> None:
         """Calibrate from the captures of all steps."""
         self._jobs.after_look(
-            lambda: self._jobs.start(Doing.FITTING, "Fit", self._the_work.fit, self._fitted)
+            lambda: self._jobs.start(
+                Doing.FITTING, "Fit", self._the_work.fit, self._fitted, failed=self._not_fitted
+            )
         )
 
+    def _not_fitted(self, error: Exception) -> None:
+        self._jobs.fail(error)
+        self.state.misfit.set(self._the_work.session)
+
     def _fitted(self, fit: Fit) -> None:
+        self.state.misfit.set(None)
         self.state.fit.set(fit)
         self.state.at.set(self.state.last)
         self.state.note.set("")

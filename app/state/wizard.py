@@ -89,8 +89,8 @@ class WizardState:
     """Values that a wizard's controller sets and its window follows.
 
     ``at`` counts pages: 0 are the settings, 1 to n the steps, n + 1 the fit. ``trouble`` is what went wrong
-    and what to do about it, ``note`` what was done last. ``is_automatic`` runs all steps without a person.
-    ``closed`` fires once, when the last work has ended.
+    and what to do about it, ``note`` what was done last. ``misfit`` is the session whose captures gave no
+    fit. ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work has ended.
     """
 
     def __init__(self, name: str, title: str) -> None:
@@ -106,6 +106,7 @@ class WizardState:
         self.can_reconnect = Value(False)
         self.note = Value("")
         self.fit: Value[Fit | None] = Value(None)
+        self.misfit: Value[CalibrationSession | None] = Value(None)
         self.settings: Value[tuple[SettingRow, ...]] = Value(())
         self.settings_trouble = Value("")
         self.places_itself = Value(False)

@@ -40,6 +40,13 @@ def patch_outlines(corners_px: Floats) -> Floats:
     return np.asarray(lifted[:, :2] / lifted[:, 2:]).reshape(-1, 4, 2)
 
 
+def corners_in(shape: tuple[int, ...]) -> Floats:
+    """Corners in the middle of a picture (rows, columns, ...), for a person to drag to where they belong."""
+    height, width = shape[:2]
+    side = min(0.7 * width / COLUMNS, 0.7 * height / ROWS)
+    return (_GRID - (COLUMNS / 2, ROWS / 2)) * side + ((width - 1) / 2, (height - 1) / 2)
+
+
 class ChartPicture(QWidget):
     """Emits ``moved`` while a corner is dragged or moved by arrow keys; Tab goes to the next corner."""
 

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pyqtgraph as pg
+from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
 from app.theme import Theme
 from app.widgets.forms import label, set_role
 from app.widgets.plots import RGB_COLOURS
-from app.wizards.chart_picture import ChartPicture
+from app.wizards.chart_picture import ChartPicture, corners_in
 from app.wizards.curves import Named, draw_curves, level_line
 from app.wizards.evidence import Evidence
 from app.wizards.evidence_parts import BAR, DOT, Aside, Cell, ChartBox, NumberTable
@@ -28,6 +29,12 @@ if TYPE_CHECKING:
     from dsl_core.model.base import Record
 
 CHANNELS = ("red", "green", "blue")
+#: What a person does where no chart was found.
+HELP = (
+    "No fit came of this picture. Drag the four corners to the outer corners of the 24 patches, in any order"
+    " round the chart, until all outlines lie inside patches; then fit."
+)
+NO_FIT = "There is no fit yet."
 TURNS = ("upright", "turned clockwise", "upside down", "turned anticlockwise")
 #: What a patch that was held out should stay below, % of its white.
 WORST_PERCENT = 4.0
@@ -51,6 +58,7 @@ class ColorCheckerEvidence(Evidence):
         self._record: ColorCheckerCalibration | None = None
         self._before: tuple[Rgb, Rgb] | None = None
         self._view: ChartView | None = None
+        self._by_hand: tuple[tuple[float, float], ...] | None = None
         self.chart = ChartPicture()
         self.swatches = Swatches()
         self.words = label("", "muted")
@@ -142,6 +150,26 @@ class ColorCheckerEvidence(Evidence):
 
         self._aside.read(read, self._take)
 
+    def show_captures(self, session: CalibrationSession) -> bool:
+        """Show the picture in which no chart was found, for its corners to be set by hand."""
+        bench, step = session.bench, session.steps[0]
+        self._record, self._view = None, None
+        self._by_hand = getattr(session.recipe, "corners_px", None)
+        for box in (self.residuals, self.response, self.emission):
+            box.say(NO_FIT)
+        self.table.fill([])
+        self.swatches.clear(NO_FIT)
+        self.tabs.setCurrentIndex(0)
+        self._say("Reading the picture…")
+
+        def read() -> NDArray[np.uint8]:
+            from dsl_core.campaign.chart_view import white_picture
+
+            return white_picture(bench, step)
+
+        self._aside.read(read, self._take_picture)
+        return True
+
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         super().apply_theme(theme)
@@ -160,13 +188,23 @@ class ColorCheckerEvidence(Evidence):
         self._put_back()
         self._draw_patches()
 
+    def _take_picture(self, picture: NDArray[np.uint8] | Exception) -> None:
+        if isinstance(picture, Exception):
+            self._say(str(picture), "bad")
+            return
+        self.chart.show_picture(picture)
+        self._put_back()
+
     def _put_back(self) -> None:
-        record = self._record
+        record, picture = self._record, self.chart.image.image
+        for button in (self.again, self.back):
+            button.setEnabled(False)
+        if record is None and picture is not None:
+            self.chart.show_corners(np.array(self._by_hand or corners_in(picture.shape).tolist()))
+            self._say(HELP, "warn")
         if record is None:
             return
         self.chart.show_corners(np.array(record.corners_px))
-        for button in (self.again, self.back):
-            button.setEnabled(False)
         if self._view is not None:
             self._say(
                 f"The chart is {TURNS[record.quarter_turns]}, {record.distance_mm:.0f} mm away, tilted by"
@@ -174,7 +212,7 @@ class ColorCheckerEvidence(Evidence):
             )
 
     def _corner_moved(self) -> None:
-        self._say("The outlines must lie inside the patches.")
+        self._say("All outlines must lie inside patches.")
         for button in (self.again, self.back):
             button.setEnabled(True)
 

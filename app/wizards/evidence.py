@@ -34,6 +34,10 @@ class Evidence(QWidget):
         """Show a fit that waits to be accepted; quick enough for the thread of the window."""
         raise NotImplementedError
 
+    def show_captures(self, session: CalibrationSession) -> bool:
+        """Show captures that no fit came of, where a person can help by looking; False where not."""
+        return False
+
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme

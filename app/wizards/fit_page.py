@@ -10,6 +10,7 @@ from app.theme import DARK, Theme
 from app.widgets.figures_table import FiguresTable
 from app.widgets.forms import label, set_role
 from app.wizards.evidence import Evidence, make_evidence
+from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.figure import failures
 
 
@@ -43,6 +44,7 @@ class FitPage(QWidget):
         column.addWidget(self.allow)
         self.stops = [
             state.fit.follow(self._show_fit),
+            state.misfit.follow(self._show_misfit),
             state.statuses.follow(lambda _: self._show_verdict()),
             state.doing.follow(lambda _: self._show_verdict()),
         ]
@@ -69,6 +71,15 @@ class FitPage(QWidget):
             if widget is not None:
                 widget.setVisible(fit is not None)
         self._show_verdict()
+
+    def _show_misfit(self, session: CalibrationSession | None) -> None:
+        """Show captures that no fit came of, where a look at them helps."""
+        if session is None or self._state.fit.value is not None:
+            return
+        if self.evidence is None:
+            self._make_evidence()
+        assert self.evidence is not None
+        self.evidence.setVisible(self.evidence.show_captures(session))
 
     def _make_evidence(self) -> None:
         self.evidence = make_evidence(self._state.name)

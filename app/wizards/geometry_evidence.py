@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -162,7 +161,7 @@ class GeometryEvidence(Evidence):
 
     def _ask(self) -> None:
         keys = [self._keys[item.text()] for item in self._choices() if not self._is_ticked(item)]
-        self.settings_wanted.emit({"left_out": json.dumps(keys)})
+        self.settings_wanted.emit({"left_out": ",".join(keys)})
 
     def _diagnose(self, too_few: bool) -> None:
         record = self._record

@@ -32,6 +32,7 @@ class Swatches(QWidget):
         self.expected: list[QColor] = []
         self._names: list[str] = []
         self._held_out: list[float] = []
+        self._sentence = "Reading the picture…"
         self.setMinimumSize(220, 150)
         self.setAccessibleName("Patches as measured and as expected")
 
@@ -45,6 +46,13 @@ class Swatches(QWidget):
         self.setAccessibleDescription(
             f"Farthest from expectation is {names[worst]}, by {100 * held_out[worst]:.1f} % of white."
         )
+        self.update()
+
+    def clear(self, sentence: str) -> None:
+        """Show a sentence in place of patches."""
+        self.measured, self.expected, self._names, self._held_out = [], [], [], []
+        self._sentence = sentence
+        self.setAccessibleDescription(sentence)
         self.update()
 
     def apply_theme(self, theme: Theme) -> None:
@@ -63,7 +71,7 @@ class Swatches(QWidget):
         line = QFontMetricsF(self.font()).height()
         if not self.measured:
             painter.setPen(QColor(self._theme.muted))
-            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignTop, "Reading the picture…")
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignTop, self._sentence)
             return
         for index, (measured, expected) in enumerate(zip(self.measured, self.expected, strict=True)):
             place = self._place(index)

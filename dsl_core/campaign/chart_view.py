@@ -25,10 +25,14 @@ class ChartView:
 
 
 def chart_view(record: ColorCheckerCalibration, bench: Bench, step: Step) -> ChartView:
-    """Read the white picture of the chart's step; raises `StoreError` when the captures are gone."""
+    """Read what a fit of the chart rests on; raises `StoreError` when the captures are gone."""
+    return ChartView(white_picture(bench, step), *patch_colours(record, bench.rig))
+
+
+def white_picture(bench: Bench, step: Step) -> NDArray[np.uint8]:
+    """The white picture of the chart's step, RGB (rows, columns, 3); raises `StoreError`."""
     from dsl_core.reconstruction.merge import MergedScan
 
     scan = MergedScan(scan_of(bench.step_folder(step)), bench.rig)
-    white = scan.merge("spectral", WHITE).radiance
-    picture = chart_picture(white, bench.rig.sensor.bayer)
-    return ChartView(np.ascontiguousarray(picture[..., ::-1]), *patch_colours(record, bench.rig))
+    picture = chart_picture(scan.merge("spectral", WHITE).radiance, bench.rig.sensor.bayer)
+    return np.ascontiguousarray(picture[..., ::-1])

@@ -16,7 +16,7 @@ from app.state.evented import Value
 from app.state.rig import RigChoice
 from app.state.wizard import Doing, Fit, WizardState
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DeviceError, StoreError
+from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import load_rig
@@ -252,6 +252,25 @@ def test_settings_wanted_by_the_evidence_fit_again(bench: CalibrateBench) -> Non
     assert found.fitted.settings["largest_dn"] == "1"
     control.change_settings({"largest_dn": "much"}, then_fit=True)
     assert "largest_dn" in state.trouble.value
+
+
+def test_a_fit_that_fails_leaves_its_captures_to_be_looked_at(bench: CalibrateBench) -> None:
+    def fails(bench: object, progress: object) -> None:
+        raise CalibrationError("No target was found. Set its corners.")
+
+    bench.wrong = {"fit": fails}
+    state, control = bench.wizard("selftest")
+    for step in (1, 2):
+        control.go_to(step)
+        control.capture()
+    control.fit()
+    assert state.trouble.value == "No target was found. Set its corners."
+    assert state.misfit.value is not None
+    assert [step.key for step in state.misfit.value.steps] == ["dim", "bright"]
+    bench.wrong = {}
+    control.change_settings({"largest_dn": "4095"}, then_fit=True)
+    assert fit_of(state) is not None
+    assert state.misfit.value is None
 
 
 def test_a_rig_that_places_targets_captures_all_steps_by_itself(bench: CalibrateBench) -> None:

@@ -9,10 +9,15 @@ import pytest
 from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
+from app.state.wizard import WizardState
 from app.wizards.evidence import PlainEvidence, make_evidence
 from app.wizards.evidence_parts import Aside, NumberTable, with_spread
+from app.wizards.fit_page import FitPage
 from dsl_core.campaign.recipes import recipe_names
-from tests.app.evidence_bench import THEMES
+from dsl_core.campaign.session import CalibrationSession
+from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.base import Record
+from tests.app.evidence_bench import THEMES, session_of
 
 MAKE_ALL = """
 import sys
@@ -48,14 +53,34 @@ def test_everything_has_a_name_and_a_tip(qtbot: QtBot, name: str) -> None:
 
 
 def test_a_calibration_without_evidence_says_so(qtbot: QtBot) -> None:
-    from dsl_core.model.accepted import AcceptedCalibration
-    from dsl_core.model.base import Record
-    from tests.app.evidence_bench import session_of
-
     widget = make_evidence("of another package")
     qtbot.addWidget(widget)
     widget.show_fit(AcceptedCalibration(name="other", title="Other"), Record(), session_of({}))
     assert "Other has nothing to draw" in widget.findChildren(QLabel)[0].text()
+
+
+def test_captures_without_a_fit_are_shown_where_that_helps(
+    qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[object] = []
+
+    class Helpful(PlainEvidence):
+        def show_captures(self, session: CalibrationSession) -> bool:
+            seen.append(session)
+            return True
+
+    for kind, helps in ((Helpful, True), (PlainEvidence, False)):
+        monkeypatch.setattr("app.wizards.fit_page.make_evidence", lambda name, kind=kind: kind())
+        state = WizardState("color-checker", "Color Checker")
+        page = FitPage(state)
+        qtbot.addWidget(page)
+        page.show()
+        session = session_of({})
+        state.misfit.set(session)
+        assert page.evidence is not None
+        assert page.evidence.isVisible() == helps
+        assert not page.figures.isVisible()
+    assert len(seen) == 1
 
 
 def test_only_the_latest_of_what_is_read_is_shown(qtbot: QtBot) -> None:

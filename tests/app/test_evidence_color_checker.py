@@ -17,6 +17,8 @@ from pytestqt.qtbot import QtBot
 
 from app.theme import Theme
 from app.wizards.chart_picture import patch_outlines
+from app.wizards.color_checker_evidence import ColorCheckerEvidence
+from app.wizards.evidence import make_evidence
 from app.wizards.swatches import screen_colours
 from dsl_core.calibration.color_checker import expected_colours
 from dsl_core.calibration.patches import patch_samples
@@ -24,6 +26,7 @@ from dsl_core.campaign.color_checker import ColorCheckerRecipe
 from dsl_core.campaign.recipe import Bench
 from dsl_core.campaign.recipes import load_recipe
 from dsl_core.campaign.session import CalibrationSession
+from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.color_checker import ColorCheckerCalibration, PatchResult
 from dsl_core.model.rig import Rig
 from dsl_core.optics.charts import chart_reflectance
@@ -184,6 +187,39 @@ def test_corners_move_by_keys(qtbot: QtBot, session: CalibrationSession) -> None
     with qtbot.waitSignal(widget.settings_wanted) as heard:
         QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
     assert json.loads(heard.args[0]["corners_px"])[1] == [200.0, 6.0]
+
+
+def test_corners_are_set_by_hand_where_no_chart_was_found(qtbot: QtBot, session: CalibrationSession) -> None:
+    widget = make_evidence("color-checker")
+    assert isinstance(widget, ColorCheckerEvidence)
+    qtbot.addWidget(widget)
+    widget.resize(700, 500)
+    assert widget.show_captures(unfitted(session, ColorCheckerRecipe()))
+    widget.show()
+    qtbot.waitUntil(lambda: widget.chart.image.image is not None, timeout=20_000)
+    corners = widget.chart.corners_px
+    assert corners.mean(0) == pytest.approx((110.5, 72))
+    assert np.ptp(corners, axis=0)[0] == pytest.approx(1.5 * np.ptp(corners, axis=0)[1])
+    assert "Drag the four corners" in widget.words.text()
+    assert not widget.again.isEnabled()
+    QTest.keyClick(widget.chart, Qt.Key.Key_Right)
+    with qtbot.waitSignal(widget.settings_wanted) as heard:
+        QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
+    wanted = load_recipe("color-checker", heard.args[0])
+    # The next attempt begins where the person left the corners.
+    assert widget.show_captures(unfitted(session, wanted))
+    qtbot.waitUntil(lambda: not widget._aside.is_busy, timeout=20_000)
+    assert np.allclose(widget.chart.corners_px, corners + np.eye(4, 2) * (1, 0), atol=0.01)
+    widget.show_fit(
+        AcceptedCalibration(name="color-checker", title=""), calibration(session.bench.rig), session
+    )
+    assert np.allclose(widget.chart.corners_px, CORNERS)
+    qtbot.waitUntil(lambda: not widget._aside.is_busy, timeout=20_000)
+
+
+def unfitted(session: CalibrationSession, recipe: object) -> CalibrationSession:
+    found = SimpleNamespace(bench=session.bench, steps=session.steps, recipe=recipe)
+    return cast(CalibrationSession, found)
 
 
 def test_missing_captures_are_said_in_words(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,8 @@ from pytestqt.qtbot import QtBot
 
 from app.theme import Theme
 from dsl_core.calibration.geometry_diagnosis import CELLS, GOOD_RMS_PX, MIN_POSES
+from dsl_core.campaign.geometry import GeometryRecipe
+from dsl_core.campaign.recipes import load_recipe
 from dsl_core.model.board import Checkerboard
 from dsl_core.model.geometry_calibration import (
     Flatness,
@@ -115,7 +116,9 @@ def test_unticked_poses_are_left_out_when_solved_again(qtbot: QtBot) -> None:
     assert widget.again.text() == "Solve again with 3 poses"
     with qtbot.waitSignal(widget.settings_wanted) as heard:
         QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
-    assert json.loads(heard.args[0]["left_out"]) == ["pose-04", "pose-06"]
+    recipe = load_recipe("geometry", heard.args[0])
+    assert isinstance(recipe, GeometryRecipe)
+    assert recipe.left_out == ("pose-04", "pose-06")
 
 
 def test_too_few_poses_are_not_solved_again(qtbot: QtBot) -> None:
