@@ -90,7 +90,7 @@ class WizardState:
 
     ``at`` counts pages: 0 are the settings, 1 to n the steps, n + 1 the fit. ``trouble`` is what went wrong
     and what to do about it, ``note`` what was done last. ``misfit`` is the session whose captures gave no
-    fit. ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work has ended.
+    fit. ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work ended.
     """
 
     def __init__(self, name: str, title: str) -> None:
