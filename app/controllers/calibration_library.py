@@ -114,7 +114,7 @@ class LibraryController:
         devices = self._rig.state.devices.value
         return devices is not None and devices.place is None
 
-    def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
+    def check(self, key: str, spectralon: bool = True) -> None:
         """Take one quick shot of a flat target and compare it with a calibration."""
         devices = self._rig.state.devices.value
         if devices is None:
@@ -126,7 +126,7 @@ class LibraryController:
             from dsl_core.devices.conditions import use_calibration
 
             known, own = self._library.find(key).rig, replace(devices)
-            use_calibration(own, known, override)
+            use_calibration(own, known)
             if own.place is not None:
                 own.place(PLACEMENT)
             with tempfile.TemporaryDirectory(prefix="dsl-scan-check-") as spare:

@@ -165,6 +165,8 @@ class WizardController:
 
     def capture(self) -> None:
         """Capture the step that is shown, or capture it anew."""
+        if self.state.doing.value is Doing.LOOKING:
+            self.state.note.set("Captures as soon as the look at hand has ended.")
         self._jobs.after_look(self._capture)
 
     def capture_all(self) -> None:

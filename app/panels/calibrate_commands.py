@@ -31,7 +31,7 @@ class LibraryCommands(Protocol):
     def report(self, key: str) -> None:
         """Show the report."""
 
-    def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
+    def check(self, key: str, spectralon: bool = True) -> None:
         """Compare the rig with it by one quick shot."""
 
 

@@ -147,8 +147,8 @@ class CalibratePage(PageWidget):
         return self._commands.open(path)
 
     def command_line(self) -> str:
-        """The command that calibrates everything of this campaign."""
-        return self._commands.command_line()
+        """The commands that calibrate everything of this campaign, or one after the other."""
+        return "\n".join(self._commands.command_line(name) for name in ("", *self.rows))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
