@@ -99,6 +99,8 @@ def calibrate_depth_stage(
         column_std_px=planes.column_std_px if covariance is not None else rig.column_std_px,
         depth_std_mm=planes.depth_std_mm,
         geometry_pull=planes.pull,
+        bow_mm=planes.bow_mm,
+        bow_std_mm=planes.bow_std_mm,
         positions=_positions(data, planes),
         film=film.film,
         film_std=film.std,

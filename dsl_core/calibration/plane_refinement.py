@@ -54,6 +54,8 @@ class PlaneRefinement:
     ``covariance`` (24, 24) is that of the refined lenses and pose; ``column_std_px`` is what it means for
     zero-order columns and ``depth_std_mm`` for depths, rms over the image and the range of depth. ``pull`` is
     how far lenses and pose had to move, in their deviations before, rms: about one or less if all is well.
+    ``bow_mm`` is by how much the target seems to bulge towards the camera, over 300 mm, with its deviation;
+    the planes are fitted as if it did not.
     """
 
     problem: StageProblem
@@ -69,6 +71,8 @@ class PlaneRefinement:
     column_std_px: float
     depth_std_mm: float
     pull: float
+    bow_mm: float
+    bow_std_mm: float
 
     def variants(self) -> Iterator[tuple[Rig, tuple[Plane, ...]]]:
         """Rigs and planes that are one deviation off, in each independent direction of what is uncertain."""
@@ -111,7 +115,7 @@ def refine_planes(
     numbers, posterior = _gauss_newton(problem, start, free)
     found = _summary(rig, problem, numbers, posterior)
     require_flat(positions_mm, found.plane_rms_mm)
-    require_agreement(found.pull)
+    require_agreement(found.pull, found.bow_mm, found.bow_std_mm)
     return found
 
 
@@ -126,9 +130,7 @@ def _gauss_newton(
     for _ in range(ROUNDS):
         residual = problem.residual_px(numbers)
         jacobian = problem.jacobian(numbers, free)
-        scale = max(1.0, 1.4826 * float(np.median(np.abs(residual / sigma))))
-        off = np.abs(residual) / (scale * sigma)
-        weight = np.minimum(1.0, HUBER_SIGMAS / np.maximum(off, 1e-12)) / (scale * sigma) ** 2
+        weight = _weights(residual, sigma)
         information = (jacobian * weight[:, None]).T @ jacobian + np.diag(pull**2)
         gradient = jacobian.T @ (weight * residual) - pull**2 * numbers[free]
         size = np.sqrt(np.diag(information).clip(1e-30))
@@ -140,6 +142,28 @@ def _gauss_newton(
     inverse = np.linalg.pinv(information / np.outer(size, size), hermitian=True) / np.outer(size, size)
     covariance[np.ix_(free, free)] = inverse
     return numbers, covariance
+
+
+def _weights(residual: Floats, sigma: Floats) -> Floats:
+    """Robust weights of residuals whose scatter sets the scale of the noise."""
+    scale = max(1.0, 1.4826 * float(np.median(np.abs(residual / sigma))))
+    off = np.abs(residual) / (scale * sigma)
+    return np.minimum(1.0, HUBER_SIGMAS / np.maximum(off, 1e-12)) / (scale * sigma) ** 2
+
+
+def _bow(problem: StageProblem, numbers: Floats, posterior: Floats) -> tuple[float, float]:
+    """The bulge that all positions share and its deviation, mm, while all that was fitted may move with it.
+
+    At the optimum of the other numbers the gradient by them is zero, so that one step of Newton's method with
+    the bulge as a further number needs its own row of the normal equations only.
+    """
+    residual = problem.residual_px(numbers)
+    weight = _weights(residual, np.hypot(problem.std_px, FLOOR_PX))
+    free = np.flatnonzero(np.diag(posterior) > 0)
+    bulge, jacobian = problem.bulge(numbers), problem.jacobian(numbers, free)
+    shared = jacobian.T @ (weight * bulge)
+    information = bulge @ (weight * bulge) - shared @ posterior[np.ix_(free, free)] @ shared
+    return float(bulge @ (weight * residual) / information), float(information**-0.5)
 
 
 def _start(
@@ -173,6 +197,7 @@ def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats
     residual = problem.residual_px(numbers)
     slope = _per_mm(problem, numbers)
     each = [problem.position_of == k for k in range(len(problem.steps_mm))]
+    bow_mm, bow_std_mm = _bow(problem, numbers, posterior)
     column_std, depth_std = systematic_std(refined, shared, problem.root, posterior[:SHARED, :SHARED])
     return PlaneRefinement(
         problem=problem,
@@ -188,6 +213,8 @@ def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats
         column_std_px=column_std,
         depth_std_mm=depth_std,
         pull=float(np.sqrt(np.mean(numbers[:SHARED] ** 2))),
+        bow_mm=bow_mm,
+        bow_std_mm=bow_std_mm,
     )
 
 

@@ -78,7 +78,7 @@ def require_flat(positions_mm: Sequence[float], rms_mm: Floats, limit_mm: float 
         )
 
 
-def require_agreement(pull: float) -> None:
+def require_agreement(pull: float, bow_mm: float, bow_std_mm: float) -> None:
     """Raise `CalibrationError` when planes would need other lenses than the board's, far beyond its doubts.
 
     A target that bulges alike at every position looks like lenses that distort otherwise.
@@ -86,6 +86,7 @@ def require_agreement(pull: float) -> None:
     if pull > MAX_PULL:
         raise CalibrationError(
             f"The planes contradict the geometry calibration: it would have to move by {pull:.1f} of"
-            f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat;"
-            " calibrate the geometry again if camera or projector were touched since."
+            f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat: it looks"
+            f" as if it bulged towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm."
+            " Calibrate the geometry again if camera or projector were touched since."
         )

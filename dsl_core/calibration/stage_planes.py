@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 SLOPES, DISTANCE, GAIN, STEPS = slice(SHARED, SHARED + 2), SHARED + 2, SHARED + 3, SHARED + 4
 #: A stage askew to the camera axis by 0.8 degrees moves a plane by this share too little.
 GAIN_STD = 1e-4
+#: Half of the width over which a bulge is stated.
+BOW_RADIUS_MM = 150.0
 
 
 def shared_parameters(rig: Rig) -> Floats:
@@ -103,6 +105,19 @@ class StageProblem:
     def residual_px(self, numbers: Floats) -> Floats:
         """Seen minus predicted columns (n,)."""
         return np.asarray(self.column_px - columns_at(self.shared(numbers), self.points_mm(numbers)))
+
+    def bulge(self, numbers: Floats) -> Floats:
+        """Change of predicted columns (n,) for a target whose middle stands 1 mm before its rim.
+
+        The rim is a circle of `BOW_RADIUS_MM` about the middle of all points; a bulge about another place
+        differs by slopes and distance, which are fitted.
+        """
+        points = self.points_mm(numbers)
+        middle = points[:2] - points[:2].mean(1, keepdims=True)
+        back_mm = (middle**2).sum(0) / BOW_RADIUS_MM**2
+        farther = 1 + back_mm / self.distances_mm(numbers)[self.position_of]
+        shared = self.shared(numbers)
+        return np.asarray(columns_at(shared, points * farther) - columns_at(shared, points))
 
     def jacobian(self, numbers: Floats, free: NDArray[np.int64]) -> Floats:
         """Change of predicted columns (n, free numbers) by central differences."""

@@ -9,6 +9,8 @@ from dsl_core.model.figure import Figure
 MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
 #: How far planes may move the geometry, in its deviations, without a doubt.
 MAX_PULL = 1.8
+#: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
+MAX_BOW_MM, BOW_SIGMAS = 0.2, 3.0
 
 
 def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
@@ -65,6 +67,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             high=MAX_PULL,
             advice="Use a flatter target, or calibrate the geometry again: one of both is not what it seems.",
         ),
+        *_bow(record),
         Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),
         Figure(
             name="held-out error of first orders",
@@ -81,5 +84,23 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             unit="",
             high=0.0,
             advice=". ".join(record.warnings),
+        ),
+    )
+
+
+def _bow(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    if record.bow_mm is None:
+        return ()
+    limit = max(MAX_BOW_MM, BOW_SIGMAS * record.bow_std_mm)
+    return (
+        Figure(
+            name="bulge of the target over 300 mm",
+            value=record.bow_mm,
+            unit="mm",
+            std=record.bow_std_mm,
+            low=-limit,
+            high=limit,
+            advice="Use a flatter target. If it is flat, the lenses are not what the board said: repeat the"
+            " geometry with poses that fill the picture.",
         ),
     )

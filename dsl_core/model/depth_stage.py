@@ -59,6 +59,8 @@ class DepthStageCalibration(Record):
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (None where it was not known
     before, and the geometry is as it was); ``column_std_px`` and ``depth_std_mm`` are what it leaves open in
     columns of the zero order and in depth; ``geometry_pull`` is how far it moved, in its deviations before.
+    ``bow_mm`` is by how much the target seems to bulge towards the camera over 300 mm, alike at all positions
+    (None in older records).
     ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
     is that of single samples of first orders. ``frames`` counts the exposures.
     """
@@ -71,6 +73,8 @@ class DepthStageCalibration(Record):
     column_std_px: float
     depth_std_mm: float
     geometry_pull: float
+    bow_mm: float | None = None
+    bow_std_mm: float = 0.0
     positions: tuple[StagePosition, ...]
     film: Film
     film_std: dict[str, float]

@@ -32,15 +32,21 @@ def small_rig() -> Rig:
 
 
 def seen(
-    truth: Rig, distance_mm: float, rng: np.random.Generator, bow_mm: float = 0.0, tilt: float = 0.02
+    truth: Rig,
+    distance_mm: float,
+    rng: np.random.Generator,
+    bow_mm: float = 0.0,
+    tilt: float = 0.02,
+    rim_mm: float = 0.0,
 ) -> ColumnSamples:
-    """Columns of a plane, bowed by so much over the view, as tile means show them."""
+    """Columns of a plane, bent by so much over the view, or domed over 300 mm, as tile means show them."""
     x, y = np.meshgrid(np.linspace(2, SIZE[0] - 3, 30), np.linspace(2, SIZE[1] - 3, 20))
     pixels = np.stack([x.ravel(), y.ravel()], 1)
     shared = shared_parameters(truth)
     rays = rays_through(shared[CAMERA], pixels)
     depth = 1 / np.tensordot(plane_of(np.array([tilt, 0.0]), distance_mm).inverse, rays, 1)
     bulge = bow_mm * ((x.ravel() - SIZE[0] / 2) / (SIZE[0] / 2)) ** 2
+    bulge = bulge + rim_mm * ((rays * depth)[:2] ** 2).sum(0) / 150.0**2
     columns = columns_at(shared, rays * (depth + bulge))
     inside = (columns > 0) & (columns < 639)
     noisy = columns[inside] + NOISE_PX * rng.standard_normal(int(inside.sum()))
@@ -89,6 +95,20 @@ def test_stated_deviations_cover_the_errors(several: list[tuple[Rig, Rig, PlaneR
     assert 0.4 < np.sqrt(np.mean(np.square(pulls))) < 1.7
 
 
+def test_a_bulge_at_all_positions_is_measured(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
+    for _, _, flat in several:
+        assert abs(flat.bow_mm) < 3 * flat.bow_std_mm < 0.3
+    truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)
+    board = board_calibrated(truth, small_rig(), 6)
+    samples = [seen(truth, distance, rng, rim_mm=0.4) for distance in distances_mm(rng)]
+    assert board.geometry_covariance is not None
+    covariance = np.array(board.geometry_covariance).reshape(24, 24)
+    found = refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
+    assert found.bow_mm == pytest.approx(0.4, abs=3 * found.bow_std_mm)
+    # The planes themselves look as flat as ever: lenses bend them straight.
+    assert found.plane_rms_mm.max() < 0.1
+
+
 def test_planes_are_as_flat_as_the_noise(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
     for truth, _, found in several:
         assert found.residual_rms_px.max() < 1.1 * NOISE_PX
@@ -125,7 +145,10 @@ def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
     samples = [seen(truth, distance, rng, bow_mm=1.5) for distance in distances_mm(rng)]
     assert board.geometry_covariance is not None
     covariance = np.array(board.geometry_covariance).reshape(24, 24)
-    with pytest.raises(CalibrationError, match="planes contradict the geometry calibration"):
+    with pytest.raises(
+        CalibrationError,
+        match=r"planes contradict the geometry .* bulged towards the camera by -?\d\.\d\d ± 0\.0\d mm",
+    ):
         refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
 
 
