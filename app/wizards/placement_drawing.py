@@ -222,7 +222,8 @@ class PlacementDrawing(QWidget):
         painter.drawRect(picture)
         painter.setPen(QColor(self._theme.text))
         below = QRectF(area.left(), picture.bottom() + 4, area.width(), area.bottom() - picture.bottom() - 4)
-        words = "\n".join(face.turns) or "facing the camera"
+        # Numbers stay with their word where lines break.
+        words = "\n".join(face.turns).replace(" by ", " by\u00a0") or "facing the camera"
         painter.drawText(below, Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap, words)
 
     @staticmethod
