@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -197,16 +198,11 @@ class Aside(QObject):
                 found, trouble = work(), None
             except Exception as error:  # told in the window, never lost in a thread
                 found, trouble = None, error
-            # The widget may have been closed meanwhile; then nobody waits for it.
-            if self._is_alive():
+            # The widget may be gone meanwhile, and this object with it: then nobody waits for it.
+            with suppress(RuntimeError):
                 self._ended.emit(number, found, trouble)
 
         QThreadPool.globalInstance().start(run)
-
-    def _is_alive(self) -> bool:
-        from shiboken6 import isValid
-
-        return bool(isValid(self))
 
     def _finish(self, number: int, found: object, trouble: Exception | None) -> None:
         if number != self._number or self._show is None:
