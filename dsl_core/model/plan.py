@@ -48,12 +48,17 @@ class ScanLines(Record):
 
 
 class LineComb(Record):
-    """Several lines per frame, ``period_px`` apart, moved by ``step_px`` from frame to frame."""
+    """Several lines per frame, ``period_px`` apart, moved by ``step_px`` from frame to frame.
+
+    ``shifts_px`` moves the combs of the red, green and blue LED apart: each frame then holds three combs of
+    one colour each.
+    """
 
     kind: Literal["comb"] = "comb"
     width_px: int = Field(default=5, ge=1)
     step_px: int = Field(default=2, ge=1)
     period_px: int = Field(default=106, ge=2)
+    shifts_px: tuple[int, int, int] = (0, 0, 0)
 
     @model_validator(mode="after")
     def _check(self) -> Self:

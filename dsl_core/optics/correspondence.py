@@ -190,6 +190,9 @@ class GridModel:
         """Projector pixels; the rows, which the fit does not cover, are those of the analytic model."""
         if order == 0:
             return _zero_footprint(self.rig, pixels, depth_mm, len(wavelengths_nm))
+        if abs(order) > 1:
+            # Too faint to be calibrated; the grating equation places them well enough.
+            return GratingModel(self.rig).trace(pixels, depth_mm, order, wavelengths_nm)
         if order not in self.grid.orders:
             raise CalibrationError(
                 f"The data-driven correspondence knows orders {self.grid.orders}, not {order}."

@@ -12,7 +12,7 @@ width of a band. The operator comes as products with H and its adjoint, and as m
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -51,14 +51,17 @@ class BlurredProfiles:
     ) -> None:
         """Blur ``profiles`` (frames, width, LEDs): for the zero order (``band_px`` 0, halo) or a band."""
         width = profiles.shape[1]
-        samples = np.arange((width + 2 * MARGIN_PX) * OVERSAMPLE)[:, None]
-        at = (samples + 0.5) / OVERSAMPLE - 0.5 - MARGIN_PX - np.arange(width)
+        samples = (width + 2 * MARGIN_PX) * OVERSAMPLE
+        # A sample and a column enter only by their distance, so each distance is worked out once.
+        steps = np.arange(samples + OVERSAMPLE * (width - 1)) - OVERSAMPLE * (width - 1)
+        distance = (steps + 0.5) / OVERSAMPLE - 0.5 - MARGIN_PX
         if band_px == 0:
-            spread = zero_order_profile(torch.as_tensor(at), -0.5, 0.5, response)
+            light = zero_order_profile(torch.as_tensor(distance), -0.5, 0.5, response)
         else:
-            spread = torch.as_tensor(band_profile(at, 1.0, response.blur_px, band_px))
-        table = torch.einsum("sx,fxl->slf", spread, torch.as_tensor(profiles, dtype=torch.float64))
-        self.table = table.to(other)
+            light = torch.as_tensor(band_profile(distance, 1.0, response.blur_px, band_px))
+        index = torch.arange(samples)[:, None] + OVERSAMPLE * (width - 1 - torch.arange(width))
+        spread = light[index]
+        self.table = torch.einsum("sx,fxl->slf", spread.to(other), like(profiles, other))
 
     def at(self, columns_px: Tensor) -> Tensor:
         """Light at columns of shape (pixels,): (pixels, LEDs, frames); almost none far outside the frame."""
@@ -79,6 +82,10 @@ class ImageFormation:
         shading: Tensor,
     ) -> None:
         """``profiles`` (frames, width, LEDs): radiance relative to full drive; ``shading`` is (pixels,)."""
+        if bool((profiles == profiles[..., :1]).all()):
+            # Grey patterns light all LEDs alike: one stands for their sum.
+            profiles = profiles[..., :1]
+            paths = [replace(path, moments=path.moments.sum(1, keepdims=True)) for path in paths]
         self.paths, self.shading, self.frames = paths, shading, len(profiles)
         self.bands = max(path.moments.shape[2] for path in paths)
         self._light = {

@@ -45,11 +45,12 @@ def line_profile(spec: ScanLines | LineComb, width_px: int, index: int) -> NDArr
     """Profile of frame ``index``, shape (width, 3), 0 or 1.
 
     A single line covers columns ``[step*index, step*index + width)``; a comb lights every column x
-    with ``(x - step*index) mod period < width``. Raises `PlanError` when the lines do not fit.
+    with ``(x - step*index) mod period < width``, each LED at its own shift. Raises `PlanError` when
+    the lines do not fit.
     """
     check_lines(spec, width_px)
-    offset = np.arange(width_px) - spec.step_px * index
+    offset = np.repeat(np.arange(width_px)[:, None] - spec.step_px * index, 3, axis=1)
     if isinstance(spec, LineComb):
-        offset %= spec.period_px
+        offset = (offset - np.array(spec.shifts_px)) % spec.period_px
     lit = (offset >= 0) & (offset < spec.width_px)
-    return np.repeat(lit[:, None], 3, axis=1).astype(np.float32)
+    return lit.astype(np.float32)

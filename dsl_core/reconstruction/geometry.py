@@ -19,6 +19,7 @@ from dsl_core.reconstruction.depth import triangulate
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.pattern_column import radiance_profiles, refine_by_profiles
 from dsl_core.reconstruction.surface import Surface, reconstruct_surface
 
 #: A pixel is lit when white stands this many standard deviations above black.
@@ -58,7 +59,7 @@ def reconstruct_geometry(
     surface_window_px: int | None = None,
     device: str = "cpu",
 ) -> Geometry:
-    """Refine decoded columns on the line frames, triangulate, and fit the surface.
+    """Refine decoded columns on the frames of the spectral patterns, triangulate, and fit the surface.
 
     ``surface_window_px`` is the window of the plane fits; by default it follows from the image's width.
     """
@@ -69,10 +70,11 @@ def reconstruct_geometry(
     refined = np.zeros(coarse.size, bool)
     depth, slope = np.empty(coarse.size), np.empty(coarse.size)
     lines = LineSet.of(plan) if refine_columns else None
+    profiles = radiance_profiles(rig, plan) if refine_columns and plan.spectral_count else None
 
     def work(start: int) -> None:
         part = slice(start, min(start + CHUNK, coarse.size))
-        column, offset = _columns(rig, coarse, white, stack, lines, part, device)
+        column, offset = _columns(rig, coarse, white, stack, lines, profiles, part, device)
         for name, values in zip(maps, (*_of(column), offset), strict=True):
             maps[name][part] = values.cpu().numpy()
         refined[part] = column.refined.cpu().numpy()
@@ -88,7 +90,7 @@ def reconstruct_geometry(
     finally:
         torch.set_num_threads(before)
     dq = np.hypot(maps["dq"], rig.column_std_px)
-    flags = _flags(rig, code, white, maps["a"], refined, depth, lines is not None)
+    flags = _flags(rig, code, white, maps["a"], refined, depth, profiles is not None)
     good = (flags & int(Flag.NO_LIGHT | Flag.CODE_UNSURE | Flag.OUT_OF_RANGE | Flag.NON_FINITE)) == 0
     depth_mm = np.where(good, depth, np.nan).reshape(shape)
     depth_std = np.where(good, dq * slope, np.nan).reshape(shape)
@@ -110,11 +112,12 @@ def _columns(
     white: MergedFrame,
     stack: LineStack,
     lines: LineSet | None,
+    profiles: NDArray[np.float64] | None,
     part: slice,
     device: str,
 ) -> tuple[Column, torch.Tensor]:
     start = torch.as_tensor(coarse[part], device=device)
-    if lines is None:
+    if profiles is None:
         amplitude = torch.as_tensor(white.radiance.ravel()[part], device=device)
         spread = torch.as_tensor(white.variance.ravel()[part], device=device).sqrt()
         none = torch.zeros_like(start, dtype=torch.bool)
@@ -123,6 +126,9 @@ def _columns(
         )
     y = torch.as_tensor(stack.radiance.reshape(len(stack.radiance), -1)[:, part], device=device)
     std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, part], device=device)
+    if lines is None:
+        column = refine_by_profiles(start, y, std, profiles, rig.projector_response)
+        return column, torch.zeros_like(start)
     column = refine(start, y, std, lines, rig.projector_response)
     return column, dark_offset(column.column_px, column.amplitude, y, std, lines, rig.projector_response)
 
@@ -134,7 +140,7 @@ def _flags(
     amplitude: NDArray[np.float32],
     refined: NDArray[np.bool_],
     depth: NDArray[np.float64],
-    has_lines: bool,
+    has_patterns: bool,
 ) -> NDArray[np.uint16]:
     light, noise = white.radiance.ravel(), np.sqrt(white.variance.ravel())
     # Saturated white is bright: its radiance is a lower bound and its variance infinite.
@@ -150,7 +156,7 @@ def _flags(
     # A bit at the edge of a stripe is close to its inverse, but then both answers are one column apart and
     # the refinement finds the right one; without it, or where it fails, the doubt stands.
     mark(code.undecided.ravel() & ~refined & lit, Flag.CODE_UNSURE)
-    if has_lines:
+    if has_patterns:
         # The amplitude is a lower bound of nothing: first orders alone never reach this share of white.
         faint = lit & refined & ~white.saturated.ravel() & (amplitude < ZERO_ORDER_SHARE * light)
         mark(faint, Flag.NO_LIGHT)

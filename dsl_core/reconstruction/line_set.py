@@ -26,7 +26,7 @@ class LineSet:
         match plan.spectral:
             case ScanLines(width_px=w, step_px=s):
                 return cls(w, s, (w - 1) / 2, plan.spectral_count, plan.spectral_count)
-            case LineComb(width_px=w, step_px=s, period_px=p) if p % s == 0:
+            case LineComb(width_px=w, step_px=s, period_px=p, shifts_px=(0, 0, 0)) if p % s == 0:
                 return cls(w, s, (w - 1) / 2, -(-(width - w // 2) // s), p // s)
         return None
 

@@ -20,6 +20,7 @@ from dsl_core.optics.demosaic import demosaic, demosaic_variance
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import halo_of_line
 from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.pattern_column import radiance_profiles
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral_system import (
     ORDERS,
@@ -166,7 +167,8 @@ class SpectralReconstruction:
         inside_tile = np.flatnonzero(valid)
         y, x = np.divmod(inside_tile, valid.shape[1])
         flat = (y + rows.start) * self.pixels.valid.shape[1] + x + columns.start
-        traced = {order: self._footprint(order, flat, self.bands.centroids_nm[order]) for order in ORDERS}
+        orders = ORDERS if self._is_banded else self.bands.orders
+        traced = {order: self._footprint(order, flat, self.bands.centroids_nm[order]) for order in orders}
         window = _Window(self, rows, columns, inside_tile)
         spectra, misfit = (self._banded if self._is_banded else self._dense)(flat, traced, window)
         self._store(spectra, misfit, flat, traced, out)
@@ -213,12 +215,10 @@ class SpectralReconstruction:
     def _dense(
         self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window
     ) -> tuple[Spectra, Tensor]:
-        from dsl_core.patterns.images import drive_levels, spectral_profiles
         from dsl_core.reconstruction.dense_solver import solve_dense
 
-        drive = drive_levels(spectral_profiles(self.plan), 1.0) / 255.0
         response = self.rig.projector_response
-        profiles = (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
+        profiles = radiance_profiles(self.rig, self.plan)
         shading = self._map(self.pixels.shading, flat)
         column = self._map(self.pixels.column_px, flat)
         radiance, weight = window.colours(range(len(self.radiance)), None)
@@ -263,9 +263,9 @@ class SpectralReconstruction:
             cube.reshape(len(cube), -1)[:, flat] = values.float().cpu().numpy()
         bits = {1: Reach.PLUS_ONE, -1: Reach.MINUS_ONE}
         reach = torch.zeros_like(mean, dtype=torch.uint8)
-        for order, footprint in traced.items():
-            inside = footprint.inside(*self.plan.projector_size_px)
-            reach |= inside[reported].to(torch.uint8) * int(bits[order])
+        for order, bit in bits.items():
+            inside = traced[order].inside(*self.plan.projector_size_px)
+            reach |= inside[reported].to(torch.uint8) * int(bit)
         reach[reach == 0] = int(Reach.ZERO_ONLY)
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
         out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()

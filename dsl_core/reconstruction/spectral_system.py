@@ -30,6 +30,8 @@ from dsl_core.optics.spectra import hat_moments
 from dsl_core.reconstruction.line_set import LineSet
 
 ORDERS = (1, -1)
+#: Orders of a few percent of the first: lines are too far away to mix with them, free patterns are not.
+SECOND_ORDERS = (2, -2)
 #: Internal bands beyond each end of the grid.
 PAD_NM = 15.0
 #: Tables of line profiles are shared by pixels whose dispersion agrees to this, px per nm.
@@ -61,7 +63,7 @@ class Bands:
         step = grid.step_nm
         centres = np.asarray(grid.start_nm + step * np.arange(-pad, grid.count + pad), np.float64)
         moments, centroids = {}, {}
-        for order in (0, *ORDERS):
+        for order in (0, *ORDERS, *SECOND_ORDERS):
             moments[order], centroids[order] = hat_moments(rig, order, centres, step)
         return cls(centres, step, slice(pad, pad + grid.count), moments, centroids)
 
@@ -69,6 +71,11 @@ class Bands:
     def count(self) -> int:
         """Number of internal bands."""
         return len(self.centres_nm)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """First orders, and second ones where the rig knows their efficiency."""
+        return ORDERS + tuple(m for m in SECOND_ORDERS if self.moments[m].any())
 
 
 @lru_cache(maxsize=64)
