@@ -1,0 +1,169 @@
+"""What a plan will reach, predicted from the model in about a second: no picture is made.
+
+The figures are those of `evaluation.summary`, over a reference set of reflectances or over what a quick look
+saw. Errors are those of the reconstruction's own estimators on the model's data (see `virtual`); times come
+from latency and exposures, and from a measured model of the computation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.errors import DecodeError, PlanError
+from dsl_core.evaluation.spectral import peak_width, spectral_errors
+from dsl_core.model.base import Record
+from dsl_core.model.plan import CapturePlan, NoSpectral
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.planning import references
+from dsl_core.planning.binning import binned
+from dsl_core.planning.computing import computing_seconds
+from dsl_core.planning.references import References
+from dsl_core.planning.views import View, plane_view
+from dsl_core.planning.virtual import Outcome, VirtualPixels
+from dsl_core.reconstruction.scan_result import DECIDED_FROM
+from dsl_core.reconstruction.spectral_system import Bands
+
+Floats = NDArray[np.float64]
+#: What the linear model leaves open in the mean of many pixels, relative to reflectance: interpolation
+#: between bands, tabulated profiles, depth. Found by noise-free scans of the twin.
+MODEL_FLOOR = 0.003
+#: Spectral step of the truth behind the width of narrow peaks, nm, and samples that state it.
+FINE_STEP_NM, PEAK_SAMPLES = 1.0, 4
+#: Where the plane of a default view stands, mm.
+REFERENCE_MM = 700.0
+
+
+class Prediction(Record):
+    """Expected figures of a plan; see `Trial` for what the errors are of.
+
+    ``pixel_*`` are of single pixels, the others of patch means. ``fwhm_nm`` is how wide a 10 nm filter
+    looks. ``coverage`` is the share of the picture that gets a depth, ``decided`` the share of bands that
+    data decide. ``seconds`` is latency and exposures, ``raw_bytes`` before compression. ``depth_std_mm`` is
+    without the calibration's share.
+    """
+
+    frames: int
+    spectral_frames: int
+    seconds: float
+    raw_bytes: int
+    computing_s: float
+    rmse: float
+    pixel_rmse: float
+    angle_rad: float
+    pixel_angle_rad: float
+    delta_e: float
+    fwhm_nm: float | None
+    depth_std_mm: float
+    coverage: float
+    decided: float
+
+
+def predict(
+    rig: Rig,
+    plan: CapturePlan,
+    view: View | None = None,
+    *,
+    grid: WavelengthGrid | None = None,
+    palette: References | None = None,
+    binning: int = 1,
+    latency_ms: float = 0.0,
+    peaks: bool = True,
+) -> Prediction:
+    """Expected figures of a plan on a rig.
+
+    ``view`` is by default a plane at `REFERENCE_MM`, and ``palette`` the classic chart; a view of a quick
+    look brings its own spectra. Raises `PlanError` for plans without spectral patterns or binary code, and
+    patterns that do not fit.
+    """
+    if isinstance(plan.spectral, NoSpectral) or plan.code_count == 0:
+        raise PlanError(f"The plan {plan.name!r} has no spectral patterns or no binary code to predict for.")
+    grid, rig = grid or WavelengthGrid(), binned(rig, binning)
+    plan = plan.model_copy(
+        update={
+            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
+            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
+        }
+    )
+    view = view or plane_view(rig, REFERENCE_MM)
+    pixels = VirtualPixels(rig, plan, grid, view)
+    nodes = _nodes(view, pixels.bands, palette or references.chart())
+    outcome = pixels.run(nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))
+    nm = grid.centres_nm
+    calm, rough = (_Errors.of(each, outcome, nm) for each in (outcome.unbiased, outcome.mean))
+    level = float(np.sqrt((outcome.truth**2).mean()))
+    return Prediction(
+        frames=plan.shot_count,
+        spectral_frames=plan.spectral_count,
+        seconds=round(plan.duration_s(latency_ms), 3),
+        raw_bytes=plan.raw_bytes,
+        computing_s=round(computing_seconds(plan, grid), 2),
+        rmse=float(np.hypot(calm.by_spectrum, MODEL_FLOOR * level)),
+        pixel_rmse=float(np.hypot(rough.over_all, MODEL_FLOOR * level)),
+        angle_rad=calm.angle_rad,
+        pixel_angle_rad=rough.angle_rad,
+        delta_e=calm.delta_e,
+        fwhm_nm=_width(rig, plan, grid, view) if peaks else None,
+        depth_std_mm=float(np.sqrt((outcome.depth_error_mm**2).mean())),
+        coverage=view.lit_share * float(outcome.lit.mean()),
+        decided=float((outcome.data_share >= DECIDED_FROM).mean()),
+    )
+
+
+def _nodes(view: View, bands: Bands, palette: References) -> Floats:
+    """True spectra (samples, spectra, internal bands): the view's own, or the palette everywhere."""
+    if view.spectra is not None and view.wavelengths_nm is not None:
+        rows = [np.interp(bands.centres_nm, view.wavelengths_nm, row) for row in view.spectra]
+        return np.stack(rows)[:, None]
+    spectra = palette.at(bands.centres_nm)
+    return np.tile(spectra, (len(view.pixels), 1, 1))
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Of spectra (bands, samples, spectra): RMSE by spectrum and over all, mean angle and CIEDE2000."""
+
+    by_spectrum: float
+    over_all: float
+    angle_rad: float
+    delta_e: float
+
+    @classmethod
+    def of(cls, found: Floats, outcome: Outcome, nm: Floats) -> _Errors:
+        shape = found.shape
+        errors = spectral_errors(found.reshape(shape[0], -1), outcome.truth.reshape(shape[0], -1), nm)
+        return cls(
+            float(errors.rmse.mean()),
+            float(np.sqrt((errors.rmse**2).mean())),
+            float(errors.angle_rad.mean()),
+            float(errors.delta_e.mean()),
+        )
+
+
+def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: View) -> float | None:
+    """Mean width of 10 nm filters without noise, from data of a fine spectral model; None if none is seen."""
+    some = np.linspace(0, len(view.pixels) - 1, PEAK_SAMPLES).round().astype(int)
+    part = replace(
+        view,
+        pixels=view.pixels[some],
+        depth_mm=view.depth_mm[some],
+        shading=view.shading[some],
+        incidence_tan=view.incidence_tan[some],
+        spectra=None,
+    )
+    pixels = VirtualPixels(rig, plan, grid, part)
+    fine = Bands.of(rig, WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=FINE_STEP_NM))
+    filters = references.peaks()
+    true, nodes = (np.tile(filters.at(bands.centres_nm), (len(some), 1, 1)) for bands in (fine, pixels.bands))
+    outcome = pixels.run(nodes, *pixels.signals(torch.as_tensor(true, dtype=torch.float32), fine))
+    widths = []
+    for spectrum in outcome.unbiased.mean(1).T:
+        try:
+            widths.append(peak_width(grid.centres_nm, spectrum).fwhm_nm)
+        except DecodeError:  # too faint or too wide to have a half maximum
+            continue
+    return float(np.mean(widths)) if widths else None

@@ -1,0 +1,140 @@
+"""Many plans measured with the twin: one file a point, so that a sweep that stops goes on where it was."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict
+from io import StringIO
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from dsl_core import pipeline
+from dsl_core.errors import DecodeError, StoreError
+from dsl_core.io.staging import staged
+from dsl_core.model.base import Record
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.planning import references
+from dsl_core.planning.binning import binned
+from dsl_core.planning.trial import run_trial
+from dsl_core.progress import NoProgress, Progress
+
+#: Part of every key: points measured by another method than today's are measured anew.
+METHOD = 4
+PALETTES: dict[str, Callable[[], references.References]] = {
+    "chart": references.chart,
+    "peaks": references.peaks,
+    "unseen": references.unseen,
+}
+
+
+class Case(Record):
+    """A plan and how its scan is read: bands every ``step_nm``, pixels binned, what it looks at."""
+
+    name: str
+    plan: CapturePlan
+    step_nm: float = 5.0
+    binning: int = 1
+    palette: str = "chart"
+
+    @property
+    def grid(self) -> WavelengthGrid:
+        """Bands of the result."""
+        return WavelengthGrid(step_nm=self.step_nm)
+
+
+class Point(Record):
+    """What a case reached; times in seconds, ``cpu_s`` per million pixels; None where it does not apply.
+
+    ``failure`` says why a plan gave nothing; its figures are then None.
+    """
+
+    name: str
+    frames: int
+    spectral_frames: int
+    seconds: float
+    raw_bytes: int
+    rmse: float | None = None
+    pixel_rmse: float | None = None
+    angle_rad: float | None = None
+    pixel_angle_rad: float | None = None
+    delta_e: float | None = None
+    fwhm_nm: float | None = None
+    depth_rmse_mm: float | None = None
+    depth_coverage: float | None = None
+    cpu_s_per_megapixel: float | None = None
+    failure: str = ""
+
+
+def measure(rig: Rig, case: Case, latency_ms: float) -> Point:
+    """Scan and evaluate one case on the twin of a rig."""
+    plan = case.plan
+    facts = {
+        "name": case.name,
+        "frames": plan.shot_count,
+        "spectral_frames": plan.spectral_count,
+        "seconds": round(plan.duration_s(latency_ms), 3),
+        "raw_bytes": plan.raw_bytes,
+    }
+    options = pipeline.Options(grid=case.grid)
+    try:
+        trial = run_trial(binned(rig, case.binning), plan, PALETTES[case.palette](), options=options)
+    except DecodeError as error:
+        return Point.model_validate({**facts, "failure": str(error)})
+    figures = asdict(trial)
+    megapixels = figures.pop("pixels") / 1e6
+    del figures["cpu_s"]
+    return Point.model_validate(
+        {**facts, **figures, "cpu_s_per_megapixel": round(trial.cpu_s / megapixels, 3)}
+    )
+
+
+def run_sweep(
+    rig: Rig, cases: Sequence[Case], folder: Path, latency_ms: float, progress: Progress | None = None
+) -> list[Point]:
+    """Measure every case that has no file yet; raises `StoreError` when a point cannot be kept."""
+    progress = progress or NoProgress()
+    points = []
+    for done, case in enumerate(cases):
+        path = folder / f"{key_of(rig, case, latency_ms)}.json"
+        point = _stored(path)
+        if point is None:
+            point = measure(rig, case, latency_ms)
+            folder.mkdir(parents=True, exist_ok=True)
+            with staged([path], overwrite=True) as (draft,):
+                draft.write_text(point.model_dump_json(indent=1) + "\n", encoding="utf-8")
+        points.append(point)
+        progress.report("plans", done + 1, len(cases))
+    return points
+
+
+def key_of(rig: Rig, case: Case, latency_ms: float) -> str:
+    """Name of a case's file: everything that its figures depend on, hashed."""
+    parts = (METHOD, rig.model_dump_json(), case.model_dump_json(), latency_ms)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]
+
+
+def _stored(path: Path) -> Point | None:
+    """A point measured before; None where there is none or it cannot be read."""
+    try:
+        return Point.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        return None
+
+
+def write_csv(points: Iterable[Point], path: Path, overwrite: bool = False) -> Path:
+    """A table with one row a point; raises `StoreError`."""
+    rows = [point.model_dump() for point in points]
+    if not rows:
+        raise StoreError(f"There is no point to write into {path}. Measure a plan first.")
+    text = StringIO()
+    table = csv.DictWriter(text, fieldnames=list(rows[0]), lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    with staged([path], overwrite=overwrite) as (draft,):
+        draft.write_text(text.getvalue(), encoding="utf-8")
+    return path

@@ -1,0 +1,328 @@
+"""Virtual pixels: the reconstruction's own equations at a few places, without a picture.
+
+At each sample of a view the linear model of `reconstruction.spectral_system` gives what every frame of a plan
+would read for each reference spectrum; the bracket's noise, the black frames' noise and the error of the
+refined column are drawn once (always the same), and the reconstruction's own estimators answer. What
+is left out: edges, shadows, second orders, and whatever the linear model itself gets wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import Footprint, correspondence, like, zero_order
+from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath
+from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel
+from dsl_core.planning.views import View
+from dsl_core.reconstruction.column import Column, refine
+from dsl_core.reconstruction.dense_solver import solve_dense
+from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.pattern_column import radiance_profiles, refine_by_profiles
+from dsl_core.reconstruction.spectra import COLOUR_ERROR, DEMOSAIC_SPREAD, DIRECT_ERROR, EDGE_PX, MODEL_ERROR
+from dsl_core.reconstruction.spectral_solver import Prior, Spectra
+from dsl_core.reconstruction.spectral_system import ORDERS, Bands, band_halfwidth_px
+from dsl_core.reconstruction.surface import default_window_px
+
+#: Column shift of the finite difference, px.
+STEP_PX = 0.2
+#: Virtual pixels lie up to this far from their sample's column where columns are refined, px.
+OFFSET_PX = 4.0
+#: Frames whose light at a sample is below this share of the strongest take no part.
+DARK = 1e-4
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What the reconstruction would find, each for (samples, spectra) virtual pixels.
+
+    Spectra and ``data_share`` have bands first; ``unbiased`` is without noise, the mean of a patch.
+    """
+
+    truth: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    unbiased: NDArray[np.float64]
+    std: NDArray[np.float64]
+    data_share: NDArray[np.float64]
+    column_error_px: NDArray[np.float64]
+    depth_error_mm: NDArray[np.float64]
+    lit: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Matrices:
+    """Operators of unit shading, (samples, 3, frames, bands): first orders, zero order, change per px."""
+
+    first: Tensor
+    zero: Tensor
+    change: Tensor
+
+
+class VirtualPixels:
+    """The samples of a view under a plan."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        plan: CapturePlan,
+        grid: WavelengthGrid,
+        view: View,
+        *,
+        prior: Prior | None = None,
+        surface_window_px: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.rig, self.plan, self.grid, self.view = rig, plan, grid, view
+        self.prior, self.seed = prior or Prior(), seed
+        self.window_px = surface_window_px or default_window_px(rig)
+        self.bands, self.bracket, self.lines = Bands.of(rig, grid), Bracket.of(rig, plan), LineSet.of(plan)
+        self.single = self.lines is not None and self.lines.lines == self.lines.frames
+        self.profiles = radiance_profiles(rig, plan)
+        self.pixels = torch.as_tensor(view.pixels)
+        self.depth = torch.as_tensor(view.depth_mm, dtype=torch.float64)
+        self.column, _ = zero_order(rig, self.pixels, self.depth)
+        _, self.slope_mm = triangulate(rig, self.pixels, self.column)
+        self.model = correspondence(rig)
+        self.inside: dict[int, Tensor] = {}
+        self.matrices = self._matrices()
+
+    def _matrices(self) -> Matrices:
+        beyond = self.depth + self.slope_mm * STEP_PX
+        ahead, _ = zero_order(self.rig, self.pixels, beyond)
+        here = self._first(self.bands, self.depth, keep=True)
+        step = (ahead - self.column)[:, None, None, None].to(here)
+        return Matrices(here, self._zero(self.bands), (self._first(self.bands, beyond) - here) / step)
+
+    def _blurred_response(self) -> Tensor:
+        """Spread of columns that demosaicing averages, as a variance, px^2."""
+        neighbour, _ = zero_order(self.rig, (self.pixels + 1).clip(max=self._count - 1), self.depth)
+        return DEMOSAIC_SPREAD * (neighbour - self.column).abs().median() ** 2
+
+    @property
+    def _count(self) -> int:
+        return self.rig.camera.width_px * self.rig.camera.height_px
+
+    def _first(self, bands: Bands, depth: Tensor, keep: bool = False) -> Tensor:
+        blur = float(np.hypot(self.rig.projector_response.blur_px, float(self._blurred_response()) ** 0.5))
+        response = self.rig.projector_response.model_copy(update={"blur_px": blur})
+        width, height = self.plan.projector_size_px
+        paths = []
+        for order in bands.orders if not self.single else ORDERS:
+            traced = self.model.trace(self.pixels, depth.double(), order, bands.centroids_nm[order])
+            footprint = Footprint(traced.columns.float(), traced.rows.float())
+            inside = footprint.inside(width, height, margin_px=EDGE_PX)
+            if keep and order in ORDERS:
+                self.inside[order] = footprint.inside(width, height)[bands.reported]
+            half = band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
+            paths.append(OrderPath(footprint.columns, inside, bands.moments[order], half))
+        return ImageFormation(response, self.profiles, paths, torch.ones(len(self.pixels))).matrix()
+
+    def _zero(self, bands: Bands) -> Tensor:
+        column = self.column.float()
+        light = BlurredProfiles(self.rig.projector_response, self.profiles, 0.0, column).at(column)
+        return torch.einsum("slf,clj->scfj", light, like(bands.moments[0], column))
+
+    def signals(self, spectra: Tensor, bands: Bands | None = None) -> tuple[Tensor, Tensor]:
+        """First-order and zero-order radiance, each (samples, spectra, 3, frames), DN per ms.
+
+        ``spectra`` (samples, spectra, bands) are node values of ``bands``, by default the internal ones.
+        """
+        shading = torch.as_tensor(self.view.shading, dtype=torch.float32)[:, None, None, None]
+        if bands is None:
+            operators = (self.matrices.first, self.matrices.zero)
+        else:
+            operators = (self._first(bands, self.depth), self._zero(bands))
+        first, zero = (torch.einsum("scfj,srj->srcf", m, spectra) * shading for m in operators)
+        return first, zero
+
+    def run(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Outcome:
+        """Reconstruct virtual pixels of truth ``spectra`` (samples, spectra, bands inside) from signals."""
+        return _Run(self, spectra, first, zero).outcome()
+
+
+class _Run:
+    """One draw of the noise, and what the estimators make of it."""
+
+    def __init__(self, owner: VirtualPixels, spectra: NDArray[np.float64], first: Tensor, zero: Tensor):
+        self.owner, self.spectra, self.first, self.zero = owner, spectra, first, zero
+        self.nodes = torch.tensor(spectra, dtype=torch.float32)
+        self.random = torch.Generator().manual_seed(owner.seed)
+        rig, view = owner.rig, owner.view
+        factors = torch.as_tensor(demosaic_factors(rig, view.pixels), dtype=torch.float32)
+        self.factors = factors[:, None, :, None]
+        self.shading = torch.as_tensor(view.shading, dtype=torch.float32)[:, None]
+        clean = first + zero
+        spread = owner.bracket.variance(clean) * self.factors
+        self.saturated = ~torch.isfinite(spread)
+        noise = self._normal(clean.shape) * torch.where(self.saturated, 0.0, spread).sqrt()
+        self.noisy = clean + noise + self._black(clean)
+        self.variance = owner.bracket.variance(self.noisy)
+
+    def _normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
+        return torch.randn(shape, generator=self.random)
+
+    def _black(self, clean: Tensor) -> Tensor:
+        """Noise of the black frames: common to all frames of a pixel."""
+        weights = self.owner.bracket.black_weights(clean)
+        shape = (len(weights), *clean.shape[:3], 1)
+        return -(weights * self._normal(shape) * (self.owner.bracket.floor * self.factors).sqrt()).sum(0)
+
+    def _columns(self) -> tuple[Column, Tensor]:
+        """Refined columns of all virtual pixels from their own samples of the mosaic, and their errors.
+
+        Each spectrum takes another place between the lines, which matters more than where in the picture.
+        """
+        owner = self.owner
+        samples, count, _, frames = self.noisy.shape
+        own = torch.as_tensor(own_channel(owner.rig, owner.view.pixels))
+        offsets = torch.linspace(-OFFSET_PX, OFFSET_PX, count) if count > 1 else torch.zeros(1)
+        true = (owner.column.float()[:, None] + offsets).reshape(-1)
+        response = owner.rig.projector_response
+        light = BlurredProfiles(response, owner.profiles, 0.0, true).at(true)
+        moments = like(owner.bands.moments[0], true)[own]
+        leds = torch.einsum("slj,srj->srl", moments, self.nodes) * self.shading[..., None]
+        zero = torch.einsum("nlf,nl->nf", light, leds.flatten(0, 1)).reshape(samples, count, frames)
+        index = own[:, None, None, None].expand(-1, count, 1, frames)
+        clean = self.first.gather(2, index)[:, :, 0] + zero
+        spread = owner.bracket.variance(clean)
+        sigma = torch.where(torch.isfinite(spread), spread, 0.0).sqrt()
+        y = clean + self._normal(clean.shape) * sigma
+        std = owner.bracket.variance(y).sqrt()
+        radiance, std = (v.reshape(-1, frames).T.contiguous() for v in (y, std))
+        if owner.lines is not None:
+            column = refine(true.round(), radiance, std, owner.lines, response)
+        else:
+            column = refine_by_profiles(true.round(), radiance, std, owner.profiles, response)
+        return column, (column.column_px - true).reshape(samples, count)
+
+    def outcome(self) -> Outcome:
+        owner = self.owner
+        column, error_px = self._columns()
+        depth_error = error_px.double() * owner.slope_mm[:, None]
+        # The estimate traces all light from the column it believes in.
+        reflectance = self.nodes
+        moved = (
+            torch.einsum("scfj,srj->srcf", owner.matrices.change, reflectance) * self.shading[..., None, None]
+        )
+        miss = moved * error_px[:, :, None, None]
+        # What the reconstruction grants its linear model as error is drawn as well.
+        base = self.noisy - miss + MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
+        clean = self.first + self.zero
+        if owner.single:
+            # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
+            base, clean = base - self.zero - self._black_again(), clean - self.zero
+        weight = self._weights()
+        amplitude = column.amplitude_std.reshape(error_px.shape)
+        found, calm = self._solve(weight, base, clean, amplitude)
+        scale = 1 / (1 + self._shading_error(column, depth_error))
+        lit = self._lit()
+        shape = (-1, *error_px.shape)
+
+        def of(values: Tensor) -> NDArray[np.float64]:
+            return np.asarray(values[owner.bands.reported].reshape(shape).double().numpy())
+
+        truth = np.moveaxis(self.spectra[..., owner.bands.reported], 2, 0)
+        return Outcome(
+            truth, of(found.mean) * scale.numpy(), of(calm.mean), of(found.std), of(found.data_share),
+            error_px.double().numpy(), depth_error.numpy(), lit.numpy(),
+        )  # fmt: skip
+
+    def _black_again(self) -> Tensor:
+        """The black frames' noise once more: what the dark offset takes out."""
+        state = torch.Generator().manual_seed(self.owner.seed)
+        torch.randn(self.noisy.shape, generator=state)
+        saved, self.random = self.random, state
+        try:
+            return self._black(self.first + self.zero)
+        finally:
+            self.random = saved
+
+    def _weights(self) -> Tensor:
+        """The reconstruction's weights, (samples, spectra, 3, frames)."""
+        spread = self.variance * self.factors + (MODEL_ERROR * self.noisy) ** 2
+        if not self.owner.single:
+            near = [
+                BlurredProfiles(self.owner.rig.projector_response, self.owner.profiles, 0.0, self.first)
+                .at(self.owner.column.float() + shift)
+                .amax(1)
+                for shift in (-1.0, 0.0, 1.0)
+            ]
+            lit = torch.stack(near).amax(0)[:, None, None, :]
+            spread = spread + (DIRECT_ERROR * self._colour()[..., None] * lit) ** 2
+        return torch.where(self.saturated, 0.0, 1 / spread)
+
+    def _colour(self) -> Tensor:
+        """Zero-order colour under white, (samples, spectra, 3)."""
+        moments = like(self.owner.bands.moments[0].sum(1), self.first)
+        reflectance = self.nodes
+        return torch.einsum("cj,srj->src", moments, reflectance) * self.shading[..., None]
+
+    def _solve(self, weight: Tensor, noisy: Tensor, clean: Tensor, spread: Tensor) -> tuple[Spectra, Spectra]:
+        """Spectra of all virtual pixels with and without noise in the data."""
+        owner = self.owner
+        whole = owner.matrices.first if owner.single else owner.matrices.first + owner.matrices.zero
+        matrices: list[Tensor] = []
+        rights: list[Tensor] = []
+        calm: list[Tensor] = []
+        for s, operator in enumerate(whole.flatten(1, 2)):
+            strength = operator.abs().amax(1)
+            used = strength > DARK * strength.max()
+            a, w = operator[used] * self.shading[s], weight[s].flatten(1)[:, used]
+            rows = a[None] * w[..., None]
+            matrices.append(rows.mT @ a)
+            for out, data in ((rights, noisy), (calm, clean)):
+                out.append((rows.mT @ data[s].flatten(1)[:, used, None])[..., 0])
+        matrix, right, quiet = (torch.cat(parts) for parts in (matrices, rights, calm))
+        if owner.single:
+            matrix, right, quiet = self._with_colour(matrix, right, quiet, spread)
+        return solve_dense(matrix, right, owner.prior), solve_dense(matrix, quiet, owner.prior)
+
+    def _with_colour(
+        self, matrix: Tensor, right: Tensor, quiet: Tensor, spread: Tensor
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Add the zero-order colour where a sample misses a band in both orders."""
+        owner = self.owner
+        reached = torch.stack(list(owner.inside.values())).any(0).all(0)
+        if bool(reached.all()):
+            return matrix, right, quiet
+        colour = self._colour()
+        variance = spread[..., None] ** 2 * self.factors[..., 0]
+        root = (~reached).float()[:, None, None] / (variance + (COLOUR_ERROR * colour) ** 2).sqrt()
+        moments = like(owner.bands.moments[0].sum(1), matrix)
+        rows = (moments * (root * self.shading[..., None])[..., None]).flatten(0, 1)
+        clean, noise = (colour * root), self._normal(colour.shape) * variance.sqrt() * root
+        add = [torch.einsum("ncj,nc->nj", rows, v.flatten(0, 1)) for v in (clean + noise, clean)]
+        return matrix + rows.mT @ rows, right + add[0], quiet + add[1]
+
+    def _shading_error(self, column: Column, depth_error: Tensor) -> Tensor:
+        """Relative errors of shading from noise in depth, (samples, spectra): plane fits and distance.
+
+        Fits weigh pixels by their stated deviation, as `surface` does.
+        """
+        view, lens, w = self.owner.view, self.owner.rig.camera, self.owner.window_px
+        stated = torch.hypot(column.std_px, torch.tensor(self.owner.rig.column_std_px))
+        weight = stated.reshape(depth_error.shape).double() ** -2
+        square = ((weight * depth_error) ** 2).mean(1) / weight.mean(1) ** 2
+        relative = square.sqrt() / self.owner.depth
+        tilt = relative * lens.fx_px * (12 / (w * w - 1)) ** 0.5 / w
+        spread = torch.as_tensor(view.incidence_tan) * tilt
+        return self._normal(depth_error.shape) * spread[:, None] + 2 * depth_error / self.owner.depth[:, None]
+
+    def _lit(self) -> Tensor:
+        """Whether white stands clear of the noise, (samples, spectra)."""
+        from dsl_core.reconstruction.geometry import LIT_SIGMAS
+
+        own = torch.as_tensor(own_channel(self.owner.rig, self.owner.view.pixels))
+        colour = self._colour()
+        white = colour.gather(2, own[:, None, None].expand(*colour.shape[:2], 1))[..., 0]
+        noise = self.owner.bracket.variance(white).sqrt()
+        lit: Tensor = (white > LIT_SIGMAS * noise) | ~torch.isfinite(noise)
+        return lit

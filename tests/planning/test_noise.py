@@ -1,0 +1,55 @@
+"""The planner's noise is the merger's and the demosaicer's, written as formulas."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.optics.demosaic import demosaic_variance
+from dsl_core.planning.binning import binned
+from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel
+from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, setting_gains_ms
+from tests.cases.small_rig import small_rig
+
+
+@pytest.mark.parametrize("radiance", [0.0, 0.5, 8.0, 60.0])
+def test_variance_is_that_of_the_merger(radiance: float) -> None:
+    rig, plan = small_rig(), CapturePlan()
+    gains = setting_gains_ms(plan.settings, rig.projector_response)
+    black = np.full((4, 4), rig.sensor.black_level_dn, np.float32)
+    blacks = [BlackFrame(black, np.zeros_like(black)) for _ in gains]
+    raws = [
+        np.clip(np.rint(black + gain * radiance), 0, rig.sensor.full_scale_dn).astype(np.uint16)
+        for gain in gains
+    ]
+    merged = HdrMerger(gains, blacks, rig.sensor).merge(raws)
+    expected = float(Bracket.of(rig, plan).variance(torch.tensor([radiance]))[0])
+    assert expected == pytest.approx(float(merged.variance[0, 0]), rel=0.05)
+
+
+def test_saturation_everywhere_is_infinite_variance() -> None:
+    bracket = Bracket.of(
+        small_rig(), CapturePlan(settings=(Setting(exposure_ms=100, level=1),), code_settings=(0,))
+    )
+    assert torch.isinf(bracket.variance(torch.tensor([1000.0]))).all()
+
+
+def test_factors_are_those_of_demosaicing() -> None:
+    rig = small_rig()
+    height, width = rig.camera.height_px, rig.camera.width_px
+    pixels = np.array([width * y + x for y in (20, 21) for x in (30, 31)], np.int64)
+    variance = demosaic_variance(np.ones((height, width), np.float32), rig.sensor.bayer).reshape(3, -1)
+    assert np.allclose(demosaic_factors(rig, pixels), variance[:, pixels].T)
+    assert own_channel(rig, pixels).tolist() == [0, 1, 1, 2]
+
+
+def test_binning_keeps_the_field_and_lowers_the_noise() -> None:
+    rig = small_rig()
+    half = binned(rig, 2)
+    assert half.camera.width_px == rig.camera.width_px // 2 // 2 * 2
+    assert half.camera.fx_px / half.camera.width_px == pytest.approx(
+        rig.camera.fx_px / rig.camera.width_px, rel=0.01
+    )
+    assert half.sensor.electrons_per_dn == 4 * rig.sensor.electrons_per_dn

@@ -1,0 +1,67 @@
+"""Predictions follow what is known: more light and finer lines are better, and the twin agrees."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, NoCode, NoSpectral, ScanLines, Setting
+from dsl_core.planning import references
+from dsl_core.planning.prediction import Prediction, predict
+from dsl_core.planning.trial import PIECE_PX, PLACES, run_trial, window_rig
+from dsl_core.planning.views import pixels_view, plane_view
+from dsl_core.simulation.published_rig import published_rig
+
+BRIGHT = (Setting(exposure_ms=1000 / 6, level=0.2), Setting(exposure_ms=1000 / 3, level=0.8))
+
+
+def plan(spectral: ScanLines | LineComb, *settings: Setting) -> CapturePlan:
+    chosen = settings or BRIGHT
+    return CapturePlan(
+        code=GrayCode(rows=False), spectral=spectral, settings=chosen, code_settings=tuple(range(len(chosen)))
+    )
+
+
+def figures(spectral: ScanLines | LineComb, *settings: Setting) -> Prediction:
+    rig = published_rig()
+    return predict(rig, plan(spectral, *settings), plane_view(rig, grid=(4, 2)), latency_ms=50)
+
+
+def test_less_light_and_fewer_lines_cost_accuracy() -> None:
+    fine, coarse = figures(ScanLines(step_px=4)), figures(ScanLines(width_px=16, step_px=8))
+    dim = figures(ScanLines(step_px=4), Setting(exposure_ms=1000 / 60, level=0.4))
+    assert fine.pixel_rmse < coarse.pixel_rmse
+    assert fine.pixel_rmse < 0.5 * dim.pixel_rmse
+    assert fine.fwhm_nm is not None
+    assert coarse.fwhm_nm is not None
+    assert 8 < fine.fwhm_nm < coarse.fwhm_nm
+    assert fine.depth_std_mm < coarse.depth_std_mm
+
+
+def test_time_and_bytes_are_those_of_the_plan() -> None:
+    made = plan(ScanLines(step_px=4))
+    found = figures(ScanLines(step_px=4))
+    assert found.frames == made.shot_count
+    assert found.seconds == pytest.approx(made.duration_s(50), abs=1e-3)
+    assert found.raw_bytes == 2 * 890 * 580 * made.shot_count
+
+
+def test_a_plan_without_patterns_or_code_is_refused() -> None:
+    rig = published_rig()
+    for update in ({"spectral": NoSpectral()}, {"code": NoCode()}):
+        with pytest.raises(PlanError, match="to predict for"):
+            predict(rig, CapturePlan().model_copy(update=update))
+
+
+@pytest.mark.parametrize("spectral", [ScanLines(step_px=4), LineComb(width_px=5, step_px=4, period_px=128)])
+def test_the_twin_agrees(spectral: ScanLines | LineComb) -> None:
+    rig, place = published_rig(), PLACES[0]
+    lens = window_rig(rig, place).camera
+    left, top = round(rig.camera.cx_px - lens.cx_px), round(rig.camera.cy_px - lens.cy_px)
+    x, y = np.meshgrid(left + np.arange(5, PIECE_PX[0] - 5, 7), top + np.arange(5, PIECE_PX[1] - 5, 13))
+    view = pixels_view(rig, (y * rig.camera.width_px + x).ravel())
+    found = predict(rig, plan(spectral), view, peaks=False)
+    measured = run_trial(rig, plan(spectral), references.chart(), places=(place,))
+    assert found.pixel_rmse == pytest.approx(measured.pixel_rmse, rel=0.25)
+    assert found.depth_std_mm == pytest.approx(measured.depth_rmse_mm, rel=0.6)
