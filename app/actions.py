@@ -54,6 +54,7 @@ PAGES: tuple[Page, ...] = (
 
 ACTIONS: tuple[Action, ...] = (
     Action("open", "&Open…", "File", "Ctrl+O", "Open a scan, a result, a reference or a calibration"),
+    Action("open_last", "Open the &last again", "File", "Ctrl+Shift+O", "Open what was opened last"),
     Action("export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs"),
     Action(
         "show_command",
@@ -109,6 +110,9 @@ ACTIONS: tuple[Action, ...] = (
         separator=True,
     ),
     Action("help_page", "&Help on this page", "Help", "F1", "What this page does and what its numbers mean"),
+    Action("tour", "Guided &tour", "Help", "", "What is where in this window, in seven steps"),
+    Action("demo", "&Demo", "Help", "", "A finished scan of the simulated rig", separator=True),
+    Action("live_demo", "Demo, &live", "Help", "", "A short scan of the simulated rig, while you watch"),
     Action("shortcuts", "&Keyboard shortcuts", "Help", "Ctrl+/", "Every action and its keys"),
     Action("report_bundle", "Save a &report bundle…", "Help", "", "Log, settings and versions in one file"),
     Action("about", "&About", "Help", separator=True),

@@ -8,15 +8,17 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
+from typing import Literal
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
 from app.jobs.qt_runner import QtRunner
-from app.main_window import MainWindow, PageMaker, Parts
+from app.main_window import Command, MainWindow, PageMaker, Parts
 from app.panels.log import LogRecords
 from app.settings import load_settings, settings_folder
+from app.state.recent import RecentFiles
 from app.state.undo import UndoStack
 from app.theme import DARK, LIGHT, Theme, style_sheet
 from app.views import Notifier
@@ -54,15 +56,24 @@ def set_theme(name: str) -> Theme:
     return theme
 
 
-def make_window(pages: dict[str, PageMaker], folder: Path | None = None) -> MainWindow:
-    """The window with its settings of a folder (default: the system's); told troubles become toasts."""
+def make_window(
+    pages: dict[str, PageMaker],
+    folder: Path | None = None,
+    theme: Literal["system", "light", "dark"] | None = None,
+    commands: dict[str, Command] | None = None,
+) -> MainWindow:
+    """The window with its settings of a folder (default: the system's); told troubles become toasts.
+
+    ``theme`` overrides that of the settings.
+    """
     path = (folder or settings_folder()) / "settings.json"
     settings, trouble = load_settings(path)
+    settings.theme = theme or settings.theme
     records = LogRecords()
     logging.getLogger().addHandler(records)
     logging.getLogger("dsl_core").setLevel(logging.INFO)
-    parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme)
-    window = MainWindow(parts, pages)
+    parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme, RecentFiles(settings))
+    window = MainWindow(parts, pages, commands)
     records.setParent(window)
     parts.runner.setParent(window)
     window.setWindowIcon(app_icon(window.theme))

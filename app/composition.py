@@ -9,21 +9,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
-from PySide6.QtGui import QGuiApplication
 
 from app.controllers.rig import RigController
-from app.main_window import MainWindow, PageMaker
-from app.projector_window import ProjectorWindow, ScreenLabel, ScreenProjector, describe_screen
+from app.main_window import Command, MainWindow, PageMaker
+from app.projector_screens import ProjectorScreens
+from app.projector_window import ScreenProjector
+from app.settings import data_folder
 from app.state.rig import Link, RigChoice, RigState
 from app.widgets.page import PageWidget
 from dsl_core.errors import DslError
 
 if TYPE_CHECKING:
-    from app.panels.rig_page import RigPage
+    from app.controllers.demo import DemoController
+    from app.controllers.scan import ScanController
     from app.state.scan import ScanState
 
 _log = logging.getLogger(__name__)
-IDENTIFY_MS = 3000
 #: How long the window is on screen before the rig is asked for, ms.
 CONNECT_AFTER_MS = 200
 
@@ -34,17 +35,21 @@ class Wish:
 
     rig: RigChoice | None = None
     open: Path | None = None
+    demo: bool = False
+    #: Whether a person sits before the window, who may be offered the tour at the first start.
+    is_first_contact: bool = False
 
 
 class Composition(QObject):
-    """Makes the pages of one window and what they share: the rig and the projector's screen."""
+    """Makes the pages of one window and what they share, and does what only all of them together can do."""
 
     def __init__(self, wish: Wish) -> None:
         super().__init__()
         self._wish = wish
         self._rig: RigController | None = None
-        self._screen: ProjectorWindow | None = None
-        self._labels: list[ScreenLabel] = []
+        self._screens: ProjectorScreens | None = None
+        self._scans: ScanController | None = None
+        self._demo: DemoController | None = None
 
     @property
     def pages(self) -> dict[str, PageMaker]:
@@ -54,6 +59,14 @@ class Composition(QObject):
             "scan": self._scan_page,
             "results": self._results_page,
             "compare": self._compare_page,
+        }
+
+    @property
+    def commands(self) -> dict[str, Command]:
+        """Actions of the whole application, by key."""
+        return {
+            "demo": lambda window: self.demo(window).show(),
+            "live_demo": lambda window: self.demo(window).scan_live(),
         }
 
     def start(self, window: MainWindow) -> None:
@@ -66,6 +79,15 @@ class Composition(QObject):
             rig.connect(rig.state.choice.value)
         if self._wish.open is not None:
             window.open_path(self._wish.open)
+        if self._wish.demo:
+            self.demo(window).show()
+        if self._wish.is_first_contact and not window.parts.settings.tour_seen:
+            # Said once: who closes it finds the tour in the Help menu.
+            window.parts.settings.tour_seen = True
+            window.toasts.offer(
+                "New here? A tour of seven steps shows what is where; Help, Guided tour has it later too.",
+                {"Take the tour": window.do_tour},
+            )
 
     def rig(self, window: MainWindow) -> RigController:
         """The one rig of the application."""
@@ -74,11 +96,36 @@ class Composition(QObject):
             remembered = RigChoice(settings.rig, tuple(settings.rig_options.items()))
             state = RigState(self._wish.rig or remembered)
             state.choice.changed.connect(lambda choice: _remember(window, choice))
-            screen = self._projector_window(window)
+            self._screens = screens = ProjectorScreens(window)
             self._rig = RigController(
-                state, window.parts.runner, window.toasts, lambda own: ScreenProjector(screen, own)
+                state, window.parts.runner, window.toasts, lambda own: ScreenProjector(screens.beam, own)
             )
         return self._rig
+
+    def demo(self, window: MainWindow) -> DemoController:
+        """The demo of the application."""
+        if self._demo is None:
+            from app.controllers.demo import DemoController
+
+            self._demo = DemoController(
+                _demo_folder(),
+                self.rig(window),
+                window.parts.runner,
+                window.toasts,
+                lambda path: self._show_result(window, path),
+                lambda: self._open_scan_page(window),
+            )
+        return self._demo
+
+    @staticmethod
+    def _show_result(window: MainWindow, path: Path) -> None:
+        window.open_page("results")
+        window.open_path(path)
+
+    def _open_scan_page(self, window: MainWindow) -> ScanController:
+        window.open_page("scan")
+        assert self._scans is not None
+        return self._scans
 
     # Pages -----------------------------------------------------------------------------------------
 
@@ -88,12 +135,8 @@ class Composition(QObject):
 
         rig = self.rig(window)
         page = RigPage(rig.state, rig, rig_names())
-        page.projector.identify.connect(self._identify)
-        page.projector.screen_chosen.connect(lambda name: self._choose_screen(window, page, name))
-        application = QGuiApplication.instance()
-        assert isinstance(application, QGuiApplication)
-        for signal in (application.screenAdded, application.screenRemoved):
-            signal.connect(lambda _screen: page.projector.refresh_screens(self._armed_screen()))
+        assert self._screens is not None
+        self._screens.serve(page)
         page.apply_theme(window.theme)
         return page
 
@@ -111,7 +154,9 @@ class Composition(QObject):
         state.phase.changed.connect(
             lambda phase: _remember_folder(window, state) if phase is Phase.DONE else None
         )
-        controller = ScanController(state, self.rig(window), parts.runner, window.toasts, parts.undo)
+        self._scans = controller = ScanController(
+            state, self.rig(window), parts.runner, window.toasts, parts.undo
+        )
         try:
             points = load_operating_points()
         except DslError as error:
@@ -125,10 +170,13 @@ class Composition(QObject):
         from app.controllers.results import ResultsController
         from app.panels.results_page import ResultsPage
         from app.state.results import ResultsState
+        from app.widgets.welcome import Welcome
 
         parts, state = window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
-        page = ResultsPage(state, controller, parts.runner)
+        welcome = Welcome(parts.recent, window.open_path, lambda: self.demo(window).show())
+        page = ResultsPage(state, controller, parts.runner, welcome)
+        page.open_chosen.connect(window.open_path)
         page.apply_theme(window.theme)
         return page
 
@@ -142,50 +190,9 @@ class Composition(QObject):
         page.apply_theme(window.theme)
         return page
 
-    # The projector's screen ------------------------------------------------------------------------
 
-    def _projector_window(self, window: MainWindow) -> ProjectorWindow:
-        if self._screen is None:
-            self._screen = ProjectorWindow()
-            self._screen.lost.connect(
-                lambda name: window.toasts.tell(
-                    "error",
-                    f"The projector's screen {name} is gone. Connect it again and choose it on the Rig page.",
-                )
-            )
-            self._screen.restored.connect(
-                lambda name: window.toasts.tell(
-                    "info", f"The screen {name} is there again. Choose it on the Rig page to use it."
-                )
-            )
-            window.destroyed.connect(self._screen.close)
-        return self._screen
-
-    def _armed_screen(self) -> str:
-        screen = self._screen
-        return screen.screen().name() if screen is not None and screen.is_armed else ""
-
-    def _choose_screen(self, window: MainWindow, page: RigPage, name: str) -> None:
-        beam = self._projector_window(window)
-        found = next((s for s in QGuiApplication.screens() if s.name() == name), None)
-        try:
-            if found is None:
-                beam.disarm()
-            elif found is window.screen():
-                raise DslError(
-                    f"{name} is the screen of this window. Choose the projector's, or move this window away."
-                )
-            else:
-                beam.arm(found)
-        except DslError as error:
-            window.toasts.tell("error", str(error))
-        page.projector.refresh_screens(self._armed_screen())
-
-    def _identify(self) -> None:
-        self._labels = [ScreenLabel(s, describe_screen(s)) for s in QGuiApplication.screens()]
-        for label in self._labels:
-            label.show()
-            QTimer.singleShot(IDENTIFY_MS, label, label.close)
+def _demo_folder() -> Path:
+    return data_folder() / "demo"
 
 
 def _remember(window: MainWindow, choice: RigChoice) -> None:
@@ -194,4 +201,6 @@ def _remember(window: MainWindow, choice: RigChoice) -> None:
 
 
 def _remember_folder(window: MainWindow, state: ScanState) -> None:
+    if state.target.value.parent == _demo_folder():
+        return
     window.parts.settings.output_folder = str(state.target.value.parent)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QSize, Qt
-from PySide6.QtGui import QAction, QCloseEvent, QKeySequence
+from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QFileDialog,
@@ -20,17 +20,24 @@ from PySide6.QtWidgets import (
 )
 
 from app.actions import ACTIONS, PAGES, Action
+from app.controllers.known_files import Kind, kind_of, meant_by, refusal
 from app.jobs.qt_runner import QtRunner
 from app.panels.log import LogPanel, LogRecords
 from app.report_bundle import write_report_bundle
 from app.settings import Settings, save_settings
+from app.state.recent import RecentFiles
 from app.state.undo import UndoStack
 from app.theme import DARK, Theme
 from app.widgets import text_windows
+from app.widgets.drops import dropped_paths, open_after_drop
 from app.widgets.job_strip import JobStrip
+from app.widgets.menus import Menus
 from app.widgets.page import PageWidget
 from app.widgets.rail import Rail
+from app.widgets.recent_menu import RecentMenu
 from app.widgets.toasts import Toasts
+from app.widgets.tour import Tour
+from app.widgets.tour_steps import STEPS, Step
 from dsl_core.errors import DslError
 
 _log = logging.getLogger(__name__)
@@ -49,24 +56,36 @@ class Parts:
     runner: QtRunner
     undo: UndoStack
     set_theme: Callable[[str], Theme]
+    recent: RecentFiles
 
 
 PageMaker = Callable[["MainWindow"], PageWidget]
+Command = Callable[["MainWindow"], object]
 
 
 class MainWindow(QMainWindow):
-    """The application's window; ``pages`` makes the widget of each page of the rail."""
+    """The application's window.
 
-    def __init__(self, parts: Parts, pages: dict[str, PageMaker]) -> None:
+    ``pages`` makes the widget of each page of the rail; ``commands`` do the actions of the table that neither
+    a page nor the window itself can do.
+    """
+
+    def __init__(
+        self, parts: Parts, pages: dict[str, PageMaker], commands: dict[str, Command] | None = None
+    ) -> None:
         super().__init__()
+        self._commands = commands or {}
         self.parts = parts
         self.theme: Theme = DARK
         self.setWindowTitle("dsl-scan")
         self.setMinimumSize(SMALLEST)
         self.resize(1280, 800)
+        self.setAcceptDrops(True)
         self._makers = pages
         self._made: dict[str, PageWidget] = {}
         self.toasts = Toasts(self)
+        self._tour: Tour | None = None
+        self.menuBar().setObjectName("menu-bar")
         self.rail = Rail([page for page in PAGES if page.key in pages])
         self.rail.chosen.connect(self.open_page)
         self.stack = QStackedWidget()
@@ -91,25 +110,19 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(centre)
 
     def _make_menus(self) -> None:
-        menus = {}
+        menus = Menus(self, ACTIONS, self.do)
+        self.actions_by_key = menus.actions
         for action in ACTIONS:
-            if action.menu not in menus:
-                menus[action.menu] = self.menuBar().addMenu(f"&{action.menu}")
-            if action.separator:
-                menus[action.menu].addSeparator()
-            made = self._make_action(action)
-            made.setVisible(action.key.removeprefix("page_") in self._makers or "page_" not in action.key)
-            menus[action.menu].addAction(made)
+            menus.actions[action.key].setVisible(self._can(action))
+        self.recent_menu = RecentMenu(self.parts.recent, self.open_path, self)
+        menus.put_after("open", self.recent_menu)
 
-    def _make_action(self, action: Action) -> QAction:
-        made = QAction(action.text, self)
-        if action.shortcut:
-            made.setShortcut(QKeySequence(action.shortcut))
-        made.setStatusTip(action.tip)
-        made.setCheckable(action.checkable)
-        made.triggered.connect(lambda _checked=False, key=action.key: self.do(key))
-        self.actions_by_key[action.key] = made
-        return made
+    def _can(self, action: Action) -> bool:
+        """Whether anybody here does an action; what nobody does is not shown."""
+        if action.key.startswith("page_"):
+            return action.key.removeprefix("page_") in self._makers
+        done_here = action.key in self._commands or hasattr(self, f"do_{action.key}")
+        return bool(action.page) or done_here or action.key.startswith("theme_")
 
     def _make_log_dock(self) -> QDockWidget:
         dock = QDockWidget("Log", self)
@@ -128,10 +141,8 @@ class MainWindow(QMainWindow):
 
     def open_page(self, key: str) -> PageWidget:
         """Show a page, making it when it is opened for the first time."""
-        if key not in self._made:
-            self._made[key] = self._makers[key](self)
-            self.stack.addWidget(self._made[key])
-        self.stack.setCurrentWidget(self._made[key])
+        page = self.page_of(key)
+        self.stack.setCurrentWidget(page)
         self.rail.mark(key)
         self.parts.settings.page = key
         for action in ACTIONS:
@@ -139,6 +150,13 @@ class MainWindow(QMainWindow):
                 self.actions_by_key[action.key].setEnabled(action.page == key)
         title = next(page.title for page in PAGES if page.key == key)
         self.setWindowTitle(f"{title} – dsl-scan")
+        return page
+
+    def page_of(self, key: str) -> PageWidget:
+        """The widget of a page, made when it is asked for first; it need not be open."""
+        if key not in self._made:
+            self._made[key] = self._makers[key](self)
+            self.stack.addWidget(self._made[key])
         return self._made[key]
 
     # Actions ---------------------------------------------------------------------------------------
@@ -150,8 +168,13 @@ class MainWindow(QMainWindow):
         elif key.startswith("theme_"):
             self.apply_theme(key.removeprefix("theme_"))
         else:
-            method = self._made[self.page].page_actions().get(key) or getattr(self, f"do_{key}")
-            method()
+            method = self._made[self.page].page_actions().get(key)
+            if method is not None:
+                method()
+            elif key in self._commands:
+                self._commands[key](self)
+            else:
+                getattr(self, f"do_{key}")()
 
     def do_open(self) -> None:
         """Choose a file to open."""
@@ -159,22 +182,36 @@ class MainWindow(QMainWindow):
         if name:
             self.open_path(Path(name))
 
+    def do_open_last(self) -> None:
+        """Open the file again that was opened last."""
+        if self.parts.recent.paths.value:
+            self.open_path(self.parts.recent.paths.value[0])
+        else:
+            self.toasts.tell("info", "Nothing was opened yet. Choose a file by File, Open.")
+
     def open_path(self, path: Path) -> None:
-        """Open a file or folder on the page that knows it."""
-        order = [self.page, *(key for key in self._makers if key != self.page)]
-        for key in order:
-            if key not in self._made:
-                self._made[key] = self._makers[key](self)
-                self.stack.addWidget(self._made[key])
-            if self._made[key].open_path(path):
-                self.parts.settings.remember(path)
-                self.open_page(key)
-                return
-        self.toasts.tell(
-            "warning",
-            f"{path.name} is no scan, result, reference spectrum or calibration that this program knows."
-            " Choose another file.",
-        )
+        """Open a file or folder on the page that knows it, the open page first; says why when none does."""
+        path = meant_by(path)
+        kind = kind_of(path)
+        if kind not in (Kind.MISSING, Kind.UNKNOWN):
+            for key in (self.page, *(key for key in self._makers if key != self.page)):
+                if self.page_of(key).open_path(path):
+                    self.parts.recent.add(path)
+                    self.open_page(key)
+                    return
+        if kind is Kind.MISSING:
+            self.parts.recent.forget(path)
+        self.toasts.tell("warning", refusal(path))
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Files may be dropped anywhere."""
+        if dropped_paths(event.mimeData()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped."""
+        event.acceptProposedAction()
+        open_after_drop(dropped_paths(event.mimeData()), self.open_path, self)
 
     def do_export(self) -> None:
         """Exporting needs a result."""
@@ -192,6 +229,26 @@ class MainWindow(QMainWindow):
         """Show the help of the open page."""
         page = next(page for page in PAGES if page.key == self.page)
         text_windows.help_window(page.help, page.title, self).open()
+
+    def do_tour(self) -> None:
+        """Show what is where."""
+        if self._tour is not None:
+            return
+        self._tour = Tour([step for step in STEPS if step.page in self._makers], self.theme, self)
+        self._tour.wanted.connect(self._show_step)
+        self._tour.ended.connect(self._end_tour)
+        self._tour.start()
+        self.parts.settings.tour_seen = True
+
+    def _show_step(self, step: Step) -> None:
+        page = self.open_page(step.page)
+        # Parts of a result are only there while one is open.
+        target = self.findChild(QWidget, step.target)
+        assert self._tour is not None
+        self._tour.point_at(target if target is not None and target.isVisible() else page)
+
+    def _end_tour(self) -> None:
+        self._tour = None
 
     def do_shortcuts(self) -> None:
         """Show all keys."""
@@ -234,6 +291,8 @@ class MainWindow(QMainWindow):
 
     def do_cancel_jobs(self) -> None:
         """Stop everything that runs."""
+        if not self.parts.runner.active:
+            self.toasts.tell("info", "Nothing is running.")
         self.parts.runner.cancel_all()
 
     def _show_undo(self) -> None:
@@ -276,7 +335,7 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask before work is stopped; end all threads and remember the layout."""
-        if self.parts.runner.active and not self._may_stop():
+        if not self._may_stop():
             event.ignore()
             return
         for page in self._made.values():
@@ -288,7 +347,9 @@ class MainWindow(QMainWindow):
         event.accept()
 
     def _may_stop(self) -> bool:
-        titles = ", ".join(job.title for job in self.parts.runner.active)
+        titles = ", ".join(job.title for job in self.parts.runner.active if not job.is_minor)
+        if not titles:
+            return True
         answer = QMessageBox.question(
             self,
             "Work is running",

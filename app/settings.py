@@ -31,6 +31,12 @@ class Settings(BaseModel):
     recent: list[str] = Field(default_factory=list)
     output_folder: str = ""
     projector_screen: str = ""
+    #: The campaign that was open, the folder of new ones, and when calibrations count as ageing.
+    campaign: str = ""
+    campaigns_folder: str = ""
+    ageing_days: int = Field(default=90, ge=1)
+    #: Name in the library of the calibration that scans use; empty for the rig's own.
+    calibration: str = ""
     #: Geometry and docks of the main window, as Qt wrote them, base64.
     window_geometry: str = ""
     window_state: str = ""
@@ -50,6 +56,16 @@ def settings_folder() -> Path:
     from platformdirs import user_config_path
 
     return user_config_path("dsl-scan", appauthor=False)
+
+
+def data_folder() -> Path:
+    """Where the program keeps what it makes for itself, such as the demo."""
+    given = os.environ.get(HOME_VARIABLE)
+    if given:
+        return Path(given)
+    from platformdirs import user_data_path
+
+    return user_data_path("dsl-scan", appauthor=False)
 
 
 def load_settings(path: Path) -> tuple[Settings, str]:

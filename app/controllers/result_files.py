@@ -7,7 +7,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.errors import DslError
 from dsl_core.io.result_arrays import ResultArrays
+
+
+def is_complete(session: Path) -> bool:
+    """Whether a scan lacks no frame; who reconstructs it complains of one that cannot be read."""
+    from dsl_core.io.session import SessionReader
+
+    try:
+        return not SessionReader(session).missing()
+    except DslError:
+        return True
 
 
 def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.controllers.known_files import RESULT_NAME, Kind, kind_of
 from app.controllers.marks import MarksController
-from app.controllers.result_files import expected_files, picture_of
+from app.controllers.result_files import expected_files, is_complete, picture_of
 from app.jobs.base import Job, JobRunner
 from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
 from app.state.undo import UndoStack
@@ -18,10 +19,6 @@ from app.views import Notifier
 from dsl_core.inspection import FrameBlock, IntensityGraph, find_session, intensity_graph, read_block
 from dsl_core.io.result_arrays import ResultArrays, load_arrays
 from dsl_core.progress import Progress
-
-#: Endings of files that may hold a reference spectrum.
-REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
-MANIFEST, RESULT = "manifest.json", "zarr.json"
 
 
 class ResultsController:
@@ -36,20 +33,21 @@ class ResultsController:
 
     def open(self, path: Path) -> bool:
         """Open a result, offer to reconstruct a scan, or take a reference; False for anything else."""
-        if (path / RESULT).is_file():
-            self._load(path)
-        elif (path / MANIFEST).is_file():
-            self.offer(path)
-        elif path.suffix.lower() in REFERENCE_SUFFIXES and self.state.result.value is not None:
-            self.marks.add_reference(path)
-        else:
-            return False
+        match kind_of(path):
+            case Kind.RESULT:
+                self._load(path)
+            case Kind.SCAN if is_complete(path):
+                self.offer(path)
+            case Kind.REFERENCE if self.state.result.value is not None:
+                self.marks.add_reference(path)
+            case _:
+                return False
         return True
 
     def offer(self, session: Path) -> None:
         """Open the result beside a scan, or offer to make it."""
         target = session.with_suffix(".zarr")
-        if (target / RESULT).is_file():
+        if (target / RESULT_NAME).is_file():
             self._load(target)
         else:
             self.state.offer.set(session)
@@ -178,7 +176,7 @@ class ResultsController:
                 self.state.adapted.set(adapted)
                 self.state.picture.set(picture)
 
-        self._runner.submit(Job(f"Light {light}", work, done, self._tell))
+        self._runner.submit(Job(f"Light {light}", work, done, self._tell, is_minor=True))
 
     # Search ----------------------------------------------------------------------------------------
 
@@ -251,7 +249,7 @@ class ResultsController:
                 self._block, graph = found
                 self.state.graph.set(graph)
 
-        self._runner.submit(Job("Intensity graph", work, done, self._tell))
+        self._runner.submit(Job("Intensity graph", work, done, self._tell, is_minor=True))
 
     # Export ----------------------------------------------------------------------------------------
 

@@ -101,6 +101,7 @@ class RigController:
             on_failed=self._live_failed,
             on_cancelled=self._live_ended,
             exclusive=RIG,
+            is_minor=True,
         )
         try:
             self._runner.submit(job)

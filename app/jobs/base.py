@@ -48,6 +48,7 @@ class Job(Generic[T]):
 
     ``work`` runs in a worker thread and reports to the `Progress` it is given; the callbacks run in the
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
+    ``is_minor`` work may be stopped unasked when the window closes: nobody misses it.
     """
 
     title: str
@@ -56,6 +57,7 @@ class Job(Generic[T]):
     on_failed: Callable[[Exception], object] | None = None
     on_cancelled: Callable[[], object] | None = None
     exclusive: str = ""
+    is_minor: bool = False
     number: int = field(default_factory=lambda: next(_numbers))
     state: JobState = JobState.WAITING
     progress: JobProgress = JobProgress()

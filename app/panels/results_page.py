@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
@@ -33,21 +32,25 @@ from app.state.results import ResultsState, View
 from app.theme import Theme
 from app.widgets.forms import label
 from app.widgets.page import PageWidget
+from app.widgets.welcome import Welcome
 from dsl_core.inspection import IntensityGraph
 
-NOTHING_OPEN = (
-    "No result is open. Open a result (a folder NAME.zarr) or a finished scan (NAME.dsl), or drop one here.\n"
-    "“dsl-scan demo” makes both on the simulated rig in a minute."
-)
+#: What the page shows, by its place in the stack.
+WAITING, CONTENT, WELCOME = range(3)
 
 
 class ResultsPage(PageWidget):
-    """Follows a `ResultsState` and asks a controller."""
+    """Follows a `ResultsState` and asks a controller; ``open_chosen`` tells a folder to open."""
 
-    def __init__(self, state: ResultsState, commands: ResultCommands, runner: JobRunner) -> None:
+    open_chosen = Signal(object)
+
+    def __init__(
+        self, state: ResultsState, commands: ResultCommands, runner: JobRunner, welcome: Welcome
+    ) -> None:
+        """``welcome`` is shown while nothing is open."""
         super().__init__()
         self._state, self._commands = state, commands
-        self.setAcceptDrops(True)
+        self.welcome = welcome
         self.title, self.about = label("Results", "title"), label("", "muted")
         self.about.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.about.setSizePolicy(
@@ -58,6 +61,7 @@ class ResultsPage(PageWidget):
         self.scene = ScenePanel(state, runner)
         self.readout = Readout(state)
         self.spectra = SpectrumPanel(state)
+        self.spectra.setObjectName("spectra")
         self.marks = MarksPanel(state, commands.marks)
         self.search = SearchPanel(state, commands)
         self.graph = IntensityWindow(state, self)
@@ -81,16 +85,19 @@ class ResultsPage(PageWidget):
         head.addWidget(self._inspect)
         head.addWidget(self._open)
         head.addWidget(self._export)
-        self.stack.addWidget(self._empty())
+        self.stack.addWidget(self._waiting())
         self.stack.addWidget(self._content())
+        greeting = QWidget()
+        QVBoxLayout(greeting).addWidget(self.welcome, 0, Qt.AlignmentFlag.AlignCenter)
+        self.stack.addWidget(greeting)
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 10, 12, 8)
         column.addLayout(head)
         column.addWidget(self.stack, 1)
 
-    def _empty(self) -> QWidget:
-        empty = QWidget()
-        self.message = label(NOTHING_OPEN, "muted")
+    def _waiting(self) -> QWidget:
+        waiting = QWidget()
+        self.message = label("", "muted")
         self.message.setWordWrap(True)
         self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.reconstruct = QPushButton("Reconstruct")
@@ -98,16 +105,17 @@ class ResultsPage(PageWidget):
         self.reconstruct.setToolTip(
             "Turn the frames into depth and spectra; the result is saved beside the scan"
         )
-        column = QVBoxLayout(empty)
+        column = QVBoxLayout(waiting)
         column.addStretch(1)
         column.addWidget(self.message)
         column.addSpacing(8)
         column.addWidget(self.reconstruct, 0, Qt.AlignmentFlag.AlignHCenter)
         column.addStretch(2)
-        return empty
+        return waiting
 
     def _content(self) -> QWidget:
         self.pictures = QSplitter(Qt.Orientation.Horizontal)
+        self.pictures.setObjectName("result-pictures")
         self.pictures.addWidget(self.image)
         self.pictures.addWidget(self.scene)
         self.pictures.setStretchFactor(0, 1)
@@ -141,7 +149,8 @@ class ResultsPage(PageWidget):
 
     def _connect(self) -> None:
         commands, state = self._commands, self._state
-        self._open.clicked.connect(self.choose)
+        for button in (self._open, self.welcome.choose):
+            button.clicked.connect(self.choose)
         self._export.clicked.connect(self.export)
         self._inspect.clicked.connect(self.inspect)
         state.graph.changed.connect(self._show_graph)
@@ -164,7 +173,7 @@ class ResultsPage(PageWidget):
     def _show_state(self) -> None:
         state, result = self._state, self._state.result.value
         waiting = bool(state.busy.value) or state.offer.value is not None
-        self.stack.setCurrentIndex(0 if waiting or result is None else 1)
+        self.stack.setCurrentIndex(WAITING if waiting else WELCOME if result is None else CONTENT)
         self.reconstruct.setVisible(state.offer.value is not None and not state.busy.value)
         self._export.setEnabled(result is not None)
         self._inspect.setEnabled(result is not None)
@@ -172,8 +181,6 @@ class ResultsPage(PageWidget):
             self.message.setText(f"{state.busy.value} …")
         elif state.offer.value is not None:
             self.message.setText(f"{state.offer.value.name} is a scan without a result. Reconstruct it now?")
-        else:
-            self.message.setText(NOTHING_OPEN)
         if result is None:
             self.about.setText("")
             return
@@ -209,8 +216,8 @@ class ResultsPage(PageWidget):
     def choose(self) -> None:
         """Choose the folder of a result or scan."""
         name = QFileDialog.getExistingDirectory(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
-        if name and not self._commands.open(Path(name)):
-            self.message.setText(f"{name} is neither a result nor a scan. Choose another folder.")
+        if name:
+            self.open_chosen.emit(Path(name))
 
     def inspect(self) -> None:
         """Show what the pixel under the cursor saw; its window comes when that is known."""
@@ -237,23 +244,8 @@ class ResultsPage(PageWidget):
         """The command that makes or exports what is open."""
         return self._commands.command_line()
 
-    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Files may be dropped."""
-        if event.mimeData().hasUrls():
-            event.acceptProposedAction()
-
-    def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped, after the drop is over, so that its sender does not wait."""
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
-        event.acceptProposedAction()
-        for path in paths:
-            QTimer.singleShot(0, self, lambda path=path: self._dropped(path))
-
-    def _dropped(self, path: Path) -> None:
-        if not self._commands.open(path):
-            self.message.setText(f"{path.name} is no result, scan or reference spectrum.")
-
     def release(self) -> None:
-        """Let go of the graphics context."""
+        """Let go of the graphics context and of the recent files."""
+        self.welcome.release()
         self.graph.close()
         self.scene.release()

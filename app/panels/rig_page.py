@@ -39,6 +39,7 @@ class RigPage(PageWidget):
         self._state, self._commands = state, commands
         self._stops: list[Callable[[], None]] = []
         self.live = LiveView()
+        self.live.setObjectName("live-view")
         self.projector = ProjectorPanel()
         self._rig = ChoiceBox("Rig", "The rig to connect")
         for name in rigs:

@@ -43,10 +43,12 @@ class ScanPage(PageWidget):
             "Go on at the next missing frame, after a look at whether anything moved"
         )
         self.plan = PlanEditor()
+        self.plan.setObjectName("scan-plan")
         self.curve = OperatingCurve(points)
         self.picture, self.graph = FramePicture(), GraphPlot()
         self.calibration = CalibrationBox(state, commands)
         self.target, self.run = TargetBox(state, commands), RunBox(state, commands)
+        self.run.setObjectName("scan-run")
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
         self._timer.timeout.connect(commands.take_news)

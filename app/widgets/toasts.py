@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMessageBox, QPushButton, QVBoxLayout, QWidget
 
@@ -17,7 +19,15 @@ class Toast(QFrame):
 
     dismissed = Signal()
 
-    def __init__(self, level: Level, text: str, details: str, parent: QWidget) -> None:
+    def __init__(
+        self,
+        level: Level,
+        text: str,
+        details: str,
+        parent: QWidget,
+        offers: Mapping[str, Callable[[], object]] | None = None,
+    ) -> None:
+        """``offers`` are buttons by their texts; using one closes the toast."""
         super().__init__(parent)
         self.setProperty("role", "toast")
         self.setProperty("level", level)
@@ -32,16 +42,24 @@ class Toast(QFrame):
         row.addWidget(label, 1)
         buttons = QVBoxLayout()
         row.addLayout(buttons)
-        close = QPushButton("Close")
-        close.setFlat(True)
-        close.clicked.connect(self.dismiss)
-        buttons.addWidget(close)
+        for name, do in (offers or {}).items():
+            offer = QPushButton(name)
+            offer.setToolTip(text)
+            offer.clicked.connect(self.dismiss)
+            offer.clicked.connect(lambda _checked=False, do=do: do())
+            buttons.addWidget(offer)
+        self._add_flat(buttons, "Close", "Take this message away", self.dismiss)
         if details:
-            more = QPushButton("Details")
-            more.setFlat(True)
-            more.clicked.connect(lambda: self._show(text, details))
-            buttons.addWidget(more)
+            self._add_flat(buttons, "Details", "What is known beside this", lambda: self._show(text, details))
         buttons.addStretch(1)
+
+    @staticmethod
+    def _add_flat(column: QVBoxLayout, text: str, tip: str, do: Callable[[], object]) -> None:
+        button = QPushButton(text)
+        button.setToolTip(tip)
+        button.setFlat(True)
+        button.clicked.connect(lambda _checked=False: do())
+        column.addWidget(button)
 
     def dismiss(self) -> None:
         """Leave for good."""
@@ -72,15 +90,22 @@ class Toasts(QObject):
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
         """Show a sentence."""
-        if any(toast.text == text for toast in self._shown):
+        self._show(Toast(level, text, details, self._window), level in STAY_MS)
+
+    def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
+        """Show a sentence with buttons by their texts; it stays until one is used or it is closed."""
+        self._show(Toast("info", text, "", self._window, offers), leaves=False)
+
+    def _show(self, toast: Toast, leaves: bool) -> None:
+        if any(other.text == toast.text for other in self._shown):
+            toast.deleteLater()
             return
-        toast = Toast(level, text, details, self._window)
         toast.dismissed.connect(lambda: self._drop(toast))
         self._shown.append(toast)
         for old in tuple(self._shown[:-MOST]):
             old.dismiss()
-        if level in STAY_MS:
-            QTimer.singleShot(STAY_MS[level], toast, toast.dismiss)
+        if leaves:
+            QTimer.singleShot(STAY_MS[toast.level], toast, toast.dismiss)
         toast.show()
         self._settle()
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import calibrate, calibrations, demo, files, results, scans
+from dsl_core.cli import calibrate, calibrations, demo, files, gui, results, scans
 
 app = typer.Typer(
     name="dsl-scan",
@@ -29,6 +29,7 @@ for command in (
     app.command()(command)
 app.command("import")(files.import_)
 app.command()(files.info)
+app.command()(gui.gui)
 app.command()(calibrate.selftest)
 app.add_typer(calibrate.calibrate, name="calibrate")
 app.add_typer(calibrations.calibrations, name="calibrations")

@@ -6,11 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QDialog, QLabel, QVBoxLayout
+from PySide6.QtWidgets import QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from app.actions import ACTIONS, PAGES
 from app.application import ExceptionHook, make_window
+from app.jobs.base import Job
 from app.main_window import MainWindow
 from app.views import RecordingNotifier
 from app.widgets.page import PageWidget
@@ -26,8 +27,6 @@ class Page(PageWidget):
         QVBoxLayout(self).addWidget(QLabel(key))
 
     def open_path(self, path: Path) -> bool:
-        if path.suffix != ".known":
-            return False
         self.opened.append(path)
         return True
 
@@ -50,11 +49,9 @@ def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
     return made
 
 
-@pytest.mark.parametrize("action", [a.key for a in ACTIONS if a.key not in ("open", "report_bundle")])
-def test_every_action_does_something(window: MainWindow, action: str) -> None:
-    window.actions_by_key[action].trigger()
-    for dialog in window.findChildren(QDialog):
-        dialog.close()
+def test_what_nobody_does_is_not_offered(window: MainWindow) -> None:
+    assert not window.actions_by_key["demo"].isVisible()
+    assert window.actions_by_key["tour"].isVisible()
 
 
 def test_shortcuts_and_mnemonics_are_unique() -> None:
@@ -87,13 +84,15 @@ def test_pages_let_go_when_the_window_closes(window: MainWindow) -> None:
 
 
 def test_a_file_that_nobody_knows_is_told(window: MainWindow, tmp_path: Path) -> None:
+    (tmp_path / "cat.jpeg").touch()
     window.open_path(tmp_path / "cat.jpeg")
     assert "cat.jpeg is no scan" in window.toasts.shown[-1].text
 
 
 def test_a_known_file_becomes_a_recent_one(window: MainWindow, tmp_path: Path) -> None:
-    window.open_path(tmp_path / "a.known")
-    assert window.parts.settings.recent == [str(tmp_path / "a.known")]
+    (tmp_path / "zarr.json").touch()
+    window.open_path(tmp_path)
+    assert window.parts.settings.recent == [str(tmp_path)]
 
 
 def test_the_log_shows_records_of_any_thread(window: MainWindow, qtbot: QtBot) -> None:
@@ -128,3 +127,21 @@ def test_toasts_leave_when_closed_and_never_pile_up(window: MainWindow) -> None:
     assert [toast.text for toast in window.toasts.shown] == [f"trouble {i}" for i in range(2, 6)]
     window.toasts.shown[0].dismiss()
     assert len(window.toasts.shown) == 3
+
+
+@pytest.mark.parametrize(("is_minor", "asked"), [(True, 0), (False, 1)])
+def test_only_work_that_somebody_would_miss_keeps_the_window_open(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch, is_minor: bool, asked: int
+) -> None:
+    questions: list[str] = []
+
+    def answer(_parent: object, _title: str, text: str) -> QMessageBox.StandardButton:
+        questions.append(text)
+        return QMessageBox.StandardButton.Yes
+
+    monkeypatch.setattr(QMessageBox, "question", answer)
+    free = threading.Event()
+    window.parts.runner.submit(Job("Long work", lambda progress: free.wait(10), is_minor=is_minor))
+    threading.Timer(0.1, free.set).start()
+    window.close()
+    assert len(questions) == asked

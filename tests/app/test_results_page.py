@@ -29,6 +29,7 @@ from app.theme import DARK as DARK_THEME
 from app.theme import LIGHT
 from app.widgets.page import PageWidget
 from app.widgets.spectrum_curve import split_by_share
+from app.widgets.welcome import Welcome
 from dsl_core.inspection import IntensityGraph
 from tests.app.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
 
@@ -53,12 +54,14 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self.state = ResultsState()
         self.page: ResultsPage
+        self.asked: list[str] = []
         self.window = make_window({"results": self._make}, folder)
 
     def _make(self, window: MainWindow) -> PageWidget:
         runner = InlineRunner()
         self.control = ResultsController(self.state, runner, window.toasts, window.parts.undo)
-        self.page = ResultsPage(self.state, self.control, runner)
+        welcome = Welcome(window.parts.recent, window.open_path, lambda: self.asked.append("demo"))
+        self.page = ResultsPage(self.state, self.control, runner, welcome)
         self.page.apply_theme(window.theme)
         return self.page
 
@@ -102,11 +105,33 @@ def test_without_a_result_a_sentence_says_what_to_do(qtbot: QtBot, tmp_path: Pat
     bench = Bench(tmp_path)
     qtbot.addWidget(bench.window)
     bench.window.show()
-    assert "Open a result" in bench.page.message.text()
-    assert not bench.page.reconstruct.isVisible()
+    assert "Open a result" in " ".join(label.text() for label in bench.page.welcome.findChildren(QLabel))
+    assert bench.page.welcome.isVisible()
+    assert not bench.page.welcome.files.isVisible()
+    bench.page.welcome.demo.click()
+    assert bench.asked == ["demo"]
     bench.state.offer.set(tmp_path / "scan.dsl")
     assert "scan.dsl is a scan without a result" in bench.page.message.text()
     assert bench.page.reconstruct.isVisible()
+
+
+def test_recent_files_are_offered_and_vanished_ones_marked(qtbot: QtBot, tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    qtbot.addWidget(bench.window)
+    bench.window.show()
+    for path in (tmp_path / "gone.zarr", write_small_result(tmp_path)):
+        bench.window.parts.recent.add(path)
+    files = bench.page.welcome.files
+    assert "(missing)" in files.item(1).text()
+    files.setFocus()
+    files.setCurrentRow(1)
+    QTest.keyClick(files, Qt.Key.Key_Return)
+    assert "gone.zarr is not there any more" in bench.window.toasts.shown[-1].text
+    assert files.count() == 1
+    files.setCurrentRow(0)
+    QTest.keyClick(files, Qt.Key.Key_Return)
+    assert bench.state.result.value is not None
+    assert not bench.page.welcome.isVisible()
 
 
 def test_the_keys_1_to_5_choose_the_view(bench: Bench, qtbot: QtBot) -> None:
@@ -227,7 +252,7 @@ def test_references_are_dropped_and_compared(bench: Bench, qtbot: QtBot, tmp_pat
         Qt.MouseButton.LeftButton,
         Qt.KeyboardModifier.NoModifier,
     )
-    bench.page.dropEvent(drop)
+    bench.window.dropEvent(drop)
     qtbot.waitUntil(lambda: len(bench.marks) == 2)
     bench.state.selected.set(bench.marks[0].key)
     text = figures_of(bench.state, LIGHT)

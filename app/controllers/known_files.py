@@ -1,0 +1,97 @@
+"""What a file or folder is to this program, judged quickly, and what to say of one that cannot be opened."""
+
+from __future__ import annotations
+
+import json
+from enum import Enum
+from pathlib import Path
+
+from dsl_core.io.campaign_folder import CAMPAIGN_NAME
+from dsl_core.io.session_manifest import MANIFEST_NAME
+
+RESULT_NAME = "zarr.json"
+#: Endings of files that may hold a reference spectrum.
+REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+_MARKS = ".marks.json"
+_OPENS = (
+    "It opens scans (folders NAME.dsl), results (folders NAME.zarr), campaigns and rigs of calibrations, and"
+    " text files of reference spectra (.csv, .txt)."
+)
+
+
+class Kind(Enum):
+    """What can be told from the outside."""
+
+    SCAN = "scan"
+    RESULT = "result"
+    CAMPAIGN = "campaign"
+    CALIBRATION = "calibration"
+    PLAN = "plan"
+    REFERENCE = "reference spectrum"
+    MISSING = "missing"
+    UNKNOWN = "unknown"
+
+
+def kind_of(path: Path) -> Kind:
+    """What lies at a path."""
+    if not path.exists():
+        return Kind.MISSING
+    for name, kind in (
+        (MANIFEST_NAME, Kind.SCAN),
+        (RESULT_NAME, Kind.RESULT),
+        (CAMPAIGN_NAME, Kind.CAMPAIGN),
+    ):
+        if (path / name).is_file():
+            return kind
+    suffix = path.suffix.lower()
+    if suffix == ".json" and path.is_file():
+        return _kind_of_json(path)
+    return Kind.REFERENCE if suffix in REFERENCE_SUFFIXES and path.is_file() else Kind.UNKNOWN
+
+
+def _kind_of_json(path: Path) -> Kind:
+    try:
+        content = json.loads(path.read_bytes())
+    except (OSError, ValueError):
+        return Kind.UNKNOWN
+    keys = set(content) if isinstance(content, dict) else set()
+    if "camera_size_px" in keys or "spectral" in keys:
+        return Kind.PLAN
+    return Kind.CALIBRATION if keys & {"film", "response", "rig"} else Kind.UNKNOWN
+
+
+def meant_by(path: Path) -> Path:
+    """The folder that is meant by one of the files that make it up, else the path itself."""
+    if path.name in (MANIFEST_NAME, RESULT_NAME, CAMPAIGN_NAME):
+        return path.parent
+    if path.name.endswith(_MARKS):
+        return path.with_name(path.name.removesuffix(_MARKS) + ".zarr")
+    return path
+
+
+def refusal(path: Path) -> str:
+    """Why nothing opened a path, and what to do."""
+    match kind_of(path):
+        case Kind.MISSING:
+            return f"{path} is not there any more. Choose another file, or connect the drive that it lies on."
+        case Kind.REFERENCE:
+            return (
+                f"{path.name} may hold a reference spectrum, which is compared with a result. Open a result"
+                " first, then this file again."
+            )
+        case Kind.PLAN:
+            return (
+                f"{path.name} is the plan of a scan. Use it with 'dsl-scan scan NAME.dsl --plan {path.name}'."
+            )
+        case Kind.CALIBRATION:
+            return (
+                f"{path.name} is a calibration. Import it into the library, by the Calibrate page or"
+                f" 'dsl-scan calibrations import {path.name}', then choose it on the Scan page."
+            )
+        case Kind.UNKNOWN:
+            return (
+                f"{path.name} is no scan, result, reference spectrum or calibration that this program knows."
+                f" {_OPENS}"
+            )
+        case kind:
+            return f"{path.name} is a {kind.value}, but no page could open it. The log says why (Ctrl+L)."

@@ -1,0 +1,53 @@
+"""Opens the window. It is another package, so it is started by its entry point and never imported here."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dsl_core.cli.options import RigOptions
+from dsl_core.errors import DslError
+
+#: The window of this package, so that it opens in a source tree without metadata too.
+WINDOW = EntryPoint("dsl-scan-gui", "app.__main__:main", "gui_scripts")
+
+
+class Theme(StrEnum):
+    """Colours of the window."""
+
+    SYSTEM = "system"
+    LIGHT = "light"
+    DARK = "dark"
+
+
+def gui(
+    path: Annotated[
+        Path | None, typer.Argument(help="A scan, result, reference or calibration to open.")
+    ] = None,
+    rig: Annotated[str | None, typer.Option(help="Rig to connect instead of the last one.")] = None,
+    option: RigOptions = [],  # noqa: B006
+    demo: Annotated[bool, typer.Option("--demo", help="Open a finished scan of the twin.")] = False,
+    theme: Annotated[Theme | None, typer.Option(help="Colours, instead of those used last.")] = None,
+) -> None:
+    """Open the window: scan, calibrate and read spectra by hand."""
+    words = [] if path is None else [str(path)]
+    if rig is not None:
+        words += ["--rig", rig]
+    for each in option:
+        words += ["--option", each]
+    if demo:
+        words.append("--demo")
+    if theme is not None:
+        words += ["--theme", theme.value]
+    try:
+        main = WINDOW.load()
+    except ImportError as error:
+        raise DslError(
+            f"The window cannot be opened here: {error}. Install dsl-scan with its desktop application:"
+            " pip install dsl-scan."
+        ) from error
+    raise typer.Exit(main(words))

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+
+from app.controllers import demo
+from app.controllers.demo import DemoController
+from app.jobs.base import InlineRunner
+from app.state.rig import Link, RigChoice
+from app.state.scan import Phase
+from dsl_core.io.result_file import load_result
+from dsl_core.io.session import SessionReader
+from tests.app.scan_bench import SHORT, ScanBench, make_bench
+
+SMALL = {"scene": "color-checker", "size": "64x48"}
+
+
+class Bench:
+    def __init__(self, folder: Path) -> None:
+        self.scans: ScanBench = make_bench(folder)
+        self.runner = InlineRunner()
+        self.opened: list[Path] = []
+        self.demo = DemoController(
+            folder / "demo",
+            self.scans.rig,
+            self.runner,
+            self.scans.notifier,
+            self.opened.append,
+            lambda: self.scans.scans,
+            lambda: datetime(2026, 3, 1, 10, 20),
+        )
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    monkeypatch.setattr(demo, "SCENE", SMALL)
+    monkeypatch.setattr(demo, "LIVE_RIG", RigChoice("twin", tuple(SMALL.items())))
+    monkeypatch.setattr(demo, "demo_plan", lambda: SHORT)
+    return Bench(tmp_path)
+
+
+def test_the_demo_is_made_once_and_offers_a_live_one(bench: Bench, tmp_path: Path) -> None:
+    bench.demo.show()
+    result = tmp_path / "demo" / "demo.zarr"
+    assert bench.opened == [result]
+    assert "reflectance" in load_result(result)
+    assert "Scan one live" in bench.scans.notifier.offers
+    bench.demo.show()
+    assert [job.title for job in bench.runner.finished] == ["Make the demo"]
+    assert bench.opened == [result, result]
+
+
+def test_what_another_version_began_is_made_anew(bench: Bench, tmp_path: Path) -> None:
+    session = tmp_path / "demo" / "demo.dsl"
+    session.mkdir(parents=True)
+    (session / "manifest.json").write_text("{ cut off")
+    bench.demo.show()
+    assert bench.opened == [tmp_path / "demo" / "demo.zarr"]
+
+
+def test_a_failure_is_told_and_can_be_tried_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise OSError("no room")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(demo, "take_demo", fail)
+        bench.demo.show()
+    assert bench.scans.notifier.told[-1] == ("error", "The demo could not be made: no room")
+    bench.demo.show()
+    assert len(bench.opened) == 1
+
+
+def test_the_live_demo_connects_the_twin_and_scans(bench: Bench, tmp_path: Path) -> None:
+    bench.demo.scan_live()
+    assert bench.scans.rig.state.link.value is Link.OPEN
+    state = bench.scans.state
+    assert state.phase.value is Phase.DONE
+    assert state.preset is not None
+    assert state.preset.key == "preview"
+    folder = tmp_path / "demo" / "scan-20260301-1020.dsl"
+    assert not SessionReader(folder).missing()
+
+
+def test_the_rig_of_a_person_is_not_taken_away(bench: Bench) -> None:
+    rig = bench.scans.rig
+    rig.connect(rig.state.choice.value)
+    rig.state.choice.set(RigChoice("room-12"))
+    bench.demo.scan_live()
+    assert bench.scans.state.phase.value is Phase.PLANNING
+    assert "room-12 is connected" in bench.scans.notifier.told[-1][1]

@@ -1,0 +1,84 @@
+"""Files dropped anywhere on the real window, and the menu of recent ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from app.application import make_window
+from app.composition import Composition, Wish
+from app.main_window import MainWindow
+from tests.app.small_result import RED, write_reference, write_small_result
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
+    composition = Composition(Wish())
+    made = make_window(composition.pages, tmp_path / "home", commands=composition.commands)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+def drop(window: MainWindow, *paths: Path) -> bool:
+    """Drag files over the middle of the window and let go; whether the window wanted them."""
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+    left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    enter = QDragEnterEvent(QPoint(500, 300), Qt.DropAction.CopyAction, data, left, none)
+    QApplication.sendEvent(window, enter)
+    if enter.isAccepted():
+        QApplication.sendEvent(
+            window, QDropEvent(QPointF(500, 300), Qt.DropAction.CopyAction, data, left, none)
+        )
+    return enter.isAccepted()
+
+
+def test_a_result_opens_where_results_are(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> None:
+    path = write_small_result(tmp_path)
+    assert drop(window, path)
+    qtbot.waitUntil(lambda: window.page == "results")
+    assert window.parts.settings.recent == [str(path)]
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=10_000)
+    window.close()
+
+
+def test_a_file_inside_a_result_means_the_result(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> None:
+    path = write_small_result(tmp_path)
+    drop(window, path / "zarr.json")
+    qtbot.waitUntil(lambda: window.parts.settings.recent == [str(path)])
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=10_000)
+    window.close()
+
+
+def test_a_wrong_file_is_told_with_what_is_known(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> None:
+    (tmp_path / "cat.jpeg").write_bytes(b"\xff\xd8")
+    drop(window, tmp_path / "cat.jpeg", write_reference(tmp_path / "tile.csv", RED))
+    qtbot.waitUntil(lambda: len(window.toasts.shown) == 2)
+    assert "cat.jpeg is no scan" in window.toasts.shown[0].text
+    assert "Open a result first" in window.toasts.shown[1].text
+    assert window.parts.settings.recent == []
+    window.close()
+
+
+def test_text_is_not_taken_for_a_file(window: MainWindow) -> None:
+    assert not drop(window)
+    window.close()
+
+
+def test_the_menu_lists_what_was_opened_and_marks_what_is_gone(window: MainWindow, tmp_path: Path) -> None:
+    window.parts.recent.add(tmp_path / "gone.zarr")
+    window.recent_menu.fill()
+    (entry,) = window.recent_menu.actions()
+    assert "gone.zarr" in entry.text()
+    assert "(missing)" in entry.text()
+    entry.trigger()
+    assert "not there any more" in window.toasts.shown[-1].text
+    window.recent_menu.fill()
+    assert not window.recent_menu.actions()[0].isEnabled()
+    window.close()
