@@ -30,8 +30,8 @@ STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-2, 1e-2])
 ROUNDS = 15
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
 HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
-#: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in either
-#: direction (seven drawn rigs, whose films then lie within 1.0 of their deviations, rms).
+#: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
+#: either direction (seven drawn rigs, whose films then lie within 1.0 of their deviations, rms).
 COMMON_PX = 0.0015
 MIN_SAMPLES = 100
 
@@ -157,7 +157,8 @@ def _common_offsets(rig: Rig, samples: OrderSamples) -> Floats:
     shapes = np.stack([np.ones(len(samples)), np.sqrt(3) * across, np.sqrt(3) * down], 1)
     _, group = np.unique(samples.filter * 8 + samples.order, return_inverse=True)
     mine = group[:, None] == np.arange(group.max() + 1)
-    return COMMON_PX * (mine[:, :, None] * shapes[:, None, :]).reshape(len(samples), -1)
+    offsets: Floats = COMMON_PX * (mine[:, :, None] * shapes[:, None, :]).reshape(len(samples), -1)
+    return offsets
 
 
 def with_geometry(
