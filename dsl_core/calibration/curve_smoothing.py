@@ -36,7 +36,7 @@ def smooth_curve(wavelengths_nm: Floats, values: Floats, std: Floats) -> SmoothC
 
     All of shape (wavelengths,); values in any unit. Not clipped at zero: that would bias dark wings.
     """
-    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg import cho_solve
 
     peak = float(np.abs(values).max()) or 1.0
     y, noise = values / peak, np.maximum(std / peak, 1e-9)
@@ -46,12 +46,13 @@ def smooth_curve(wavelengths_nm: Floats, values: Floats, std: Floats) -> SmoothC
     for length in LENGTHS_NM:
         shape = _matern(distance / length) * np.outer(envelope, envelope)
         for scale in SCALES:
-            factor = cho_factor(scale**2 * shape + np.diag(noise**2), lower=True)
+            # numpy's lets other threads run meanwhile, scipy's does not.
+            factor = np.linalg.cholesky(scale**2 * shape + np.diag(noise**2)), True
             evidence = -0.5 * y @ cho_solve(factor, y) - np.log(np.diag(factor[0])).sum()
             if evidence > best[0]:
                 best = (float(evidence), float(length), scale**2 * shape)
     _, length_nm, prior = best
-    factor = cho_factor(prior + np.diag(noise**2), lower=True)
+    factor = np.linalg.cholesky(prior + np.diag(noise**2)), True
     mean = prior @ cho_solve(factor, y)
     spread = np.diag(prior) - np.einsum("ij,ij->j", prior, cho_solve(factor, prior))
     return SmoothCurve(mean * peak, np.sqrt(np.maximum(spread, 0)) * peak, length_nm)
