@@ -83,6 +83,30 @@ ACTIONS: tuple[Action, ...] = (
         "Ctrl+.",
         "Stop everything that runs, at the next safe point",
     ),
+    Action("calibrate_new", "&New campaign…", "Calibrate", "", "Begin a campaign of the rig at hand"),
+    Action("calibrate_open", "&Open campaign…", "Calibrate", "", "Go on with a campaign that was begun"),
+    *(
+        Action(f"calibrate_{key}", f"{text}…", "Calibrate", f"F{i}", tip, separator=i == 4)
+        for i, (key, text, tip) in enumerate(
+            (
+                ("selftest", "&Self-test", "Whether camera, projector, focus and room are good enough"),
+                ("geometry", "&Geometry", "Find lenses and pose from a printed board"),
+                ("spectralon", "S&pectralon", "Measure the LEDs' light, evenness and white"),
+                ("color-checker", "&Color Checker", "Refine response and emission on known patches"),
+                ("bandpass", "&Bandpass filters", "Measure how bright the film's orders are"),
+                ("depth-stage", "&Depth stage", "Find where the film stands and how it bends"),
+            ),
+            4,
+        )
+    ),
+    Action(
+        "calibrate_everything",
+        "Calibrate &everything",
+        "Calibrate",
+        "",
+        "Run all calibrations in order on a rig that places targets itself",
+        separator=True,
+    ),
     *(
         Action(f"view_{key}", text, "Results", str(i), tip, page="results")
         for i, (key, text, tip) in enumerate(

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
 
+from app.calibration_desk import CalibrationDesk, calibration_commands
 from app.controllers.rig import RigController
 from app.main_window import Command, MainWindow, PageMaker
 from app.projector_screens import ProjectorScreens
 from app.projector_window import ScreenProjector
+from app.session_desk import SessionDesk
 from app.settings import data_folder
 from app.state.rig import Link, RigChoice, RigState
 from app.widgets.page import PageWidget
@@ -50,12 +52,15 @@ class Composition(QObject):
         self._screens: ProjectorScreens | None = None
         self._scans: ScanController | None = None
         self._demo: DemoController | None = None
+        self._session: SessionDesk | None = None
+        self._desk: CalibrationDesk | None = None
 
     @property
     def pages(self) -> dict[str, PageMaker]:
         """Makers of all pages by key."""
         return {
             "rig": self._rig_page,
+            "calibrate": self._calibrate_page,
             "scan": self._scan_page,
             "results": self._results_page,
             "compare": self._compare_page,
@@ -67,6 +72,7 @@ class Composition(QObject):
         return {
             "demo": lambda window: self.demo(window).show(),
             "live_demo": lambda window: self.demo(window).scan_live(),
+            **calibration_commands(),
         }
 
     def start(self, window: MainWindow) -> None:
@@ -74,6 +80,7 @@ class Composition(QObject):
         QTimer.singleShot(CONNECT_AFTER_MS, self, lambda: self._begin(window))
 
     def _begin(self, window: MainWindow) -> None:
+        self.session(window).start()
         rig = self.rig(window)
         if rig.state.link.value is Link.CLOSED:
             rig.connect(rig.state.choice.value)
@@ -122,10 +129,25 @@ class Composition(QObject):
         window.open_page("results")
         window.open_path(path)
 
+    def session(self, window: MainWindow) -> SessionDesk:
+        """What keeps the session of the window."""
+        if self._session is None:
+            self._session = SessionDesk(window)
+        return self._session
+
     def _open_scan_page(self, window: MainWindow) -> ScanController:
         window.open_page("scan")
         assert self._scans is not None
         return self._scans
+
+    def desk(self, window: MainWindow) -> CalibrationDesk:
+        """What all calibrations of the application share."""
+        if self._desk is None:
+            self._desk = CalibrationDesk(window, self.rig(window))
+        return self._desk
+
+    def _calibrate_page(self, window: MainWindow) -> PageWidget:
+        return self.desk(window).page()
 
     # Pages -----------------------------------------------------------------------------------------
 
@@ -137,6 +159,7 @@ class Composition(QObject):
         page = RigPage(rig.state, rig, rig_names())
         assert self._screens is not None
         self._screens.serve(page)
+        page.selftest_wanted.connect(lambda: window.do("calibrate_selftest"))
         page.apply_theme(window.theme)
         return page
 
@@ -157,11 +180,13 @@ class Composition(QObject):
         self._scans = controller = ScanController(
             state, self.rig(window), parts.runner, window.toasts, parts.undo
         )
+        self.desk(window).serve(controller)
         try:
             points = load_operating_points()
         except DslError as error:
             _log.warning("%s", error)
             points = None
+        self.session(window).serve_scan(controller)
         page = ScanPage(state, controller, points, window.open_path)
         page.apply_theme(window.theme)
         return page
@@ -175,6 +200,7 @@ class Composition(QObject):
         parts, state = window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
         welcome = Welcome(parts.recent, window.open_path, lambda: self.demo(window).show())
+        self.session(window).serve_results(controller)
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)
         page.apply_theme(window.theme)
@@ -186,7 +212,9 @@ class Composition(QObject):
         from app.state.compare import CompareState
 
         state = CompareState()
-        page = ComparePage(state, CompareController(state, window.parts.runner, window.toasts))
+        controller = CompareController(state, window.parts.runner, window.toasts)
+        self.session(window).serve_comparison(controller)
+        page = ComparePage(state, controller)
         page.apply_theme(window.theme)
         return page
 

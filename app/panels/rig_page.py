@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
@@ -31,7 +31,9 @@ _ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED
 
 
 class RigPage(PageWidget):
-    """Follows a `RigState` and asks a controller."""
+    """Follows a `RigState` and asks a controller; ``selftest_wanted`` asks for the self-test's wizard."""
+
+    selftest_wanted = Signal()
 
     def __init__(self, state: RigState, commands: RigCommands, rigs: Sequence[str]) -> None:
         """``rigs`` are the names of the rigs that are installed."""
@@ -57,6 +59,9 @@ class RigPage(PageWidget):
         self._camera_text, self._projector_text = label("–"), label("–")
         self._live_button = QPushButton("Start live view")
         self._live_button.setToolTip("Look through the camera until it is needed for something else")
+        self.selftest = QPushButton("Self-&test…")
+        self.selftest.setToolTip("Test camera, projector, timing, focus and room, and say what to do (F4)")
+        self.selftest.clicked.connect(self.selftest_wanted)
         low, high = 0.01, 30_000.0
         self._exposure = NumberBox(
             "Exposure", low, high, state.exposure_ms.value, "ms", 2, "Exposure of live frames"
@@ -79,6 +84,7 @@ class RigPage(PageWidget):
         form.addRow(self._trouble)
         form.addRow("Camera", self._camera_text)
         form.addRow("Projector", self._projector_text)
+        form.addRow("", self.selftest)
         camera = QGroupBox("Camera")
         camera_form = QFormLayout(camera)
         camera_form.addRow("Exposure", self._exposure)
@@ -136,6 +142,7 @@ class RigPage(PageWidget):
         self.live.set_camera(camera)
         self.projector.set_projector(projector)
         self._live_button.setEnabled(devices is not None)
+        self.selftest.setEnabled(devices is not None)
         self._exposure.setEnabled(devices is not None)
         if camera is not None:
             self._exposure.setRange(*camera.exposure_range_ms)
