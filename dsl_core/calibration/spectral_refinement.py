@@ -162,7 +162,7 @@ def refined_curves(rig: Rig, found: Refinement) -> tuple[Rgb, Rgb, float]:
 
 def _solve(rig: Rig, data: SurfaceSignals, weight: float, error: float) -> Refinement:
     """Gauss and Newton from the start curves, and the evidence by Laplace's approximation."""
-    from scipy.linalg import cho_factor, cho_solve
+    from scipy.linalg import cho_solve
 
     model = SpectralModel(rig)
     std = _total_std(data, error)
@@ -172,16 +172,18 @@ def _solve(rig: Rig, data: SurfaceSignals, weight: float, error: float) -> Refin
         predicted, slope = model.predict(x, data)
         a = (slope / std[..., None]).reshape(-1, model.size)
         miss = ((data.signal - predicted) / std).ravel()
-        hessian = cho_factor(a.T @ a + prior, lower=True)
-        step = cho_solve(hessian, a.T @ miss - prior @ x)
+        # numpy's lets other threads run meanwhile, scipy's does not.
+        root = np.linalg.cholesky(a.T @ a + prior)
+        step = cho_solve((root, True), a.T @ miss - prior @ x)
         x = x + np.clip(step, -0.5, 0.5)
         if np.abs(step).max() < 1e-6:
             break
     predicted, _ = model.predict(x, data)
     cost = float((((data.signal - predicted) / std) ** 2).sum() + x @ prior @ x)
     evidence = -0.5 * cost - float(np.log(std).sum()) + 0.5 * float(np.linalg.slogdet(prior)[1])
-    evidence -= float(np.log(np.diag(hessian[0])).sum())
-    covariance = cho_solve(hessian, np.eye(model.size))[:-1, :-1]
+    evidence -= float(np.log(np.diag(root)).sum())
+    inverse = np.linalg.inv(root)
+    covariance = (inverse.T @ inverse)[:-1, :-1]
     return Refinement(x[:-1].reshape(6, -1), covariance, float(x[-1]), weight, error, evidence)
 
 
