@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QSize, Qt
+from PySide6.QtCore import QByteArray, QSize, Qt, Signal
 from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QDockWidget,
@@ -67,8 +67,10 @@ class MainWindow(QMainWindow):
     """The application's window.
 
     ``pages`` makes the widget of each page of the rail; ``commands`` do the actions of the table that neither
-    a page nor the window itself can do.
+    a page nor the window itself can do. ``closed`` tells that the window ends well.
     """
+
+    closed = Signal()
 
     def __init__(
         self, parts: Parts, pages: dict[str, PageMaker], commands: dict[str, Command] | None = None
@@ -342,6 +344,7 @@ class MainWindow(QMainWindow):
             page.release()
         self.parts.runner.shut_down()
         self.remember()
+        self.closed.emit()
         # Python's logging outlives the window and must not call into it.
         logging.getLogger().removeHandler(self.parts.records)
         event.accept()

@@ -11,7 +11,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import write_atomic
+from dsl_core.io.atomic import set_aside, write_atomic
 
 _log = logging.getLogger(__name__)
 RECENT_COUNT = 12
@@ -79,10 +79,10 @@ def load_settings(path: Path) -> tuple[Settings, str]:
     except FileNotFoundError:
         return Settings(), ""
     except (OSError, ValueError) as error:
-        aside = _set_aside(path)
+        aside = set_aside(path)
         return Settings(), f"The settings {path} could not be read ({error}); they start anew.{aside}"
     if not isinstance(content, dict):
-        return Settings(), f"The settings {path} hold no settings; they start anew.{_set_aside(path)}"
+        return Settings(), f"The settings {path} hold no settings; they start anew.{set_aside(path)}"
     return _tolerant(content, path)
 
 
@@ -106,13 +106,3 @@ def _tolerant(content: dict[str, Any], path: Path) -> tuple[Settings, str]:
             f"In the settings {path} these made no sense and are at their defaults:"
             f" {', '.join(sorted(wrong))}."
         )
-
-
-def _set_aside(path: Path) -> str:
-    """Keep a file that cannot be read, and say where."""
-    aside = path.with_suffix(".damaged.json")
-    try:
-        os.replace(path, aside)
-    except OSError:
-        return ""
-    return f" The old file is kept as {aside}."

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import write_atomic
+from dsl_core.io.atomic import set_aside, write_atomic
 from dsl_core.model.base import Record
 
 
@@ -65,7 +65,10 @@ def save_annotations(annotations: Annotations, result: Path) -> Path:
 
 
 def load_annotations(result: Path) -> Annotations:
-    """The marks beside a result, none where there is no file; raises `StoreError` for a damaged one."""
+    """The marks beside a result, none where there is no file.
+
+    Raises `StoreError` for a damaged file, which is put aside, so that new marks do not replace it.
+    """
     path = annotations_path(result)
     if not path.exists():
         return Annotations()
@@ -73,6 +76,6 @@ def load_annotations(result: Path) -> Annotations:
         return Annotations.model_validate_json(path.read_bytes())
     except (OSError, ValidationError) as error:
         raise StoreError(
-            f"The marks in {path} cannot be read ({type(error).__name__}). The result is opened without them;"
-            " move the file away to mark anew."
+            f"The marks in {path} cannot be read ({type(error).__name__}). The result is opened without them."
+            f"{set_aside(path)}"
         ) from error

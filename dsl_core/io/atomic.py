@@ -52,6 +52,19 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
+def set_aside(path: Path) -> str:
+    """Rename a file that cannot be read, so that a new one does not replace it; says where it is now.
+
+    Returns an empty text where it cannot be renamed.
+    """
+    aside = path.with_suffix(f".damaged{path.suffix}")
+    try:
+        os.replace(path, aside)
+    except OSError:
+        return ""
+    return f" The old file is kept as {aside}."
+
+
 def remove_partials(folder: Path) -> None:
     """Delete what an interrupted `write_atomic` left in a folder."""
     for leftover in folder.glob("*" + PARTIAL_SUFFIX):

@@ -29,7 +29,9 @@ def test_no_file_means_no_marks(tmp_path: Path) -> None:
     assert load_annotations(tmp_path / "scan.zarr") == Annotations()
 
 
-def test_a_damaged_file_is_named(tmp_path: Path) -> None:
+def test_a_damaged_file_is_named_and_put_aside(tmp_path: Path) -> None:
     (tmp_path / "scan.marks.json").write_text('{"pins": 3}')
     with pytest.raises(StoreError, match=r"scan\.marks\.json"):
         load_annotations(tmp_path / "scan.zarr")
+    assert not (tmp_path / "scan.marks.json").exists()
+    assert (tmp_path / "scan.marks.damaged.json").read_text() == '{"pins": 3}'

@@ -1,0 +1,144 @@
+"""What each page gives to the session and how it comes back to it. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from typing import TypeVar
+
+from app.controllers.compare import CompareController
+from app.controllers.result_files import is_complete
+from app.controllers.results import ResultsController
+from app.controllers.scan import ScanController
+from app.state.compare import CompareState, Side
+from app.state.evented import Value
+from app.state.results import Quality, ResultsState, View
+from app.state.scan import CalibrationChoice, ScanState, preset_of
+from app.state.session import ComparePart, ResultsPart, ScanPart
+from dsl_core.io.result_arrays import ResultArrays
+from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.model.presets import on_cycles
+
+E = TypeVar("E", bound=Enum)
+T = TypeVar("T")
+#: The plan that a page begins with is nothing to come back to.
+_FIRST_PLAN = "reference"
+
+
+def results_part(state: ResultsState) -> ResultsPart | None:
+    """The result that is open and its views."""
+    result = state.result.value
+    if result is None:
+        return None
+    return ResultsPart(
+        path=result.path,
+        view=state.view.value.value,
+        cloud_by=state.cloud_by.value.value,
+        quality=state.quality.value.value,
+        band=state.band.value,
+        light=state.light.value,
+        adapted=state.adapted.value,
+        cursor=state.cursor.value,
+    )
+
+
+def come_back_to_result(part: ResultsPart, control: ResultsController) -> None:
+    """Open the result again, and look at it as before once it is there."""
+    state = control.state
+
+    def look(result: ResultArrays) -> None:
+        if part.cursor is not None:
+            control.point_at(part.cursor)
+        if result.has_spectra:
+            control.step_band(part.band - state.band.value)
+        _set_named(state.cloud_by, View, part.cloud_by)
+        _set_named(state.quality, Quality, part.quality)
+        view = _named(View, part.view)
+        if view is not None:
+            control.show(view)
+        if (part.light, part.adapted) != (state.light.value, state.adapted.value):
+            control.relight(part.light, part.adapted)
+
+    _once(state.result, look, lambda result: result.path == part.path)
+    control.open(part.path)
+
+
+def scan_part(state: ScanState) -> ScanPart | None:
+    """The plan and where it goes, unless it is the one that everybody begins with."""
+    preset = preset_of(on_cycles(state.plan.value, state.period_ms.value), state.period_ms.value)
+    is_begun = state.phase.value.is_busy or state.interrupted.value is not None
+    if not is_begun and preset is not None and preset.key == _FIRST_PLAN:
+        return None
+    return ScanPart(
+        plan=state.plan.value,
+        target=state.target.value,
+        then_reconstruct=state.then_reconstruct.value,
+        override=state.override.value,
+        calibration=state.calibration.value.key,
+    )
+
+
+def come_back_to_scan(part: ScanPart, control: ScanController) -> None:
+    """Plan the same again; a scan that the crash interrupted is offered to be gone on with."""
+    control.state.then_reconstruct.set(part.then_reconstruct)
+    if (part.target / MANIFEST_NAME).is_file() and not is_complete(part.target):
+        control.open(part.target)
+        return
+    control.plans.change_plan(part.plan)
+    if not part.target.exists():
+        control.plans.set_target(part.target)
+    control.plans.set_override(part.override)
+    if part.calibration:
+        control.plans.choose_calibration(CalibrationChoice(part.calibration, part.calibration))
+
+
+def compare_part(state: CompareState) -> ComparePart | None:
+    """The two sides."""
+    first, second = state.first.value, state.second.value
+    if first is None and second is None:
+        return None
+    truth = second is not None and second.truth is not None
+    return ComparePart(first=_path(first), second=None if truth else _path(second), with_truth=truth)
+
+
+def come_back_to_comparison(part: ComparePart, control: CompareController) -> None:
+    """Open A, then B or the truth of A."""
+
+    def then(_: Side) -> None:
+        if part.with_truth:
+            control.use_truth()
+        elif part.second is not None:
+            control.open_side(part.second, second=True)
+
+    if part.first is None:
+        if part.second is not None:
+            control.open_side(part.second, second=True)
+        return
+    _once(control.state.first, then, lambda side: side.arrays.path == part.first)
+    control.open_side(part.first, second=False)
+
+
+def _path(side: Side | None) -> Path | None:
+    return None if side is None else side.arrays.path
+
+
+def _named(kind: type[E], name: str) -> E | None:
+    return next((each for each in kind if each.value == name), None)
+
+
+def _set_named(value: Value[E], kind: type[E], name: str) -> None:
+    found = _named(kind, name)
+    if found is not None:
+        value.set(found)
+
+
+def _once(value: Value[T | None], do: Callable[[T], object], if_: Callable[[T], bool]) -> None:
+    """Do something the first time that a value is what is waited for."""
+
+    def judge(now: T | None) -> None:
+        if now is not None and if_(now):
+            stop()
+            do(now)
+
+    stop = value.changed.connect(judge)

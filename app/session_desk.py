@@ -1,0 +1,132 @@
+"""Keeps what is open while the window lives, and offers it again after a crash."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, QTimer
+
+from app.controllers.session_keeper import SessionKeeper
+from app.main_window import MainWindow
+from app.state.session import Session
+
+if TYPE_CHECKING:
+    from app.controllers.compare import CompareController
+    from app.controllers.results import ResultsController
+    from app.controllers.scan import ScanController
+
+#: How long changes are gathered before they are written, ms.
+SAVE_MS = 1000
+
+
+class SessionDesk(QObject):
+    """Knows the controllers of the pages that were made so far."""
+
+    def __init__(self, window: MainWindow) -> None:
+        super().__init__(window)
+        self._window = window
+        self._results: ResultsController | None = None
+        self._scans: ScanController | None = None
+        self._compare: CompareController | None = None
+        self.keeper = SessionKeeper(window.parts.settings_path.parent / "sessions", self.collect)
+        self._timer = QTimer(self)
+        self._timer.setInterval(SAVE_MS)
+        self._timer.timeout.connect(self.save)
+
+    # Pages -----------------------------------------------------------------------------------------
+
+    def serve_results(self, control: ResultsController) -> None:
+        """Keep what the Results page shows."""
+        self._results, state = control, control.state
+        self.keeper.watch(
+            state.result,
+            state.view,
+            state.cloud_by,
+            state.quality,
+            state.band,
+            state.light,
+            state.adapted,
+            state.cursor,
+        )
+
+    def serve_scan(self, control: ScanController) -> None:
+        """Keep what the Scan page plans."""
+        self._scans, state = control, control.state
+        self.keeper.watch(
+            state.plan,
+            state.target,
+            state.phase,
+            state.interrupted,
+            state.then_reconstruct,
+            state.override,
+            state.calibration,
+        )
+
+    def serve_comparison(self, control: CompareController) -> None:
+        """Keep what the Compare page compares."""
+        self._compare = control
+        self.keeper.watch(control.state.first, control.state.second)
+
+    # Keep ------------------------------------------------------------------------------------------
+
+    def collect(self) -> Session:
+        """What is open now."""
+        from app.controllers.session_parts import compare_part, results_part, scan_part
+
+        return Session(
+            page=self._window.page,
+            results=None if self._results is None else results_part(self._results.state),
+            scan=None if self._scans is None else scan_part(self._scans.state),
+            compare=None if self._compare is None else compare_part(self._compare.state),
+        )
+
+    def save(self) -> None:
+        """Write what changed."""
+        trouble = self.keeper.save()
+        if trouble:
+            self._window.toasts.tell("warning", trouble)
+
+    def start(self) -> None:
+        """Offer what a crash left behind, once; keep what is open from now on, until the window closes."""
+        session, trouble = self.keeper.left_behind()
+        if trouble:
+            self._window.toasts.tell("warning", trouble)
+        if session is not None:
+            self._window.toasts.offer(
+                f"The program did not end well last time. Then open: {', '.join(session.names)}.",
+                {"Open again": lambda: self.come_back(session)},
+            )
+        self._timer.start()
+        self._window.closed.connect(self._end)
+
+    def _end(self) -> None:
+        self._timer.stop()
+        self.keeper.end()
+
+    # Come back -------------------------------------------------------------------------------------
+
+    def come_back(self, session: Session) -> None:
+        """Open again what a session holds; what is gone is told."""
+        from app.controllers.session_parts import (
+            come_back_to_comparison,
+            come_back_to_result,
+            come_back_to_scan,
+        )
+
+        window = self._window
+        if session.results is not None:
+            window.page_of("results")
+            assert self._results is not None
+            if not session.results.path.exists():
+                window.open_path(session.results.path)
+            else:
+                come_back_to_result(session.results, self._results)
+        if session.scan is not None:
+            window.page_of("scan")
+            assert self._scans is not None
+            come_back_to_scan(session.scan, self._scans)
+        if session.compare is not None:
+            window.page_of("compare")
+            assert self._compare is not None
+            come_back_to_comparison(session.compare, self._compare)
+        window.open_page(session.page)
