@@ -2,7 +2,7 @@
 """Set dsl-scan up in a virtual environment and run it; needs only Python 3.11 to 3.13 and a network.
 
 python3 packaging/run.py demo [...]       a scan on the digital twin, from patterns to a report
-python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest
+python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest (-n 0: in one process)
 python3 packaging/run.py dsl-scan [...]   the command line of the project
 python3 packaging/run.py shell            a shell inside the environment
 python3 packaging/run.py lock             write packaging/constraints.txt anew (for maintainers)
@@ -55,6 +55,8 @@ CHECKS = (
     ("mypy", ("mypy",)),
     ("import contracts", ("lint-imports", "--no-cache")),
 )
+#: Tests of a file share what they prepare and stay together. More processes would want more memory than time.
+SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile")
 
 
 class SetupError(Exception):
@@ -260,7 +262,7 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
     """Run every check and the tests; the first exit code that is not zero is the answer."""
     variables = venv_variables(venv)
     results: list[tuple[str, int, float]] = []
-    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *arguments))):
+    for name, (program, *options) in (*CHECKS, ("pytest", ("pytest", *SHARED, *arguments))):
         start = time.monotonic()
         say(f"{name} ...")
         code, interrupted = run([str(venv_program(venv, program)), *options], variables, ROOT)
