@@ -76,13 +76,6 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "show_log", "Show lo&g", "View", "Ctrl+L", "Messages of the program, with a filter", separator=True
     ),
-    Action(
-        "cancel_jobs",
-        "&Cancel all work",
-        "Scan",
-        "Ctrl+.",
-        "Stop everything that runs, at the next safe point",
-    ),
     Action("calibrate_new", "&New campaign…", "Calibrate", "", "Begin a campaign of the rig at hand"),
     Action("calibrate_open", "&Open campaign…", "Calibrate", "", "Go on with a campaign that was begun"),
     *(
@@ -106,6 +99,13 @@ ACTIONS: tuple[Action, ...] = (
         "",
         "Run all calibrations in order on a rig that places targets itself",
         separator=True,
+    ),
+    Action(
+        "cancel_jobs",
+        "&Cancel all work",
+        "Scan",
+        "Ctrl+.",
+        "Stop everything that runs, at the next safe point",
     ),
     *(
         Action(f"view_{key}", text, "Results", str(i), tip, page="results")

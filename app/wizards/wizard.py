@@ -35,8 +35,7 @@ class CalibrationWizard(QDialog):
         self.setWindowTitle(f"Calibrate: {state.title}")
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint, True)
         self.setMinimumSize(SMALLEST)
-        room = parent.window().size()
-        self.resize(USUAL.boundedTo(QSize(room.width() - 40, room.height() - 40)).expandedTo(SMALLEST))
+        self.resize(_fitting(parent.window().size()))
         self.banner = Banner("Connect the rig again")
         self.banner.action.setToolTip("Open all devices of the rig anew and go on here")
         self.steps = StepList()
@@ -137,3 +136,10 @@ class CalibrationWizard(QDialog):
         """Take the colours of a theme."""
         for part in (self.steps, self.step, self.fit):
             part.apply_theme(theme)
+
+
+def _fitting(room: QSize) -> QSize:
+    """A size for a wizard over a window: most of it, its edges still seen."""
+    most = QSize(round(0.84 * room.width()), round(0.88 * room.height()))
+    inside = QSize(room.width() - 40, room.height() - 40)
+    return most.expandedTo(USUAL).boundedTo(inside).expandedTo(SMALLEST)
