@@ -16,6 +16,7 @@ from app.state.evented import Value
 from app.state.rig import RigChoice
 from app.state.wizard import Doing, Fit, WizardState
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
@@ -469,3 +470,36 @@ def test_another_devices_captures_do_not_pass(bench: CalibrateBench) -> None:
     assert [each.state for each in state.statuses.value] == ["refused", "refused"]
     assert "serial number was TWIN-C and is OTHER" in state.statuses.value[0].reason
     control.leave()
+
+
+def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    assert bench.control.library.must_be_placed
+    conditions = current_conditions(devices)
+    other = conditions.model_copy(
+        update={"projector": conditions.projector.model_copy(update={"mode": "6500 K"})}
+    )
+    bench.library.store("other", devices.calibration.model_copy(update={"conditions": other}))
+    bench.control.library.check("other")
+    assert "the projector's mode was 6500 K and is not named" in bench.told
+    assert bench.state.drift.value is None
+    bench.rig.disconnect()
+    bench.control.library.check("other")
+    assert "No rig is connected" in bench.told
+
+
+def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(tmp_path: Path) -> None:
+    choice = RigChoice("twin", (("scene", "plane"), ("size", "112x72")))
+    bench = make_bench(tmp_path, choice=choice)
+    bench.rig.connect(choice)
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    bench.library.store("own", devices.calibration)
+    bench.control.library.check("own")
+    verdict = bench.state.drift.value
+    assert verdict is not None, bench.told
+    assert {figure.name for figure in verdict.figures} >= {"row drift"}
+    assert "The rig is as own says." in bench.state.note.value
