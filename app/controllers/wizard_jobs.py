@@ -43,7 +43,6 @@ class WizardJobs:
         state.trouble.set("")
         state.can_reconnect.set(False)
         state.progress.set(Told())
-        state.doing.set(doing)
         job: Job[object] = Job(
             f"{state.title}: {title}",
             work,
@@ -52,7 +51,9 @@ class WizardJobs:
             lambda: self._over(self._stopped),
             exclusive=RIG if on_rig else "",
         )
+        # Known before anybody hears of it, who might want to leave at once.
         self._job = job
+        state.doing.set(doing)
         if on_rig:
             self._rig.run(job, lambda text: self._over(lambda: self._refused(text)))
         else:

@@ -456,6 +456,7 @@ def test_leaving_while_something_runs_waits_for_its_end(bench: CalibrateBench) -
     state.doing.changed.connect(leave)
     control.capture()
     assert left == [Doing.CAPTURING]
+    assert not (bench.campaign / "selftest" / "dim").exists(), "it was captured although the person had left"
     bench.wizard("selftest")
 
 
