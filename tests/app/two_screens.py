@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from tests.app.virtual_display import virtual_display
 
 PROJECTOR = "PROJECTOR"
 OPERATOR_AREA, PROJECTOR_AREA = "1280/340x800/210+0+0", "1280/300x720/170+1280+0"
@@ -20,22 +21,10 @@ def missing_programs() -> list[str]:
 @contextmanager
 def two_screens() -> Iterator[str]:
     """Start the display, yield its name like ``:7``, and stop it."""
-    read, write = os.pipe()
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "2560x800x24", "-nolisten", "tcp", "-noreset"],
-        pass_fds=(write,),
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(write)
-    try:
-        with os.fdopen(read) as pipe:
-            display = f":{pipe.readline().strip()}"
+    with virtual_display(2560, 800) as display:
         set_monitor(display, "OPERATOR", OPERATOR_AREA, "screen")
         plug(display)
         yield display
-    finally:
-        server.terminate()
-        server.wait(10)
 
 
 def set_monitor(display: str, name: str, area: str, output: str) -> None:

@@ -1,0 +1,81 @@
+"""The Calibrate page and its library."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from app.panels.calibrate_page import CalibratePage, DriftWindow
+from app.state.rig import RigChoice
+from dsl_core.io.campaign_folder import CampaignFolder
+from tests.screens.stage import CHART_RIG, Stage
+
+
+def rig_of(campaign: Path) -> RigChoice:
+    """The rig that a campaign was begun with."""
+    info = CampaignFolder.open(campaign).info
+    return RigChoice(info.rig, tuple(info.options.items()))
+
+
+def open_campaign(stage: Stage, material: Path, library: bool = False) -> CalibratePage:
+    """The page with a copy of a campaign and its rig."""
+    campaign = stage.copied(material)
+    stage.open(library=library, campaign=campaign)
+    stage.connect(rig_of(campaign))
+    page = stage.window.open_page("calibrate")
+    stage.idle()
+    assert isinstance(page, CalibratePage)
+    return page
+
+
+def empty(stage: Stage) -> None:
+    """No campaign yet, nothing in the library."""
+    stage.open()
+    page = stage.window.open_page("calibrate")
+    stage.shoot()
+    stage.connect()
+    assert isinstance(page, CalibratePage)
+    stage.shoot_question("new", page.head.ask_new)
+    page.head._commands.begin_campaign(stage.folder / "campaigns" / "room-12")
+    stage.idle()
+    stage.shoot("begun")
+
+
+def half(stage: Stage) -> None:
+    """Some accepted, one begun, the rest to come."""
+    open_campaign(stage, stage.material.half)
+    stage.shoot()
+
+
+def complete(stage: Stage) -> None:
+    """Everything accepted and kept in the library, in several versions."""
+    page = open_campaign(stage, stage.material.complete, library=True)
+    stage.shoot()
+    stage.press("Use for scans", page)
+    stage.shoot("in-use")
+
+
+def drift(stage: Stage) -> None:
+    """What a quick shot says of a calibration."""
+    page = open_campaign(stage, stage.material.complete, library=True)
+    stage.press("Check for drift…", page)
+    stage.dialog(DriftWindow)
+    stage.shoot()
+
+
+def foreign(stage: Stage) -> None:
+    """A campaign of another rig than the one that is connected."""
+    open_campaign(stage, stage.material.half)
+    stage.connect(replace(CHART_RIG, options=(("size", "64x48"),)))
+    stage.idle()
+    stage.shoot()
+
+
+SCENES: dict[str, Callable[[Stage], None]] = {
+    "calibrate-empty": empty,
+    "calibrate-half": half,
+    "calibrate-complete": complete,
+    "calibrate-drift": drift,
+    "calibrate-foreign": foreign,
+}

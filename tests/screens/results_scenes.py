@@ -1,0 +1,142 @@
+"""The Results page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtWidgets import QTabWidget
+
+from app.panels.export_dialog import ExportDialog
+from app.panels.results_page import ResultsPage
+from app.state.results import Quality, ResultsState, Seek, View
+from tests.screens.stage import Stage
+
+
+def opened(stage: Stage) -> tuple[ResultsPage, ResultsState]:
+    """The page with a result."""
+    result = stage.copied(stage.material.scans) / "chart.zarr"
+    stage.open()
+    stage.window.open_path(result)
+    page = stage.window.page_of("results")
+    assert isinstance(page, ResultsPage)
+    state = page._state
+    stage.wait(lambda: state.result.value is not None)
+    stage.idle()
+    return page, state
+
+
+def marked(stage: Stage) -> tuple[ResultsPage, ResultsState]:
+    """The page with pins, a region and a reference."""
+    page, state = opened(stage)
+    commands = page._commands
+    for pixel in ((40, 40), (60, 40), (80, 60)):
+        commands.point_at(pixel)
+        commands.marks.pin(pixel)
+    commands.marks.add_outline(((90.0, 35.0), (104.0, 35.0), (104.0, 47.0), (90.0, 47.0)))
+    stage.idle()
+    commands.marks.add_reference(write_reference(stage.folder / "spectroradiometer.csv", state))
+    stage.idle()
+    return page, state
+
+
+def write_reference(path: Path, state: ResultsState) -> Path:
+    """A spectrum near the first pin's, as a spectroradiometer's program writes it."""
+    spectrum = state.marks.value[0].spectrum
+    values = spectrum.mean + 0.01 * np.sin(spectrum.nm / 20)
+    rows = "\n".join(f"{nm:g},{value:.5f}" for nm, value in zip(spectrum.nm, values, strict=True))
+    path.write_text(f"nm,reflectance\n{rows}\n")
+    return path
+
+
+def nothing(stage: Stage) -> None:
+    """No result is open, at the first start and later."""
+    stage.open()
+    stage.window.open_page("results")
+    stage.shoot("first")
+    stage.window.parts.recent.add(stage.folder / "scans" / "gone.zarr")
+    stage.window.parts.recent.add(stage.material.scans / "chart.zarr")
+    stage.shoot("recent")
+    stage.window.open_path(stage.copied(stage.material.scans) / "unreconstructed.dsl")
+    stage.shoot("offer")
+
+
+def views(stage: Stage) -> None:
+    """The five views of a result."""
+    page, state = opened(stage)
+    page._commands.point_at((60, 40))
+    for view in View:
+        stage.window.do(view.value)
+        stage.shoot(view.value.removeprefix("view_"))
+    stage.window.do("view_quality")
+    for quality in Quality:
+        state.quality.set(quality)
+        stage.shoot(f"quality-{quality.name.lower().replace('_', '-')}")
+
+
+def marks(stage: Stage) -> None:
+    """Pins, a region and a reference with its figures; the same in 3D."""
+    page, state = marked(stage)
+    stage.shoot()
+    state.selected.set(state.marks.value[0].key)
+    stage.shoot("compared")
+    stage.window.do("view_cloud")
+    stage.shoot("cloud")
+    page.marks.remove_selected()
+    stage.shoot("undo")
+
+
+def light(stage: Stage) -> None:
+    """The colours under another light."""
+    page, _ = opened(stage)
+    page._commands.relight("A", False)
+    stage.idle()
+    stage.shoot()
+
+
+def graph(stage: Stage) -> None:
+    """What a pixel saw line by line."""
+    page, _ = opened(stage)
+    page._commands.point_at((60, 40))
+    stage.window.do("intensity_graph")
+    stage.wait(page.graph.isVisible)
+    stage.shoot()
+
+
+def search(stage: Stage) -> None:
+    """Where a spectrum occurs, and where only its colour does."""
+    page, state = marked(stage)
+    state.selected.set(state.marks.value[0].key)
+    tabs = page.findChild(QTabWidget)
+    assert tabs is not None
+    tabs.setCurrentWidget(page.search)
+    for seek in Seek:
+        page.search.what.setCurrentIndex(page.search.what.findData(seek))
+        stage.press("Look", page)
+        stage.idle()
+        stage.shoot(seek.name.lower())
+
+
+def export(stage: Stage) -> None:
+    """The export dialog, ready and with a target that exists."""
+    marked(stage)
+    stage.window.do("export")
+    dialog = stage.dialog(ExportDialog)
+    for box in dialog.formats.values():
+        box.setChecked(box.isEnabled())
+    stage.shoot()
+    (stage.folder / "scans" / "chart.ply").touch()
+    dialog.folder.setText(str(stage.folder / "scans"))
+    stage.shoot("taken")
+
+
+SCENES: dict[str, Callable[[Stage], None]] = {
+    "results-nothing": nothing,
+    "results-view": views,
+    "results-marks": marks,
+    "results-light": light,
+    "results-graph": graph,
+    "results-search": search,
+    "results-export": export,
+}

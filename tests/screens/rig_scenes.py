@@ -1,0 +1,50 @@
+"""The Rig page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.panels.rig_page import RigPage
+from app.state.rig import Link, RigChoice
+from tests.screens.stage import Stage
+
+
+def disconnected(stage: Stage) -> None:
+    """As it comes up before a rig answers."""
+    stage.open()
+    stage.shoot()
+
+
+def live(stage: Stage) -> None:
+    """Connected, with frames that come in while the projector shows a field."""
+    stage.open()
+    stage.connect()
+    stage.shoot("connected")
+    rig = stage.composition.rig(stage.window)
+    rig.show("white", 0.8)
+    rig.set_exposure(100.0)
+    stage.press("Start live view")
+    stage.wait(lambda: rig.frames_seen > 3)
+    page = stage.window.page_of("rig")
+    assert isinstance(page, RigPage)
+    stage.shoot("picture")
+    rig.set_exposure(1500.0)
+    count = rig.frames_seen
+    stage.wait(lambda: rig.frames_seen > count + 3)
+    stage.shoot("saturated")
+
+
+def refused(stage: Stage) -> None:
+    """A rig with options that make no sense."""
+    stage.open()
+    rig = stage.composition.rig(stage.window)
+    rig.connect(RigChoice("twin", (("scene", "chart"), ("size", "huge"))))
+    stage.wait(lambda: rig.state.link.value is Link.CLOSED)
+    stage.shoot()
+
+
+SCENES: dict[str, Callable[[Stage], None]] = {
+    "rig-disconnected": disconnected,
+    "rig-live": live,
+    "rig-refused": refused,
+}

@@ -1,0 +1,125 @@
+"""What belongs to no page: log, help, windows of text, toasts, tour, recovery, menus."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QMenu
+
+from app.actions import PAGES
+from app.controllers.session_keeper import SessionKeeper
+from app.state.session import ResultsPart, Session
+from app.widgets.tour import Tour
+from tests.screens.results_scenes import marked
+from tests.screens.stage import Stage
+
+
+def log(stage: Stage) -> None:
+    """The log below a page."""
+    stage.open()
+    stage.connect()
+    for level, text in (
+        (logging.INFO, "Connected the twin of GS3-U3-32S4C."),
+        (logging.WARNING, "Frame 17 arrived late and was taken again."),
+        (logging.ERROR, "The camera does not answer. Check its cable and power."),
+    ):
+        logging.getLogger("dsl_core.capture").log(level, text)
+    stage.window.do("show_log")
+    stage.shoot()
+    # The dock outlives the window in its settings only.
+    stage.window.do("show_log")
+
+
+def texts(stage: Stage) -> None:
+    """Windows that only show text."""
+    stage.open()
+    for page in PAGES:
+        stage.window.open_page(page.key)
+        stage.window.do("help_page")
+        stage.shoot(f"help-{page.key}")
+        _close(stage)
+    for key in ("shortcuts", "about", "show_command"):
+        stage.window.do(key)
+        stage.shoot(key.replace("_", "-"))
+        _close(stage)
+
+
+def _close(stage: Stage) -> None:
+    for dialog in stage.dialogs:
+        dialog.close()
+    stage.settle()
+
+
+def toasts(stage: Stage) -> None:
+    """Messages of all kinds, as many as there may be."""
+    stage.open()
+    tell = stage.window.toasts
+    tell.tell("info", "Written: chart.ply, chart.csv.")
+    tell.tell("warning", "The settings could not be saved: No space left on device.")
+    tell.tell("error", "The camera does not answer. Check its cable and power.", "Frame 17 of 129\nattempt 3")
+    tell.offer("New here? A tour of seven steps shows what is where.", {"Take the tour": lambda: None})
+    stage.shoot()
+
+
+def tour(stage: Stage) -> None:
+    """Every step of the tour."""
+    stage.open()
+    stage.connect()
+    stage.window.do("tour")
+    number = 0
+    while stage.window._tour is not None:
+        made = stage.window.findChild(Tour)
+        assert made is not None
+        number += 1
+        stage.idle()
+        stage.shoot(str(number))
+        made.next.click()
+
+
+def recovery(stage: Stage) -> None:
+    """After a crash: what was open is offered, and comes back."""
+    scans = stage.copied(stage.material.scans)
+    part = ResultsPart(path=scans / "chart.zarr", view="view_depth", cursor=(60, 40))
+    _crash(stage.folder / "home" / "sessions", Session(page="results", results=part))
+    stage.open()
+    stage.composition.session(stage.window).start()
+    stage.shoot()
+    stage.press("Open again")
+    stage.wait(lambda: stage.window.page == "results")
+    stage.idle()
+    stage.shoot("opened")
+
+
+def _crash(folder: Path, session: Session) -> None:
+    """Leave the session of a program behind that is no more."""
+    process = os.spawnlp(os.P_NOWAIT, "true", "true")
+    os.waitpid(process, 0)
+    keeper = SessionKeeper(folder, lambda: session, process)
+    keeper.touch()
+    assert not keeper.save()
+
+
+def menus(stage: Stage) -> None:
+    """Every menu, open over a result."""
+    marked(stage)
+    stage.window.parts.recent.add(stage.folder / "gone.zarr")
+    for action in stage.window.menuBar().actions():
+        menu = action.menu()
+        assert isinstance(menu, QMenu)
+        corner = stage.window.menuBar().actionGeometry(action).bottomLeft()
+        menu.popup(stage.window.menuBar().mapToGlobal(corner))
+        stage.shoot(action.text().replace("&", "").lower())
+        menu.close()
+
+
+SCENES: dict[str, Callable[[Stage], None]] = {
+    "shell-log": log,
+    "shell-text": texts,
+    "shell-toasts": toasts,
+    "shell-tour": tour,
+    "shell-recovery": recovery,
+    "shell-menu": menus,
+}

@@ -1,0 +1,139 @@
+"""Every wizard, on each kind of its pages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from app.panels.calibrate_page import CalibratePage
+from app.state.calibrate import ABOUT
+from app.state.wizard import Doing, WizardState
+from app.wizards.wizard import CalibrationWizard
+from dsl_core.io.campaign_folder import CampaignFolder
+from tests.cases.tiny_campaign import with_options
+from tests.screens.calibrate_scenes import open_campaign
+from tests.screens.stage import Stage
+
+
+class Wizard:
+    """A wizard that is open, and what a person does in it."""
+
+    def __init__(self, stage: Stage, name: str, campaign: Path) -> None:
+        self.stage = stage
+        page: CalibratePage = open_campaign(stage, campaign)
+        stage.click(page.rows[name].run)
+        self.window = stage.dialog(CalibrationWizard)
+        self.state: WizardState = self.window._state
+
+    def press(self, text: str) -> None:
+        """Press a button of the wizard."""
+        self.stage.press(text, self.window)
+
+    def idle(self) -> None:
+        """Wait until nothing goes on."""
+        self.stage.wait(lambda: self.state.doing.value is Doing.IDLE)
+
+    def go_to(self, page: int) -> None:
+        """Click a page in the list at the left."""
+        self.window.steps.setCurrentRow(page)
+        self.stage.wait(lambda: self.state.at.value == page)
+        self.idle()
+
+    def stop(self) -> None:
+        """Stop a capture or fit and wait for its end."""
+        if self.state.doing.value.is_long:
+            self.press("Stop")
+        self.idle()
+
+
+def calibrated(name: str, stage: Stage) -> None:
+    """A calibration that was accepted: its evidence, its settings, a look at a step, a capture anew."""
+    wizard = Wizard(stage, name, stage.material.complete)
+    wizard.idle()
+    stage.shoot("accepted")
+    wizard.go_to(0)
+    stage.shoot("settings")
+    wizard.go_to(1)
+    wizard.press("Check")
+    stage.wait(lambda: wizard.state.look.value is not None)
+    wizard.press("Check")
+    wizard.idle()
+    wizard.window._commands.take_news()
+    stage.shoot("look")
+    wizard.press("Redo this step")
+    stage.wait(lambda: wizard.state.progress.value.done > 0 or not wizard.state.doing.value.is_long)
+    stage.shoot("capture")
+    wizard.stop()
+
+
+def fresh(stage: Stage) -> None:
+    """The next calibration of a campaign: a step that was never captured, and a fit that lacks it."""
+    wizard = Wizard(stage, "spectralon", stage.material.half)
+    stage.shoot("place")
+    wizard.press("Capture all")
+    stage.wait(lambda: wizard.state.doing.value is Doing.CAPTURING)
+    stage.shoot("all")
+    stage.wait(lambda: wizard.state.fit.value is not None)
+    wizard.idle()
+    stage.shoot("judge")
+    wizard.press("Accept")
+    stage.wait(lambda: "The rig lies" in wizard.state.note.value)
+    stage.shoot("accepted")
+
+
+def lacking(stage: Stage) -> None:
+    """The page of the fit before everything is captured, and a setting that makes no sense."""
+    wizard = Wizard(stage, "spectralon", stage.material.half)
+    wizard.go_to(wizard.state.last)
+    stage.shoot("fit")
+    wizard.go_to(0)
+    key = wizard.state.settings.value[0].key
+    wizard.window._commands.change_settings({key: "many"})
+    wizard.idle()
+    stage.shoot("setting")
+
+
+def refused(stage: Stage) -> None:
+    """A target that is not there: the look says so, and so does the capture of all steps."""
+    campaign = stage.copied(stage.material.half)
+    with_options(campaign, {"target_missing": "on"})
+    _forget(campaign, "geometry")
+    wizard = Wizard(stage, "geometry", stage.material.half)
+    wizard.go_to(1)
+    wizard.window._commands.check(True)
+    stage.wait(lambda: wizard.state.look.value is not None)
+    wizard.press("Check")
+    wizard.idle()
+    wizard.window._commands.take_news()
+    stage.shoot("look")
+    wizard.press("Capture all")
+    stage.wait(lambda: wizard.state.trouble.value)
+    stage.shoot("capture")
+
+
+def _forget(campaign: Path, name: str) -> None:
+    """Take a calibration's captures away."""
+    folder = CampaignFolder.open(campaign)
+    for note in folder.home(name).rglob("*.json"):
+        note.unlink()
+    (campaign / f"{name}.json").unlink()
+
+
+def leaving(stage: Stage) -> None:
+    """The question before a capture is left."""
+    wizard = Wizard(stage, "geometry", stage.material.complete)
+    wizard.go_to(1)
+    wizard.press("Redo this step")
+    stage.wait(lambda: wizard.state.doing.value is Doing.CAPTURING)
+    stage.shoot_question("", lambda: wizard.press("Leave"))
+    wizard.stop()
+
+
+SCENES: dict[str, Callable[[Stage], None]] = {
+    **{f"wizard-{name}": partial(calibrated, name) for name in ABOUT},
+    "wizard-fresh": fresh,
+    "wizard-lacking": lacking,
+    "wizard-refused": refused,
+    "wizard-leaving": leaving,
+}
