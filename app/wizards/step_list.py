@@ -10,7 +10,7 @@ from app.theme import DARK, Theme
 from dsl_core.campaign.session import State, StepStatus
 
 _MARKS: dict[State, str] = {"missing": "○", "captured": "✓", "refused": "✗"}
-WIDTH_PX = 208
+WIDTH_PX = 250
 
 
 class StepList(QListWidget):

@@ -167,7 +167,7 @@ def test_a_calibration_by_keys_alone(stage: Stage) -> None:
     QTest.keyClick(wizard, Qt.Key.Key_A, Qt.KeyboardModifier.AltModifier)
     stage.wait(lambda: "The rig lies in" in state.note.value)
     QTest.keyClick(wizard, Qt.Key.Key_F1)
-    assert any(w.windowTitle() == "Help – Self-test" for w in wizard.findChildren(QWidget))
+    assert any(w.windowTitle().startswith("Help") for w in wizard.findChildren(QWidget))
     QTest.keyClick(wizard, Qt.Key.Key_Escape)
     stage.wait(lambda: stage.bench.row("selftest").state is RowState.GOOD)
 
