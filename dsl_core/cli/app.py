@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import calibrate, calibrations, demo, files, gui, results, scans
+from dsl_core.cli import calibrate, calibrations, demo, effects, files, gui, results, scans
 
 app = typer.Typer(
     name="dsl-scan",
@@ -19,6 +19,7 @@ for command in (
     demo.demo,
     scans.rigs,
     scans.scenes,
+    effects.effects,
     scans.plan,
     scans.scan,
     scans.resume,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import Json, parse_size
+from dsl_core.cli.options import Effects, Json, Tolerance, parse_size, with_effects
 from dsl_core.cli.output import Output
 from dsl_core.errors import Cancelled
 
@@ -31,6 +31,8 @@ def demo(
     scene: Annotated[
         str, typer.Option(help="A scene of the twin; 'dsl-scan scenes' lists them.")
     ] = "color-checker",
+    effects: Effects = None,
+    tolerance: Tolerance = None,
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the report in a browser.")] = False,
     json: Json = False,
 ) -> None:
@@ -39,7 +41,7 @@ def demo(
 
     output, timer = Output(json), StageTimer()
     width, height = parse_size("--size", size)
-    options = {"scene": scene, "size": f"{width}x{height}"}
+    options = with_effects({"scene": scene, "size": f"{width}x{height}"}, effects, tolerance)
     folder = _choose_folder(out, options)
     try:
         _capture(output, timer, folder, options)
@@ -66,7 +68,8 @@ def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
         if not folder.exists():
             return folder
         started = (folder / SCAN / MANIFEST_NAME).is_file() and not (folder / RESULT).exists()
-        if started and read_manifest(folder / SCAN).notes == rig_notes("twin", options):
+        wanted_notes = rig_notes("twin", options).items()
+        if started and wanted_notes <= read_manifest(folder / SCAN).notes.items():
             return folder
     raise AssertionError("numbers do not end")
 

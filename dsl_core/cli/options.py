@@ -23,6 +23,16 @@ RigName = Annotated[str, typer.Option("--rig", help="Name of a rig; 'dsl-scan ri
 RigOptions = Annotated[
     list[str], typer.Option("--option", "-o", help="Option of the rig as key=value; may be repeated.")
 ]
+Effects = Annotated[
+    str | None,
+    typer.Option(
+        "--effects", help="What the twin renders: auto, all, none, usual, or effects by name, with commas."
+    ),
+]
+Tolerance = Annotated[
+    str | None,
+    typer.Option("--tolerance", help="How far --effects auto may be from all, like 1DN or 0.5sigma."),
+]
 CalibrationName = Annotated[
     str | None,
     typer.Option("--calibration", help="A calibration: its name in the library, NAME@DATE, or a rig's file."),
@@ -121,6 +131,19 @@ def parse_options(texts: Sequence[str]) -> dict[str, str]:
             )
         options[key] = value
     return options
+
+
+def with_effects(options: dict[str, str], effects: str | None, tolerance: str | None) -> dict[str, str]:
+    """Options of a rig with those of effects; raises `DeviceError` where one is given both ways.
+
+    >>> with_effects({"scene": "box"}, "auto", None)
+    {'scene': 'box', 'effects': 'auto'}
+    """
+    given = {k: v for k, v in (("effects", effects), ("tolerance", tolerance)) if v is not None}
+    twice = [key for key in given if key in options]
+    if twice:
+        raise DeviceError(f"Give {twice[0]} as --{twice[0]} or as --option {twice[0]}=..., not both.")
+    return {**options, **given}
 
 
 def parse_bands(text: str) -> WavelengthGrid:

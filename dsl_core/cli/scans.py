@@ -12,6 +12,7 @@ from dsl_core.cli.options import (
     CalibrationName,
     Code,
     Comb,
+    Effects,
     Force,
     Json,
     Lines,
@@ -21,7 +22,9 @@ from dsl_core.cli.options import (
     RigName,
     RigOptions,
     Settings,
+    Tolerance,
     parse_options,
+    with_effects,
 )
 from dsl_core.cli.output import Output
 from dsl_core.errors import Cancelled, StoreError
@@ -99,6 +102,8 @@ def scan(
     setting: Settings = [],  # noqa: B006
     calibration: CalibrationName = None,
     override: OverrideCalibration = False,
+    effects: Effects = None,
+    tolerance: Tolerance = None,
     json: Json = False,
 ) -> None:
     """Capture a plan; every frame is safe on disk before the next is taken."""
@@ -107,7 +112,7 @@ def scan(
     from dsl_core.io.origin import rig_notes
     from dsl_core.io.session_manifest import MANIFEST_NAME
 
-    output, options = Output(json), parse_options(option)
+    output, options = Output(json), with_effects(parse_options(option), effects, tolerance)
     choice = PlanChoice(plan, code, lines, comb, setting).build()
     if (target / MANIFEST_NAME).exists():
         raise StoreError(

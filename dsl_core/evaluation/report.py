@@ -20,6 +20,7 @@ from dsl_core.evaluation.curves import (
 )
 from dsl_core.evaluation.pages import render_page
 from dsl_core.evaluation.pictures import Picture, colour_picture, flag_picture, value_picture
+from dsl_core.evaluation.rendered_effects import RenderedEffects
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.model.plan import CapturePlan
@@ -35,7 +36,8 @@ _SAMPLE_GRID = (4, 2)
 class ReportContent:
     """What a report is made of; everything but title and result may be absent.
 
-    ``pixels`` are (row, column) whose spectra are shown; ``provenance`` lists facts by name.
+    ``pixels`` are (row, column) whose spectra are shown; ``effects`` is what a twin rendered; ``provenance``
+    lists facts by name.
     """
 
     title: str
@@ -46,6 +48,7 @@ class ReportContent:
     verdicts: Sequence[Verdict] = ()
     costs: Sequence[StageCost] = ()
     plan: CapturePlan | None = None
+    effects: RenderedEffects | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
     pixels: Sequence[tuple[int, int]] = ()
 
@@ -75,6 +78,7 @@ def render_report(content: ReportContent) -> str:
         costs=content.costs,
         total_seconds=sum(cost.seconds for cost in content.costs),
         plan=_plan_facts(content.plan) if content.plan else {},
+        effects=content.effects,
         provenance=content.provenance,
     )
 

@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from dsl_core.evaluation.cost import StageCost
+from dsl_core.evaluation.rendered_effects import RenderedEffects
 from dsl_core.evaluation.report import ReportContent
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.evaluation.verdict import Goal, verdicts
@@ -27,6 +28,9 @@ def report_content(
     attributes = dict(result.attrs)
     costs = [StageCost(**cost) for cost in json.loads(attributes.pop("stage_costs", "[]"))]
     plan = attributes.pop("capture_plan", None)
+    effects = RenderedEffects.of_note(str(attributes.get("effects", "")))
+    if effects is not None:
+        del attributes["effects"]
     return ReportContent(
         title,
         result,
@@ -36,5 +40,6 @@ def report_content(
         verdicts=verdicts(evaluation, goals),
         costs=costs,
         plan=CapturePlan.model_validate_json(plan) if plan else None,
+        effects=effects,
         provenance={str(key).replace("_", " "): str(value) for key, value in attributes.items()},
     )

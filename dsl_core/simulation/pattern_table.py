@@ -88,7 +88,7 @@ def _lookup(table: Tensor, position: Tensor, offset: Tensor | None) -> Tensor:
     return torch.lerp(flat.index_select(0, index), flat.index_select(0, index + 1), p)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=12)
 def _spread(pixels: int, oversample: int, response: ProjectorResponse, halo: bool) -> Tensor:
     """Matrix from pixel radiances to blurred samples, shape (pixels * oversample, pixels)."""
     if not halo:

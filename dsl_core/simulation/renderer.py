@@ -37,6 +37,8 @@ from dsl_core.simulation.truth import Parts, SceneTruth
 ORDERS = (1, -1, 2, -2)
 THREADS = 2
 NM = np.arange(400.0, 701.0)
+#: Bands of white columns: start and stop (px), level 0..1.
+Runs = list[tuple[float, float, float]]
 
 
 class Slicing(NamedTuple):
@@ -212,16 +214,18 @@ class Renderer:
 
     def expected(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Signal (rows, columns), DN per ms, of drive levels (height, width, 3) or (height, width)."""
-        colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
-        out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
-        out.index_add_(0, self.pixels, self.of_parts(colour))
-        return out.reshape(self.shape).cpu().numpy()
+        return self._picture(self._light(as_colour(image)))
 
     def planes(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
         """Signal as a camera without a mosaic would see it, DN per ms, shape (3, rows, columns)."""
         if not self._colours:
             self._colours = tuple(self._of_colour(channel) for channel in range(3))
-        return np.stack([colour.expected(image) for colour in self._colours])
+        light = self._light(as_colour(image))
+        return np.stack([colour._picture(light) for colour in self._colours])
+
+    def of_parts(self, image: NDArray[np.uint8]) -> Tensor:
+        """Signal of every part, (parts,), DN per ms, of the same drive levels as `expected`."""
+        return self._signal(self._light(as_colour(image)))
 
     def _of_colour(self, channel: int) -> Renderer:
         """The same view, every pixel of which sees one colour; the geometry is shared."""
@@ -230,12 +234,21 @@ class Renderer:
         other._white, other._colours = None, ()
         return other
 
-    def of_parts(self, colour: NDArray[np.uint8]) -> Tensor:
-        """Signal (parts,), DN per ms, of drive levels (height, width, 3)."""
+    def _light(self, colour: NDArray[np.uint8]) -> Runs | PatternTable:
+        """A few bands of white, or any other pattern as a table."""
         runs = _white_runs(colour)
         most = MAX_RUNS if self.slicing is BROAD else MAX_RUNS_FILTERED
-        signal = self._any(colour) if runs is None or len(runs) > most else self._lines(runs)
-        return signal * self.shading
+        return self._table(colour) if runs is None or len(runs) > most else runs
+
+    def _signal(self, light: Runs | PatternTable) -> Tensor:
+        if isinstance(light, PatternTable):
+            return (self._sliced(light) + self._black()) * self.shading
+        return self._lines(light) * self.shading
+
+    def _picture(self, light: Runs | PatternTable) -> NDArray[np.float32]:
+        out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
+        out.index_add_(0, self.pixels, self._signal(light))
+        return out.reshape(self.shape).cpu().numpy()
 
     def _black(self) -> Tensor | float:
         """Light of a dark projector: its black level times the signal of white."""
@@ -251,7 +264,7 @@ class Renderer:
                 self._add_band(self._white, -0.5, w - 0.5, 1.0)
         return black * self._white
 
-    def _lines(self, runs: list[tuple[float, float, float]]) -> Tensor:
+    def _lines(self, runs: Runs) -> Tensor:
         signal = torch.zeros_like(self.column) + self._black()
         response = self.rig.projector_response
         for start, stop, level in runs:
@@ -288,14 +301,13 @@ class Renderer:
             at_edge.append(entry[:, 0] + (nm - whole) * entry[:, 1])
         signal.index_add_(0, pixels, (at_edge[1] - at_edge[0]).abs() * radiance)
 
-    def _any(self, colour: NDArray[np.uint8]) -> Tensor:
+    def _table(self, colour: NDArray[np.uint8]) -> PatternTable:
         response = self.rig.projector_response
         radiance = response.radiance(np.arange(256) / 255)[colour] - response.black_fraction
         grey = np.array_equal(colour[..., 0], colour[..., 1]) and np.array_equal(
             colour[..., 0], colour[..., 2]
         )
-        table = PatternTable.of(radiance[..., :1] if grey else radiance, self.response, self.device)
-        return self._sliced(table) + self._black()
+        return PatternTable.of(radiance[..., :1] if grey else radiance, self.response, self.device)
 
     def _sliced(self, table: PatternTable) -> Tensor:
         leds = [slice(0, 3)] if table.leds == 1 else [slice(i, i + 1) for i in range(3)]
@@ -339,6 +351,11 @@ class Renderer:
         return total
 
 
+def as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Drive levels (height, width, 3) of an image that may be grey."""
+    return image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
+
+
 def _horner(coefficients: Tensor, t: Tensor) -> tuple[Tensor, Tensor]:
     """Value and derivative of a polynomial with rising coefficients."""
     value, derivative = coefficients[-1].expand_as(t), torch.zeros_like(t)
@@ -360,7 +377,7 @@ def _row_limits(rows: Tensor, height: int) -> tuple[Tensor, Tensor]:
     return low, high
 
 
-def _white_runs(colour: NDArray[np.uint8]) -> list[tuple[float, float, float]] | None:
+def _white_runs(colour: NDArray[np.uint8]) -> Runs | None:
     """Lit bands of a grey, column-only image as (start px, stop px, level 0..1); None for other images."""
     line = colour[0]
     if not ((line == line[:, :1]).all() and (colour == line).all()):

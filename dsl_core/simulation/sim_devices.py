@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 import numpy as np
@@ -20,6 +21,8 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.bandpass_filters import measured_transmissions
+from dsl_core.simulation.effects.catalogue import USUAL_CHOICE, Choice
+from dsl_core.simulation.effects.planner import Tolerance, describe
 from dsl_core.simulation.placing import Mishaps, TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
@@ -171,6 +174,10 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``), ``realtime`` (``on`` waits as long as real
     devices would).
 
+    ``effects`` says what is rendered of all that light does: ``usual`` (the default, what the plain renderer
+    has), ``all``, ``none``, names, or ``auto``: what the scene calls for, within a ``tolerance`` (``1DN``,
+    ``0.5sigma``).
+
     For calibrations: ``truth`` (a number draws a rig around the published one, whose calibration nobody
     knows), ``led_cycle_hz`` (the LEDs flash in turn instead of shining steadily), ``ambient_dn_per_ms``. For
     mishaps: ``defocus_px``, ``brightness`` (the light is so many times as bright), ``wrong_filter_nm``,
@@ -211,6 +218,8 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
         noise=_switch("noise", rest.pop("noise", "on")),
         film=_switch("film", rest.pop("film", "on")),
         device=rest.pop("device", "cpu"),
+        effects=Choice.of(rest.pop("effects", "usual")),
+        tolerance=Tolerance.of(rest.pop("tolerance", "1DN")),
         ambient_dn_per_ms=_number("ambient_dn_per_ms", rest.pop("ambient_dn_per_ms", str(AMBIENT_DN_PER_MS))),
         led_cycle_ms=1000.0 / cycle_hz if cycle_hz else None,
         defocus_px=_number("defocus_px", rest.pop("defocus_px", "0")),
@@ -224,6 +233,8 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     devices = assemble(world)
     devices.nominal, devices.filters = nominal, measured_transmissions(drawn)
     devices.place = TwinHand(world, drawn, mishaps)
+    if world.effects != USUAL_CHOICE:
+        devices.notes["effects"] = json.dumps(describe(world.effect_plan(), world.effects.text))
     if truth is not None:
         devices.calibration = None
     return devices

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.led_cycle import led_weights
@@ -52,7 +53,9 @@ class World:
     only on the seed, on what stands where (``noise_key``), on the shot and the attempt, never on what was
     captured before, so that an interrupted scan continues bit for bit.
 
-    ``effects`` says what of all that happens is rendered, within a ``tolerance`` where the scene decides.
+    ``effects`` says what of all that happens is rendered. Where the scene decides, pictures differ from those
+    with everything by less than the ``tolerance``, for all patterns at the ``settings``; a brighter exposure
+    adds its own setting.
 
     With ``led_cycle_ms`` the projector flashes its LEDs one after the other, running freely on the world's
     clock; None is steady light. Light of a dark projector is taken as steady.
@@ -72,6 +75,7 @@ class World:
     device: str = "cpu"
     effects: Choice = USUAL_CHOICE
     tolerance: Tolerance = ONE_DN
+    settings: tuple[Setting, ...] = CapturePlan().settings
     clock: Clock = field(default_factory=Clock)
     image: NDArray[np.uint8] | None = None
     _scene: Scene | None = None
@@ -133,7 +137,7 @@ class World:
 
     def effect_plan(self) -> EffectPlan:
         """Which effects are rendered of the scene as it stands, and why."""
-        return plan_effects(self.everything(), self.tolerance, only=self.effects.names)
+        return plan_effects(self.everything(), self.tolerance, self.settings, self.effects.names)
 
     @property
     def path(self) -> LightPath:
@@ -201,8 +205,22 @@ class World:
             light += np.float32(weight) * (self._rendered(f"LED {led}", _only(led)) - dark)
         return light
 
+    def _allow_for(self, exposure_ms: float) -> None:
+        """Decide anew on effects for an exposure that brings more light than those allowed for."""
+        if self.effects.names is not None:
+            return
+        level = 0.0 if self.image is None else float(self.image.max()) / 255
+        radiance = self.rig.projector_response.radiance
+        brightest = max(s.exposure_ms * float(radiance(s.level)) for s in self.settings)
+        longest = max(s.exposure_ms for s in self.settings)
+        if exposure_ms > longest or exposure_ms * float(radiance(level)) > brightest:
+            more = Setting(exposure_ms=exposure_ms, level=max(level, 1 / 255))
+            self.settings = (*self.settings, more)
+            self._path, self._bare, self._renderer, self._rates = None, None, None, {}
+
     def expose(self, exposure_ms: float, shot: int, attempt: int = 0) -> NDArray[np.uint16]:
         """Raw mosaic of one exposure."""
+        self._allow_for(exposure_ms)
         rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt, *self._noise_key()]))
         jitter_ms = JITTER_MS * rng.random() if self.led_cycle_ms else 0.0
         signal = self._light(exposure_ms, jitter_ms) * np.float32(exposure_ms)

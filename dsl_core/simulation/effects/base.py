@@ -29,13 +29,14 @@ class Effect(ABC):
     """One thing that light or electronics do, which a scene may or may not call for.
 
     ``needed`` effects cannot be left out. ``ns_per_pixel`` is the CPU time of a frame on the machine of
-    `machine`.
+    `machine` that grows with the image, ``ms_per_frame`` what does not.
     """
 
     name: str
     summary: str
     needed: ClassVar[bool] = False
     ns_per_pixel: ClassVar[float] = 0.0
+    ms_per_frame: ClassVar[float] = 0.0
 
     @abstractmethod
     def parameters(self, path: LightPath) -> dict[str, str]:
@@ -54,8 +55,13 @@ class Effect(ABC):
         return False
 
     def cost_s(self, limits: Limits) -> float:
-        """Seconds of computing a frame that it takes, estimated for the size of the image."""
-        return 1e-9 * self.ns_per_pixel * limits.pixel_count * slowness()
+        """CPU seconds of a frame with a line that it takes, beside the rendering of further colours."""
+        seconds = 1e-9 * self.ns_per_pixel * self.pixels_concerned(limits) + 1e-3 * self.ms_per_frame
+        return seconds * slowness()
+
+    def pixels_concerned(self, limits: Limits) -> int:
+        """Pixels for which there is something to compute."""
+        return limits.pixel_count
 
 
 class ExtraEffect(Effect):

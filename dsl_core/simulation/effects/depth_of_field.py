@@ -13,6 +13,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.simulation.effects.base import EffectBound, ExtraEffect, with_response
 from dsl_core.simulation.effects.limits import SLACK, Limits
+from dsl_core.simulation.effects.machine import PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
 from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.truth import Parts
@@ -44,7 +45,7 @@ class DepthOfField(ExtraEffect):
 
     name = "depth-of-field"
     summary = "defocus of camera and projector away from the scene's median depth"
-    ns_per_pixel = 300.0
+    ns_per_pixel = 4.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""
@@ -108,9 +109,14 @@ class DepthOfField(ExtraEffect):
         return _CameraStage.of(self.blurs(path).camera_px)
 
     def cost_s(self, limits: Limits) -> float:
-        """More for more different blurs."""
-        levels = len(layers(self.blurs(limits.path).camera_px)[0])
-        return super().cost_s(limits) * levels
+        """That of pixels which are rendered with two blurs, and of blurring the picture."""
+        blurs = self.blurs(limits.path)
+        _, weights = layers(blurs.projector_px)
+        twice = sum(int((weight > 0).sum()) for weight in weights) - limits.pixel_count
+        pictures = len(layers(blurs.camera_px)[0])
+        colours = 3 if self.needs_colours(limits.path) else 1
+        ns = PLAIN_NS * twice + self.ns_per_pixel * pictures * limits.pixel_count
+        return 1e-9 * colours * ns * slowness()
 
 
 def _blur(depth_mm: Floats, scale: float) -> Floats:

@@ -22,7 +22,7 @@ class Glare(ExtraEffect):
 
     name = "glare"
     summary = "veiling glare of the camera's lens"
-    ns_per_pixel = 2.0
+    ns_per_pixel = 10.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""

@@ -36,7 +36,7 @@ class Interreflection(ExtraEffect):
 
     name = "interreflection"
     summary = "light that surfaces send each other"
-    ns_per_pixel = 400.0
+    ns_per_pixel, ms_per_frame = 25.0, 10.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""
@@ -171,8 +171,7 @@ class _InterreflectionStage:
 
     def apply(self, signal: Signal, image: Image) -> Signal:
         """See `Stage`."""
-        colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
-        arrives = self.samples.of_parts(colour).cpu().numpy().astype(np.float64)
+        arrives = self.samples.of_parts(image).cpu().numpy().astype(np.float64)
         light = self.exchange.solve(arrives.reshape(-1, _BANDS))
         shape = self.path.truth.depth_mm.shape
         if len(signal) == 1:

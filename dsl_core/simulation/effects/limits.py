@@ -77,7 +77,8 @@ class Limits:
     @cached_property
     def table(self) -> Floats:
         """Brightest colour of every material at unit shading, DN per ms, (materials,)."""
-        return self.from_orders(self.path.truth.materials.at(NM), self.path.orders).max(1)
+        signal = self.from_orders(self.path.truth.materials.at(NM), self.path.orders)
+        return np.asarray(signal.max(1), np.float64)
 
     @cached_property
     def brightest(self) -> float:

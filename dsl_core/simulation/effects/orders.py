@@ -43,7 +43,7 @@ class SecondOrders(Effect):
 
     name = "second-orders"
     summary = "second orders of the film"
-    ns_per_pixel = 20.0
+    ns_per_pixel = 12.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""

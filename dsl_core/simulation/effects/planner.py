@@ -9,13 +9,10 @@ from dataclasses import dataclass
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.simulation.effects.base import Effect, EffectBound
-from dsl_core.simulation.effects.catalogue import EFFECTS
+from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
 from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.machine import slowness
+from dsl_core.simulation.effects.machine import PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import LightPath
-
-#: CPU time of a pixel of the plain renderer in one colour, on the machine of `machine`.
-PLAIN_NS_PER_PIXEL = 60.0
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class EffectPlan:
-    """A decision on every effect; what is left out changes no pixel by the tolerance or more."""
+    """A decision on every effect; what is left out changes no pixel by the tolerance or more.
+
+    ``colour_s`` is what the plain renderer takes for a frame with a line in one colour.
+    """
 
     tolerance: Tolerance
     decisions: tuple[Decision, ...]
@@ -90,15 +90,41 @@ class EffectPlan:
         return sum(self.tolerance.of_bound(decision.bound) for decision in self.left_out)
 
     def frame_s(self, names: Collection[str]) -> float:
-        """Seconds of computing a frame with some effects."""
-        chosen = [d for d in self.decisions if d.effect.name in names]
-        colours = 3 if any(d.colours for d in chosen) else 1
-        return colours * self.colour_s + sum(d.cost_s for d in chosen)
+        """CPU seconds of a frame with a line and some effects."""
+        chosen = [decision for decision in self.decisions if decision.effect.name in names]
+        colours = 3 if any(decision.colours for decision in chosen) else 1
+        usual = sum(d.cost_s for d in self.decisions if d.effect.name in USUAL)
+        plain = self.colour_s - usual + sum(d.cost_s for d in chosen if d.effect.name in USUAL)
+        return colours * plain + sum(d.cost_s for d in chosen if d.effect.name not in USUAL)
 
     @property
     def seconds(self) -> tuple[float, float]:
-        """Seconds of a frame with what is rendered, and with everything."""
+        """CPU seconds of a frame with what is rendered, and with everything."""
         return self.frame_s(self.names), self.frame_s([d.effect.name for d in self.decisions])
+
+
+def describe(plan: EffectPlan, choice: str) -> dict[str, object]:
+    """The plan as plain values, for files and other programs; seconds are of computing a frame."""
+    rendered_s, all_s = plan.seconds
+    return {
+        "choice": choice,
+        "tolerance": str(plan.tolerance),
+        "left_out_bound": plan.left_out_bound,
+        "frame_s": rendered_s,
+        "frame_with_all_s": all_s,
+        "effects": [
+            {
+                "name": d.effect.name,
+                "what": d.effect.summary,
+                "on": d.on,
+                "bound_dn": d.bound.dn,
+                "bound_sigmas": d.bound.sigmas,
+                "cost_s": d.cost_s,
+                "why": d.why,
+            }
+            for d in plan.decisions
+        ],
+    }
 
 
 def plan_effects(
@@ -125,7 +151,7 @@ def plan_effects(
         )
         for effect in EFFECTS
     )
-    return EffectPlan(tolerance, decisions, 1e-9 * PLAIN_NS_PER_PIXEL * limits.pixel_count * slowness())
+    return EffectPlan(tolerance, decisions, 1e-9 * PLAIN_NS * limits.pixel_count * slowness())
 
 
 def _weighed(
@@ -143,12 +169,11 @@ def _weighed(
         elif spent + most < tolerance.value:
             spent += most
             reasons[effect.name] = (
-                False, _sentence(f"{bound.reason}, which is {most:.2g} of the {tolerance} allowed"),
+                False, _sentence(f"{bound.reason}; that is at most {most:.2g} of the {tolerance} allowed"),
             )  # fmt: skip
         else:
             over = "alone" if most >= tolerance.value else "with what is left out already"
-            why = f"{bound.reason}, up to {most:.3g} {tolerance.unit}: {over} more than {tolerance}"
-            reasons[effect.name] = (True, _sentence(why))
+            reasons[effect.name] = (True, _sentence(f"{bound.reason}; {over} more than {tolerance}"))
     return reasons
 
 

@@ -30,7 +30,7 @@ class Specular(ExtraEffect):
 
     name = "specular"
     summary = "highlights of glossy surfaces"
-    ns_per_pixel = 60.0
+    ns_per_pixel = 45.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""
@@ -55,6 +55,11 @@ class Specular(ExtraEffect):
         shading = surface_shading(path.rig, path.truth, path.shaded).ravel()[pixel]
         light = np.bincount(pixel, shading * share * white, limits.pixel_count)
         return np.asarray(light, np.float64)
+
+    def pixels_concerned(self, limits: Limits) -> int:
+        """Those of glossy materials."""
+        glossy = list(glossy_materials(limits.path.truth.materials))
+        return int(np.isin(limits.path.truth.material, glossy).sum())
 
     def stage(self, path: LightPath) -> Stage:
         """See `ExtraEffect`."""

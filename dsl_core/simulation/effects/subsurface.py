@@ -31,7 +31,7 @@ class Subsurface(ExtraEffect):
 
     name = "subsurface"
     summary = "light that wanders in translucent materials"
-    ns_per_pixel = 200.0
+    ns_per_pixel = 110.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""
@@ -53,6 +53,11 @@ class Subsurface(ExtraEffect):
     def needs_colours(self, path: LightPath) -> bool:
         """Where there is anything translucent."""
         return bool(_spreads_px(path))
+
+    def pixels_concerned(self, limits: Limits) -> int:
+        """Those of translucent materials."""
+        clear = list(translucent(limits.path.truth.materials))
+        return int(np.isin(limits.path.truth.material, clear).sum())
 
     def stage(self, path: LightPath) -> Stage:
         """See `ExtraEffect`."""
