@@ -3,26 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import replace
+from typing import ClassVar
 
+from dsl_core.simulation.effects.bound import EffectBound
+from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.machine import slowness
 from dsl_core.simulation.effects.path import LightPath, Stage
-
-if TYPE_CHECKING:
-    from dsl_core.simulation.effects.limits import Limits
-
-
-@dataclass(frozen=True)
-class EffectBound:
-    """The most that an effect changes in any pixel of any picture of a plan, and what decides it.
-
-    ``dn`` in counts, ``sigmas`` in standard deviations of the darkest pixel's noise.
-    """
-
-    dn: float
-    sigmas: float
-    reason: str
 
 
 class Effect(ABC):

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.effects.base import EffectBound, ExtraEffect, with_response
+from dsl_core.simulation.effects.base import ExtraEffect, with_response
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.machine import PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View

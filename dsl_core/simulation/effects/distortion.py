@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dsl_core.model.geometry import Lens
-from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.base import Effect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath
 

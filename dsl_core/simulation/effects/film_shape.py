@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.base import Effect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.orders import FIRST, SECOND
 from dsl_core.simulation.effects.path import LightPath

@@ -12,7 +12,8 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
-from dsl_core.simulation.effects.base import EffectBound, ExtraEffect
+from dsl_core.simulation.effects.base import ExtraEffect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.patches import Patches
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,19 +16,36 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.optics.spectra import chain_response
-from dsl_core.simulation.effects.base import EffectBound
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.path import LightPath
 from dsl_core.simulation.renderer import NM
 from dsl_core.simulation.surface_light import surface_shading
 
-if TYPE_CHECKING:
-    from dsl_core.simulation.effects.glare import Glare
-    from dsl_core.simulation.effects.interreflection import Interreflection
-    from dsl_core.simulation.effects.specular import Specular
-
 Floats = NDArray[np.float64]
 #: For what the renderer's tables add by rounding and interpolation.
 SLACK = 1.02
+
+
+class AddsLight(Protocol):
+    """An effect that adds light to what pixels get from the projector."""
+
+    def most(self, limits: Limits) -> Floats:
+        """The most light that it adds, DN per ms, (rows * columns,)."""
+
+
+class Exchanges(AddsLight, Protocol):
+    """One that adds light from other surfaces."""
+
+    def amplification(self, path: LightPath) -> float:
+        """Light that a place gets from others when all are lit evenly, relative to that light."""
+
+
+class Spreads(Protocol):
+    """One that gives every pixel a share of the mean light."""
+
+    @property
+    def share(self) -> float:
+        """That share."""
 
 
 class Limits:
@@ -103,26 +120,26 @@ class Limits:
         effect = self.path.extra("interreflection")
         if effect is None:
             return np.zeros(self.pixel_count)
-        return cast("Interreflection", effect).most(self)
+        return cast(AddsLight, effect).most(self)
 
     @cached_property
     def amplification(self) -> float:
         """Factor by which reflections among surfaces and glare raise the largest change of direct light."""
         effect = self.path.extra("interreflection")
-        bounced = 0.0 if effect is None else cast("Interreflection", effect).amplification(self.path)
+        bounced = 0.0 if effect is None else cast(Exchanges, effect).amplification(self.path)
         return (1 + bounced) * (1 + self.glare)
 
     @cached_property
     def specular(self) -> Floats:
         """Light of highlights, DN per ms, (rows * columns,)."""
         effect = self.path.extra("specular")
-        return np.zeros(self.pixel_count) if effect is None else cast("Specular", effect).most(self)
+        return np.zeros(self.pixel_count) if effect is None else cast(AddsLight, effect).most(self)
 
     @property
     def glare(self) -> float:
         """Share of the mean light that every pixel gets."""
         effect = self.path.extra("glare")
-        return 0.0 if effect is None else cast("Glare", effect).share
+        return 0.0 if effect is None else cast(Spreads, effect).share
 
     @cached_property
     def total(self) -> Floats:

@@ -8,7 +8,8 @@ import numpy as np
 import torch
 
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.base import Effect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath
 from dsl_core.simulation.renderer import NM

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, Setting
-from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.base import Effect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.machine import PLAIN_NS, slowness

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dsl_core.simulation.effects.base import Effect, EffectBound, with_sensor
+from dsl_core.simulation.effects.base import Effect, with_sensor
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath
 

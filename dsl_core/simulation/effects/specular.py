@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.effects.base import EffectBound, ExtraEffect
+from dsl_core.simulation.effects.base import ExtraEffect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
 from dsl_core.simulation.finish import Finish

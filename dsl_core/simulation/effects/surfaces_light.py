@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from dsl_core.optics.flat_field import relative_gain
-from dsl_core.simulation.effects.base import Effect, EffectBound
+from dsl_core.simulation.effects.base import Effect
+from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.path import LightPath
 from dsl_core.simulation.surface_light import surface_shading
