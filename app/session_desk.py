@@ -93,7 +93,7 @@ class SessionDesk(QObject):
             self._window.toasts.tell("warning", trouble)
         if session is not None:
             self._window.toasts.offer(
-                f"The program did not end well last time. Then open: {', '.join(session.names)}.",
+                f"The program did not end well last time. This was open: {', '.join(session.names)}.",
                 {"Open again": lambda: self.come_back(session)},
             )
         self._timer.start()

@@ -101,6 +101,8 @@ QFrame[role="toast"][level="warning"] {{ border-left-color: {t.warn}; }}
 QFrame[role="toast"][level="error"] {{ border-left-color: {t.bad}; }}
 QFrame[role="banner"] {{ background: {t.bad}; border: none; }}
 QFrame[role="banner"] QLabel {{ color: {t.base}; font-weight: 600; }}
+QAbstractSpinBox {{ min-height: 18px; }}
+QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 QTableView {{ gridline-color: {t.line}; }}
 QHeaderView::section {{ background: {t.window}; color: {t.muted}; border: none;
   border-bottom: 1px solid {t.line}; padding: 4px 6px; }}

@@ -114,10 +114,10 @@ class CampaignController:
         if facts is None:
             return ""
         if devices is not None and not self._fits(facts):
-            mine, known = self._rig.state.choice.value.command, facts.rig.command
+            mine, known = self._rig.state.choice.value.words, facts.rig.words
             return (
-                f"This campaign was begun with {known}, but {mine} is connected. Connect the campaign's rig,"
-                " or open another campaign."
+                f"This campaign was begun with the rig {known}, but {mine} is connected. Connect the"
+                " campaign's rig, or open another campaign."
             )
         return NO_RIG if devices is None else ""
 

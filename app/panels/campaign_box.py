@@ -149,7 +149,7 @@ class CampaignBox(QFrame):
 
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""
-        dialog = NewCampaignDialog(self._home, self._rig.choice.value.command, self)
+        dialog = NewCampaignDialog(self._home, self._rig.choice.value.words, self)
         before = self._state.campaign.value
         if dialog.exec() != QDialog.DialogCode.Accepted:
             return False
@@ -171,8 +171,7 @@ class CampaignBox(QFrame):
             self._name.setText(facts.path.name)
             # Zero-width spaces let long paths break at their slashes.
             place = str(facts.path.parent).replace("/", "/" + chr(0x200B))
-            options = ", ".join(f"{key} {value}" for key, value in facts.rig.options)
-            self._where.setText(f"in {place}  ·  rig {facts.rig.name}" + (f", {options}" if options else ""))
+            self._where.setText(f"in {place}  ·  rig {facts.rig.words}")
         self._show_work()
 
     def _show_work(self) -> None:

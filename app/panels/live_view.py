@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF
+from PySide6.QtCore import QPointF, Qt
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from app.theme import Theme
@@ -19,6 +19,8 @@ from dsl_core.model.frames import Frame
 FIGURES_S = 0.25
 #: Share of saturated pixels that deserves a warning (as peers have it).
 MANY_SATURATED = 0.005
+NO_RIG = "No picture yet. Connect a rig and start the live view."
+NO_PICTURE = "No picture yet. Start the live view."
 _CHANNELS = ("R", "G", "B")
 _COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
 
@@ -52,29 +54,37 @@ class LiveView(QWidget):
         self._histogram.setMenuEnabled(False)
         self._histogram.setAccessibleName("Histogram of raw counts")
         self._histogram.setLabel("bottom", "raw counts, DN")
+        # Room for half of the outermost numbers of the axes.
+        self._histogram.getPlotItem().setContentsMargins(0, 8, 14, 0)
+        self._histogram.setXRange(0, 4096, padding=0)
         self._curves = [self._histogram.plot(pen=pg.mkPen(colour, width=1)) for colour in _COLOURS]
         self._rate = label("", "muted")
         self._saturated = label("")
+        self._saturated.setWordWrap(True)
         self._focus = label("", "muted")
         self._pixel = label("Move over the picture to read raw counts.", "muted")
-        self._empty = label(
-            "No picture yet. Connect a rig and start the live view.", "muted", self.view.viewport()
-        )
-        self._empty.move(16, 12)
+        self._empty = label(NO_RIG, "muted")
+        self._empty.setWordWrap(True)
         self._lay_out()
 
     def _lay_out(self) -> None:
+        over = QVBoxLayout(self.view.viewport())
+        over.setContentsMargins(16, 12, 16, 12)
+        over.addWidget(self._empty, 0, Qt.AlignmentFlag.AlignTop)
+        figures = QHBoxLayout()
+        figures.setSpacing(16)
+        figures.addWidget(self._saturated, 1)
+        for figure in (self._focus, self._rate):
+            figures.addWidget(figure, 0, Qt.AlignmentFlag.AlignTop)
         switches = QHBoxLayout()
         for box in (self.saturation, self.logarithmic):
             switches.addWidget(box)
         switches.addStretch(1)
-        for figure in (self._saturated, self._focus, self._rate):
-            switches.addWidget(figure)
-            switches.addSpacing(12)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.view, 1)
         column.addWidget(self._pixel)
+        column.addLayout(figures)
         column.addLayout(switches)
         column.addWidget(self._histogram)
 
@@ -82,7 +92,10 @@ class LiveView(QWidget):
         """Show frames of this camera from now on."""
         self._camera, self._frame, self._times = camera, None, []
         self._item.clear()
+        self._empty.setText(NO_RIG if camera is None else NO_PICTURE)
         self._empty.setVisible(True)
+        for figure in (self._saturated, self._focus, self._rate):
+            figure.clear()
         if camera is not None:
             self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
 

@@ -155,7 +155,9 @@ class OperatingCurve(QWidget):
 
     def _name(self, key: str, spots: dict[str, tuple[float, float]]) -> None:
         colour = self._theme.text if key == self._current else self._theme.muted
-        text = pg.TextItem(TITLES[key], color=colour, anchor=(0.5, 1.25))
+        # A name near the left edge must not leave the plot.
+        share = spots[key][0] / max(x for x, _ in spots.values())
+        text = pg.TextItem(TITLES[key], color=colour, anchor=(min(3 * share, 0.5), 1.25))
         text.setPos(*spots[key])
         self.plot.addItem(text, ignoreBounds=True)
         self._labels[key] = text

@@ -20,7 +20,7 @@ from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
 
 #: How fast a looped line moves, ms a step.
 LOOP_MS = 120
-NO_SCREEN = "none: the rig's own projector"
+NO_SCREEN = "The rig's own"
 
 
 class ProjectorPanel(QGroupBox):
@@ -33,6 +33,8 @@ class ProjectorPanel(QGroupBox):
     def __init__(self) -> None:
         super().__init__("Projector")
         self._screen = ChoiceBox("Projector screen", "The screen that the projector is; never this one")
+        # Names of screens are longer than the box.
+        self._screen.view().setMinimumWidth(260)
         self._identify = QPushButton("Identify screens")
         self._identify.setToolTip("Show each screen's name on it for three seconds")
         self._kind = ChoiceBox("Picture", "What the projector shows")

@@ -207,10 +207,8 @@ class RunBox(QGroupBox):
         for widget in (self._what, self._time):
             widget.setVisible(status.total > 0)
         self._what.setText(f"{status.done} of {status.total} frames stored")
-        parts = [f"{describe_seconds(status.elapsed_s)} so far"]
-        if not status.state.is_final:
-            parts.append(f"{describe_seconds(status.remaining_s)} left")
-        self._time.setText(", ".join(parts))
+        spent, left = describe_seconds(status.elapsed_s), describe_seconds(status.remaining_s)
+        self._time.setText(f"took {spent}" if status.state.is_final else f"{spent} so far, {left} left")
 
 
 def _minutes(seconds: float) -> str:

@@ -32,6 +32,11 @@ class RigChoice:
         parts = [f"--rig {self.name}", *(f"--option {key}={value}" for key, value in self.options)]
         return " ".join(parts)
 
+    @property
+    def words(self) -> str:
+        """How people read it, such as ``twin, scene plane``."""
+        return ", ".join((self.name, *(f"{key} {value}" for key, value in self.options)))
+
 
 class RigState:
     """Values that the rig's controller sets and pages follow.

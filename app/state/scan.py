@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from app.state.evented import Event, Value
 from dsl_core.capture.growth import IntensityGraph
 from dsl_core.capture.status import State, Status
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.presets import PRESETS, Preset, on_cycles
 
 
@@ -121,6 +123,15 @@ def preset_of(plan: CapturePlan, period_ms: float) -> Preset | None:
     """The preset that a plan is, on a projector of this frame period."""
     for preset in PRESETS:
         wanted = on_cycles(preset.plan, period_ms)
-        if (plan.code, plan.spectral, plan.settings) == (wanted.code, wanted.spectral, wanted.settings):
+        same_patterns = (plan.code, plan.spectral) == (wanted.code, wanted.spectral)
+        if same_patterns and same_settings(plan.settings, wanted.settings):
             return preset
     return None
+
+
+def same_settings(first: Sequence[Setting], second: Sequence[Setting]) -> bool:
+    """Whether settings are the same but for the rounding of whole cycles."""
+    return len(first) == len(second) and all(
+        a.level == b.level and math.isclose(a.exposure_ms, b.exposure_ms, rel_tol=1e-9)
+        for a, b in zip(first, second, strict=True)
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
@@ -13,6 +14,8 @@ from dsl_core.model.figure import Figure
 
 _COLUMNS = ("", "Figure", "Value", "Wanted", "What to do")
 _MARK_PX = 26
+#: A hyphen that is the sign of a number, as in ``order -1``.
+_SIGN = re.compile(r"(?<!\w)-(?=\d)")
 
 
 class FiguresTable(QTableWidget):
@@ -64,7 +67,7 @@ class FiguresTable(QTableWidget):
         )
         return (
             first,
-            _item(figure.name, theme.text),
+            _item(_SIGN.sub("−", figure.name), theme.text),
             _item(value_words(figure), colour if not figure.passed else theme.text),
             _item(figure.limits.replace("-", "−"), theme.muted),
             _item(advice, theme.text),

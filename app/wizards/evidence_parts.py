@@ -61,6 +61,10 @@ class ChartBox(QWidget):
         column.addWidget(self.legend)
         column.addLayout(self._stack, 1)
 
+    def hasHeightForWidth(self) -> bool:
+        """Boxes side by side and below each other share the room alike, however long their legends are."""
+        return False
+
     def begin(self) -> None:
         """Forget what was drawn and show the plot."""
         self.item.clear()

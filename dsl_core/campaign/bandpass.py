@@ -51,8 +51,8 @@ class BandpassRecipe:
 
     ``filters_nm`` are nominal centres; ``line_px`` is width and step of the lines through a filter, which
     must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for noisy cameras;
-    ``pixels`` is how many of the camera's are used; ``depth_mm`` is where the target stands;
-    ``reflectance`` is the target's.
+    ``pixels`` is how many pixels of the camera are used; ``depth_mm`` is how far away the target stands;
+    ``reflectance`` is that of the target.
     """
 
     filters_nm: tuple[float, ...] = FILTERS_NM

@@ -46,8 +46,8 @@ class ColorCheckerRecipe:
     """The calibration with a classic Color Checker of 24 patches.
 
     ``chart`` names the table of reflectances in colour-science; ``corners_px`` are column and row of the four
-    outer corners of the patches, in cyclic order from any, where the chart is not found by itself; the
-    chart stands at ``depth_mm``.
+    outer corners of the patches, in cyclic order from any, where the chart is not found by itself;
+    ``depth_mm`` is how far away it stands.
     """
 
     chart: str = "BabelColor Average"

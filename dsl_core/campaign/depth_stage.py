@@ -48,11 +48,12 @@ class StageNote(Record):
 class DepthStageRecipe:
     """The calibration with a plane on a stage.
 
-    ``positions_mm`` are those of the stage, ``stage_std_mm`` how well it keeps them; ``filters_nm`` are
-    nominal centres of bandpass filters. ``code_step_px`` is the step of the lines without filter, at most 5;
-    ``filter_step_px`` that of the lines through filters, which may lie far apart. ``reflectance`` is the
-    target's; ``chain`` corrects the product of response, emission and efficiency by it; ``grid``
-    adds the data-driven model of the seed, which needs three positions.
+    ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the deviation with which it keeps
+    them; ``filters_nm`` are nominal centres of bandpass filters. ``code_step_px`` is the step of the lines
+    without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may lie far
+    apart. ``reflectance`` is that of the target; ``chain`` lets the plane correct the product of response,
+    emission and efficiency; ``grid`` adds a model of the columns that is drawn from the data, which needs
+    three positions.
     """
 
     positions_mm: tuple[float, ...] = (600.0, 750.0, 900.0)

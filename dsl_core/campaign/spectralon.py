@@ -35,8 +35,8 @@ class SpectralonRecipe:
 
     ``reflectance`` is its certified reflectance, or ``reflectance_file`` a text file of it over wavelength.
     ``readings`` is how often the spectroradiometer reads each picture; ``emission_folder`` holds text files
-    ``red*``, ``green*``, ``blue*``, ``white*``, ``black*`` of an instrument that is not connected. The
-    target stands at ``depth_mm``.
+    ``red*``, ``green*``, ``blue*``, ``white*``, ``black*`` of an instrument that is not connected.
+    ``depth_mm`` is how far away the target stands.
     """
 
     reflectance: float = 0.99

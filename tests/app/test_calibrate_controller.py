@@ -359,7 +359,7 @@ def test_wrong_folders_and_other_rigs_are_named(bench: CalibrateBench, tmp_path:
     assert "neither empty nor a campaign" in bench.told
     bench.rig.connect(RigChoice("twin", (("scene", "plane"), ("size", "48x32"))))
     assert is_on(bench.state.foreign)
-    assert "begun with --rig twin --option scene=plane --option size=32x24" in bench.state.trouble.value
+    assert "begun with the rig twin, scene plane, size 32x24" in bench.state.trouble.value
     bench.control.run("selftest")
     assert "another campaign" in bench.told
     bench.control.connect_rig()
