@@ -64,7 +64,7 @@ class Stage:
         self.windows[-1].open()
 
     def wait(self, until: Callable[[], bool]) -> None:
-        self.qtbot.waitUntil(until, timeout=20_000)
+        self.qtbot.waitUntil(until, timeout=60_000)
 
     def idle(self) -> None:
         self.wait(lambda: self.runner.active == ())
