@@ -40,16 +40,18 @@ if TYPE_CHECKING:
 class Options:
     """How to reconstruct: bands, correspondence (auto, grating, hybrid, grid), refinement, torch device.
 
-    ``surface_window_px`` is the window of normals; None takes it from the image's width, which is wrong for a
-    piece cut out of a larger image.
+    ``solver`` is ``best`` or, to compare with it, ``published`` (Adam on the published objective),
+    ``nearest-line`` or ``colour-basis``. ``surface_window_px`` is the window of normals; None takes it from
+    the image's width, which is wrong for a piece cut out of a larger image.
     """
 
     grid: WavelengthGrid = field(default_factory=WavelengthGrid)
     correspondence: str = "auto"
     refine_columns: bool = True
-    surface_window_px: int | None = None
     spectra: bool = True
     device: str = "cpu"
+    surface_window_px: int | None = None
+    solver: str = "best"
 
 
 def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
@@ -137,12 +139,11 @@ def reconstruct(
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
     from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.optics.correspondence import correspondence
     from dsl_core.reconstruction.geometry import reconstruct_geometry
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
     from dsl_core.reconstruction.sanity import require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
-    from dsl_core.reconstruction.spectra import SpectralReconstruction
+    from dsl_core.reconstruction.solvers import solve_spectra
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
     plan = check_source(source, rig)
@@ -167,12 +168,17 @@ def reconstruct(
     spectra = None
     if options.spectra:
         with timer.stage("spectra"):
-            model = correspondence(rig, options.correspondence)
-            pixels = known_pixels(geometry)
-            solver = SpectralReconstruction(
-                rig, plan, options.grid, model, stack.radiance, stack.std, pixels, device=options.device
+            spectra = solve_spectra(
+                options.solver,
+                rig,
+                plan,
+                options.grid,
+                options.correspondence,
+                stack,
+                known_pixels(geometry),
+                device=options.device,
+                progress=progress,
             )
-            spectra = solver.run(progress)
     with timer.stage("colour and result"):
         return assemble(rig, plan, options.grid, geometry, spectra)
 

@@ -24,7 +24,7 @@ from dsl_core.reconstruction.column import MAX_CHI_SQUARE, Column
 #: Candidates reach this far from the decoded column, in steps of, px.
 REACH_PX, STEP_PX = 1.0, 0.125
 #: Relative error of the zero-order model: first orders of other columns lie under it.
-DIRECT_ERROR = 0.05
+DIRECT_ERROR = 0.02
 #: Keeps the amplitudes of LEDs apart that a set cannot tell apart, relative to its strongest.
 RIDGE = 1e-4
 

@@ -114,7 +114,7 @@ class PublishedReconstruction:
                 flat[part], order[part], columns[:, part], reached[:, part], kappa[part], first[..., part],
                 torch.as_tensor(colour[:, part], dtype=torch.float32),
             )  # fmt: skip
-            self._store(out, flat[part], order[part], reached[:, part], fit(measured, self.options))
+            self._store(out, flat[part], order[part], reached[:, part], self.fit(measured))
 
         starts = range(0, flat.size, CHUNK)
         before = torch.get_num_threads()
@@ -126,6 +126,10 @@ class PublishedReconstruction:
         finally:
             torch.set_num_threads(before)
         return out
+
+    def fit(self, measured: Measured) -> Tensor:
+        """Spectra (bands, pixels) that minimise the objective."""
+        return fit(measured, self.options)
 
     def _valid_order(self, flat: NDArray[np.intp]) -> tuple[Tensor, Tensor, Tensor]:
         """Seed Eq. (3): per pixel the first order that reaches more bands; which bands, and their columns."""

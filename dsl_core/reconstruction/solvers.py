@@ -1,0 +1,40 @@
+"""The spectral solvers by name."""
+
+from __future__ import annotations
+
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.progress import Progress
+from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.nearest_line import ColourBasis, NearestLine
+from dsl_core.reconstruction.published_objective import PublishedReconstruction
+from dsl_core.reconstruction.spectra import Pixels, SpectralMaps, SpectralReconstruction
+
+SOLVERS = ("best", "published", "nearest-line", "colour-basis")
+
+
+def solve_spectra(
+    solver: str,
+    rig: Rig,
+    plan: CapturePlan,
+    grid: WavelengthGrid,
+    model: str,
+    stack: LineStack,
+    pixels: Pixels,
+    *,
+    device: str = "cpu",
+    progress: Progress | None = None,
+) -> SpectralMaps:
+    """Spectra of known pixels; raises `PlanError` for an unknown solver or patterns that it cannot read."""
+    if solver not in SOLVERS:
+        raise PlanError(f"There is no spectral solver {solver!r}; choose {', '.join(SOLVERS)}.")
+    if solver == "colour-basis":
+        return ColourBasis(rig, grid, pixels).run(progress)
+    kind = {"published": PublishedReconstruction, "nearest-line": NearestLine}.get(solver)
+    data = (rig, plan, grid, correspondence(rig, model), stack.radiance, stack.std, pixels)
+    if kind is None:
+        return SpectralReconstruction(*data, device=device).run(progress)
+    return kind(*data, device=device).run(progress)
