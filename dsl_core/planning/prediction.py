@@ -27,6 +27,7 @@ from dsl_core.planning.views import View, plane_view
 from dsl_core.planning.virtual import Outcome, VirtualPixels
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
 from dsl_core.reconstruction.spectral_system import Bands
+from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]
 #: What the linear model leaves open in the mean of many pixels, relative to reflectance: interpolation
@@ -89,7 +90,19 @@ def predict(
             "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
         }
     )
-    view = view or plane_view(rig, REFERENCE_MM)
+    with one_kernel_thread():
+        return _predict(rig, plan, view or plane_view(rig, REFERENCE_MM), grid, palette, latency_ms, peaks)
+
+
+def _predict(
+    rig: Rig,
+    plan: CapturePlan,
+    view: View,
+    grid: WavelengthGrid,
+    palette: References | None,
+    latency_ms: float,
+    peaks: bool,
+) -> Prediction:
     pixels = VirtualPixels(rig, plan, grid, view)
     nodes = _nodes(view, pixels.bands, palette or references.chart())
     outcome = pixels.run(nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))

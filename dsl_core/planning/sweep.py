@@ -40,6 +40,7 @@ class Case(Record):
     step_nm: float = 5.0
     binning: int = 1
     palette: str = "chart"
+    solver: str = "best"
 
     @property
     def grid(self) -> WavelengthGrid:
@@ -80,7 +81,7 @@ def measure(rig: Rig, case: Case, latency_ms: float) -> Point:
         "seconds": round(plan.duration_s(latency_ms), 3),
         "raw_bytes": plan.raw_bytes,
     }
-    options = pipeline.Options(grid=case.grid)
+    options = pipeline.Options(grid=case.grid, solver=case.solver)
     try:
         trial = run_trial(binned(rig, case.binning), plan, PALETTES[case.palette](), options=options)
     except DecodeError as error:

@@ -314,7 +314,8 @@ class _Run:
         relative = square.sqrt() / self.owner.depth
         tilt = relative * lens.fx_px * (12 / (w * w - 1)) ** 0.5 / w
         spread = torch.as_tensor(view.incidence_tan) * tilt
-        return self._normal(depth_error.shape) * spread[:, None] + 2 * depth_error / self.owner.depth[:, None]
+        tilted: Tensor = self._normal(depth_error.shape) * spread[:, None]
+        return tilted + 2 * depth_error / self.owner.depth[:, None]
 
     def _lit(self) -> Tensor:
         """Whether white stands clear of the noise, (samples, spectra)."""

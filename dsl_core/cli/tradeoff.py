@@ -1,0 +1,173 @@
+"""Commands about what accuracy costs in time: tradeoff, design."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dsl_core.cli.options import CalibrationName, Force, Json, RigName, RigOptions, parse_options
+from dsl_core.cli.output import Output
+from dsl_core.errors import CalibrationError, PlanError
+
+if TYPE_CHECKING:
+    from dsl_core.devices.base import DeviceRig
+    from dsl_core.model.rig import Rig
+    from dsl_core.planning.choice import Weighed
+    from dsl_core.planning.views import View
+
+
+def tradeoff(
+    budget: Annotated[
+        str | None, typer.Option("--budget", help="Most time for the capture, like 60s or 2min.")
+    ] = None,
+    error: Annotated[
+        float | None, typer.Option("--error", help="Reflectance error of a pixel that is good enough.")
+    ] = None,
+    rig: RigName = "twin",
+    option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
+    calibration: CalibrationName = None,
+    look: Annotated[
+        Path | None, typer.Option("--look", help="Result of a quick scan of the scene, to plan for it.")
+    ] = None,
+    plan: Annotated[Path | None, typer.Option("--plan", help="Write the chosen plan into this file.")] = None,
+    report: Annotated[Path | None, typer.Option("--report", help="Write all plans as a page.")] = None,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Choose the plan that is most accurate in a budget of time, or quickest for an error; predicted."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.plan_file import save_plan
+    from dsl_core.planning.candidates import candidate_plans
+    from dsl_core.planning.choice import choose, pareto, weigh
+
+    output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
+    with open_rig(rig, parse_options(option)) as devices:
+        known = _calibration(devices, calibration)
+        latency_ms = devices.projector.info.latency_ms
+    view = _view(known, look)
+    with output.progress() as progress:
+        limit_s = None if report else budget_s
+        weighed = weigh(
+            known, candidate_plans(known), view, latency_ms=latency_ms, budget_s=limit_s, progress=progress
+        )
+    chosen = choose(weighed, budget_s, error)
+    _tell(output, pareto(weighed), chosen)
+    if report is not None:
+        from dsl_core.planning.report import write_tradeoff_report
+
+        output.put(report=write_tradeoff_report(weighed, chosen, report, overwrite=force))
+        output.say(f"All plans are compared in {report}.")
+    if plan is not None:
+        save_plan(chosen.plan, plan, overwrite=force)
+        output.put(plan_file=plan)
+        output.say(f"The plan lies in {plan}. Next: dsl-scan scan SCAN.dsl --plan {plan} and the same rig.")
+    output.finish()
+
+
+def design(
+    target: Annotated[Path, typer.Argument(metavar="SET.json", help="File to write.")],
+    frames: Annotated[int, typer.Option("--frames", help="How many patterns, 8 to 160.")] = 32,
+    rig: RigName = "twin",
+    option: RigOptions = [],  # noqa: B006
+    calibration: CalibrationName = None,
+    steps: Annotated[int, typer.Option("--steps", help="Steps of the search.", min=1)] = 600,
+    plan: Annotated[
+        Path | None, typer.Option("--plan", help="Also write a plan with these patterns.")
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Design patterns for a calibrated rig: the least expected error for so many frames."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.plan_file import save_plan
+    from dsl_core.model.plan import CapturePlan, GrayCode
+    from dsl_core.planning.design import DesignOptions
+    from dsl_core.planning.design import design as search
+    from dsl_core.planning.designed import DesignedSet, packed, save_design
+
+    output = Output(json)
+    with open_rig(rig, parse_options(option)) as devices:
+        known = _calibration(devices, calibration)
+    base = CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False))
+    with output.progress() as progress:
+        found = search(known, base, frames, options=DesignOptions(steps=steps), progress=progress)
+    made = DesignedSet(
+        name=f"designed {frames}",
+        rig=known.name,
+        command=f"dsl-scan design {target.name} --frames {frames} --steps {steps}",
+        frames=frames,
+        width_px=found.levels.shape[1],
+        loss_start=found.loss_start,
+        loss=found.loss,
+        levels=packed(found.levels),
+    )
+    save_design(made, target, overwrite=force)
+    output.say(f"{frames} patterns lie in {target}; expected error {made.loss_start:.4f} -> {made.loss:.4f}.")
+    output.put(set=target, loss_start=made.loss_start, loss=made.loss)
+    if plan is not None:
+        save_plan(base.model_copy(update={"spectral": found.columns}), plan, overwrite=force)
+        output.put(plan_file=plan)
+    output.finish()
+
+
+def parse_seconds(text: str) -> float:
+    """Seconds from ``60``, ``60s`` or ``2min``; raises `PlanError`.
+
+    >>> parse_seconds("2min")
+    120.0
+    """
+    units = {"min": 60.0, "s": 1.0}
+    unit = next((unit for unit in units if text.endswith(unit)), "")
+    try:
+        value = float(text.removesuffix(unit)) * units.get(unit, 1.0)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise PlanError(f"--budget must be a time like 60s or 2min, not {text!r}.")
+    return value
+
+
+def _calibration(devices: DeviceRig, name: str | None) -> Rig:
+    from dsl_core.io.calibration_library import load_calibration
+
+    known = load_calibration(name) if name else devices.calibration
+    if known is None:
+        raise CalibrationError(
+            f"The rig {devices.name!r} has no calibration to predict from. Name one with --calibration."
+        )
+    return known
+
+
+def _view(rig: Rig, look: Path | None) -> View | None:
+    if look is None:
+        return None
+    from dsl_core.io.result_file import load_result
+    from dsl_core.planning.views import scene_view
+
+    return scene_view(rig, load_result(look))
+
+
+def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
+    rows = [
+        (
+            "*" if each.plan is chosen.plan else "",
+            each.plan.name,
+            each.expected.frames,
+            f"{each.expected.seconds:.0f}",
+            f"{each.expected.pixel_rmse:.4f}",
+            f"{each.expected.pixel_angle_rad:.3f}",
+            f"{each.expected.depth_std_mm:.2f}",
+        )
+        for each in front
+    ]
+    output.say("Plans that none beats in both time and expected error:")
+    output.table(("", "plan", "frames", "s", "error of a pixel", "angle rad", "depth mm"), rows)
+    e = chosen.expected
+    output.say(
+        f"Chosen: {chosen.plan.name}: {e.frames} frames in {e.seconds:.0f} s, expected reflectance error"
+        f" {e.pixel_rmse:.4f} a pixel, depth {e.depth_std_mm:.2f} mm, {e.computing_s:.0f} s of computing."
+    )
+    output.put(chosen=chosen.plan.name, expected=e.model_dump())
+    output.put(front=[{"plan": each.plan.name, **each.expected.model_dump()} for each in front])

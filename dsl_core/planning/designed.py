@@ -1,0 +1,75 @@
+"""Designed pattern sets that come with the program, and files for others."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.staging import staged
+from dsl_core.model.base import Record
+from dsl_core.model.plan import Columns
+from dsl_core.planning.design import columns_of
+from dsl_core.resources import resource_path
+
+FOLDER = "patterns"
+
+
+class DesignedSet(Record):
+    """Levels of a designed set, 8 bit (frames, width, 3), zlib-packed in base64, and how it was made."""
+
+    schema_version: Literal[1] = 1
+    name: str
+    rig: str
+    command: str
+    frames: int
+    width_px: int
+    loss_start: float
+    loss: float
+    levels: str
+
+    @property
+    def array(self) -> NDArray[np.uint8]:
+        """The levels, shape (frames, width, 3)."""
+        raw = zlib.decompress(base64.b64decode(self.levels))
+        return np.frombuffer(raw, np.uint8).reshape(self.frames, self.width_px, 3)
+
+
+def packed(levels: NDArray[np.uint8]) -> str:
+    """Levels as text."""
+    return base64.b64encode(zlib.compress(np.ascontiguousarray(levels).tobytes(), 9)).decode("ascii")
+
+
+def save_design(made: DesignedSet, path: Path, overwrite: bool = False) -> Path:
+    """Write a set; raises `StoreError`."""
+    with staged([path], overwrite=overwrite) as (draft,):
+        draft.write_text(made.model_dump_json(indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def load_design(path: Path) -> DesignedSet:
+    """Read a set; raises `StoreError`."""
+    try:
+        made = DesignedSet.model_validate_json(path.read_bytes())
+        _ = made.array
+    except (OSError, ValueError, zlib.error, ValidationError) as error:
+        raise StoreError(
+            f"The pattern set {path} cannot be read ({error}). 'dsl-scan design' writes one."
+        ) from error
+    return made
+
+
+def designed_sets() -> dict[str, Columns]:
+    """The sets of this installation as pattern sets, by name."""
+    try:
+        folder = resource_path(FOLDER)
+    except StoreError:  # an installation without designed sets still has lines and combs
+        return {}
+    made = [load_design(path) for path in sorted(folder.glob("*.json"))]
+    return {each.name: columns_of(each.array) for each in made}

@@ -1,0 +1,118 @@
+"""Choosing a plan: the front, the budget, the error, and the command that answers with a plan."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.cli.tradeoff import parse_seconds
+from dsl_core.errors import PlanError, StoreError
+from dsl_core.io.plan_file import load_plan, save_plan
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
+from dsl_core.planning import sweep
+from dsl_core.planning.candidates import candidate_plans
+from dsl_core.planning.choice import Weighed, choose, front, pareto, weigh
+from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
+from dsl_core.planning.prediction import Prediction
+from dsl_core.planning.report import write_tradeoff_report
+from dsl_core.planning.views import plane_view
+from dsl_core.simulation.published_rig import published_rig
+
+
+def weighed(seconds: float, error: float) -> Weighed:
+    expected = Prediction(
+        frames=10, spectral_frames=5, seconds=seconds, raw_bytes=1, computing_s=1, rmse=error,
+        pixel_rmse=error, angle_rad=0, pixel_angle_rad=0, delta_e=0, fwhm_nm=None, depth_std_mm=1,
+        coverage=1, decided=1,
+    )  # fmt: skip
+    return Weighed(CapturePlan(name=f"{seconds:g} s"), expected)
+
+
+PLANS = [weighed(10, 0.05), weighed(30, 0.02), weighed(40, 0.03), weighed(60, 0.01)]
+
+
+def test_the_front_holds_what_nothing_beats() -> None:
+    assert [each.plan.name for each in pareto(PLANS)] == ["10 s", "30 s", "60 s"]
+    assert front([(1, 1), (1, 0.5), (2, 0.5)]) == [1]
+
+
+def test_a_budget_gets_the_most_accurate_and_an_error_the_quickest() -> None:
+    assert choose(PLANS, budget_s=45).plan.name == "30 s"
+    assert choose(PLANS, error=0.035).plan.name == "30 s"
+    assert choose(PLANS, budget_s=100).plan.name == "60 s"
+
+
+def test_what_cannot_be_had_is_refused_with_what_can() -> None:
+    with pytest.raises(PlanError, match=r"'60 s', reaches 0\.0100"):
+        choose(PLANS, error=0.001)
+    with pytest.raises(PlanError, match="at most 5 s"):
+        choose(PLANS, budget_s=5)
+
+
+@pytest.mark.parametrize("text", ["", "soon", "-3s", "0", "nan"])
+def test_a_budget_that_is_no_time_is_refused(text: str) -> None:
+    with pytest.raises(PlanError, match="60s or 2min"):
+        parse_seconds(text)
+
+
+def test_real_plans_are_weighed_and_written(tmp_path: Path) -> None:
+    rig = published_rig()
+    quick = sorted(candidate_plans(rig), key=lambda plan: plan.duration_s(50))[:3]
+    found = weigh(rig, quick, plane_view(rig, grid=(3, 1)), latency_ms=50)
+    best = choose(found)
+    path = save_plan(best.plan, tmp_path / "plan.json")
+    assert load_plan(path) == best.plan
+    page = write_tradeoff_report(found, best, tmp_path / "page.html").read_text()
+    assert best.plan.name in page
+    assert "data:image/png" in page
+
+
+def test_a_sweep_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measured: list[str] = []
+
+    def measure(rig: object, case: sweep.Case, latency_ms: float) -> sweep.Point:
+        measured.append(case.name)
+        if case.name == "b" and measured.count("b") == 1:
+            raise KeyboardInterrupt
+        return sweep.Point(name=case.name, frames=1, spectral_frames=1, seconds=2.0, raw_bytes=3)
+
+    monkeypatch.setattr(sweep, "measure", measure)
+    cases = [sweep.Case(name=name, plan=CapturePlan(name=name)) for name in "abc"]
+    with pytest.raises(KeyboardInterrupt):
+        sweep.run_sweep(published_rig(), cases, tmp_path, 50)
+    points = sweep.run_sweep(published_rig(), cases, tmp_path, 50)
+    assert measured == ["a", "b", "b", "c"]
+    assert [point.name for point in points] == ["a", "b", "c"]
+    table = sweep.write_csv(points, tmp_path / "points.csv").read_text().splitlines()
+    assert table[0].startswith("name,frames")
+    assert len(table) == 4
+
+
+def test_a_designed_set_survives_its_file(tmp_path: Path) -> None:
+    levels = np.random.default_rng(1).integers(0, 256, (8, 640, 3), np.uint8)
+    made = DesignedSet(
+        name="set",
+        rig="twin",
+        command="",
+        frames=8,
+        width_px=640,
+        loss_start=2,
+        loss=1,
+        levels=packed(levels),
+    )
+    path = save_design(made, tmp_path / "set.json")
+    assert np.array_equal(load_design(path).array, levels)
+    path.write_text(json.dumps({"name": "set"}))
+    with pytest.raises(StoreError, match="cannot be read"):
+        load_design(path)
+
+
+def test_candidates_are_named_apart_and_fit_the_rig() -> None:
+    plans = list(candidate_plans(published_rig()))
+    assert len({plan.name for plan in plans}) == len(plans)
+    assert plans[0].spectral_count == 318
+    assert any(isinstance(p.spectral, LineComb) and p.spectral.shifts_px != (0, 0, 0) for p in plans)
+    assert all(isinstance(plan.code, GrayCode) for plan in plans)
