@@ -101,6 +101,9 @@ QFrame[role="toast"][level="warning"] {{ border-left-color: {t.warn}; }}
 QFrame[role="toast"][level="error"] {{ border-left-color: {t.bad}; }}
 QFrame[role="banner"] {{ background: {t.bad}; border: none; }}
 QFrame[role="banner"] QLabel {{ color: {t.base}; font-weight: 600; }}
+QCheckBox::indicator:unchecked, QAbstractItemView::indicator:unchecked {{ width: 12px; height: 12px;
+  border: 1px solid {t.muted}; border-radius: 2px; background: {t.base}; }}
+QCheckBox::indicator:unchecked:disabled {{ border-color: {t.line}; }}
 QAbstractSpinBox {{ min-height: 18px; }}
 QDialogButtonBox {{ dialogbuttonbox-buttons-have-icons: 0; }}
 QTableView {{ gridline-color: {t.line}; }}
