@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import calibrate, calibrations, demo, effects, files, gui, results, scans
+from dsl_core.cli import calibrate, calibrations, demo, effects, files, gui, results, scans, tradeoff
 
 app = typer.Typer(
     name="dsl-scan",
@@ -21,6 +21,8 @@ for command in (
     scans.scenes,
     effects.effects,
     scans.plan,
+    tradeoff.tradeoff,
+    tradeoff.design,
     scans.scan,
     scans.resume,
     results.reconstruct,
