@@ -112,14 +112,20 @@ class Layers:
         return _classes(np.minimum(reach, 4).astype(np.uint8), names, colours)
 
 
+#: How much of the colour of what is nothing to see is painted, of 255.
+FAINT = 40
+
+
 def _classes(classes: NDArray[np.uint8], names: list[str], colours: list[str]) -> Layer:
     table = np.zeros((256, 4), np.uint8)
     for i, colour in enumerate(colours):
-        table[i] = (*bytes.fromhex(colour[1:]), 255 if i else 40)
+        table[i] = (*bytes.fromhex(colour[1:]), 255 if i else FAINT)
     counts = np.bincount(classes.ravel(), minlength=len(colours)) / classes.size
+    faint = ",".join(str(level) for level in bytes.fromhex(colours[0][1:]))
+    shown = [f"rgba({faint},{FAINT / 255:.2f})", *colours[1:]]
     keys = tuple(
         (colour, name, float(share))
-        for colour, name, share in zip(colours, names, counts, strict=False)
+        for colour, name, share in zip(shown, names, counts, strict=False)
         if share > 0
     )
     return Layer(classes, (0, 255), table=table, keys=keys)
