@@ -131,11 +131,16 @@ def _blur(depth_mm: Floats, scale: float) -> Floats:
 
 
 def layers(sigma_px: Floats) -> tuple[list[float], list[NDArray[np.float32]]]:
-    """Blurs to render, and at every pixel the weights by which they are mixed; the first is no blur."""
+    """Blurs to render, and at every pixel the weights by which they are mixed; the first is no blur.
+
+    Mixed are neighbouring blurs, so that the variance is that of the pixel.
+    """
     count = math.ceil(float(sigma_px.max(initial=0.0)) / STEP_PX)
-    position = sigma_px / STEP_PX
-    weights = [np.clip(1 - np.abs(position - k), 0, 1).astype(np.float32) for k in range(count + 1)]
-    return [k * STEP_PX for k in range(count + 1)], weights
+    steps = sigma_px / STEP_PX
+    whole = np.minimum(np.floor(steps), max(count - 1, 0))
+    share = (steps**2 - whole**2) / (2 * whole + 1)
+    weights = [np.where(whole == k, 1 - share, np.where(whole == k - 1, share, 0)) for k in range(count + 1)]
+    return [k * STEP_PX for k in range(count + 1)], [weight.astype(np.float32) for weight in weights]
 
 
 def gaussian_distance(narrow_px: float, wide_px: float) -> float:

@@ -1,0 +1,149 @@
+"""The planner leaves out what it may and no more, says why, and the twin does as it says."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError
+from dsl_core.model.plan import Setting
+from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, Choice, with_effects
+from dsl_core.simulation.effects.limits import Limits
+from dsl_core.simulation.effects.planner import EffectPlan, Tolerance, describe, plan_effects
+from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from dsl_core.simulation.world import World
+from tests.cases.effect_scenes import HEIGHT, WIDTH, world_of
+
+
+@pytest.fixture(scope="module")
+def plane() -> EffectPlan:
+    return plan_effects(world_of("plane").everything())
+
+
+@pytest.mark.parametrize("tolerance", ["0.01", "1 DN", "100DN", "3 sigma", "9000"])
+def test_what_is_left_out_stays_below_the_tolerance(tolerance: str) -> None:
+    plan = plan_effects(world_of("sphere gloss=1e-6").everything(), Tolerance.of(tolerance))
+    assert plan.left_out_bound < plan.tolerance.value
+    spare = plan.tolerance.value - plan.left_out_bound
+    # Nothing else would have fitted.
+    for decision in plan.decisions:
+        if decision.on and not decision.effect.needed:
+            assert plan.tolerance.of_bound(decision.bound) >= spare
+    assert plan.names >= NEEDED
+
+
+def test_more_tolerance_saves_more() -> None:
+    path = world_of("box").everything()
+    seconds = [plan_effects(path, Tolerance(value)).seconds for value in (0.01, 1.0, 5000.0)]
+    rendered = [pair[0] for pair in seconds]
+    assert rendered[0] >= rendered[1] > rendered[2]
+    assert all(pair[0] <= pair[1] for pair in seconds)
+
+
+def test_every_decision_is_told_in_a_sentence(plane: EffectPlan) -> None:
+    assert [decision.effect.name for decision in plane.decisions] == list(NAMES)
+    why = {decision.effect.name: decision.why for decision in plane.decisions}
+    assert all(text[0].isupper() and text.endswith(".") for text in why.values())
+    assert why["interreflection"] == "No surface in view faces another."
+    assert "allowed" in why["ambient"]
+    assert "more than 1 DN" in why["halo"]
+    path = world_of("plane").everything()
+    assert all(decision.effect.parameters(path) for decision in plane.decisions)
+    assert all(decision.effect.summary for decision in plane.decisions)
+
+
+def test_the_cost_of_colours_is_counted_once(plane: EffectPlan) -> None:
+    wax = plan_effects(world_of("wax").everything())
+    both = wax.frame_s(USUAL | {"subsurface", "depth-of-field"})
+    singly = [wax.frame_s(USUAL | {name}) for name in ("subsurface", "depth-of-field")]
+    assert both < sum(singly)
+    assert wax.frame_s(USUAL | {"subsurface"}) > 3 * 0.9 * wax.frame_s(USUAL)
+    assert plane.frame_s(USUAL | {"interreflection"}) > plane.frame_s(USUAL) > plane.frame_s(NEEDED)
+
+
+def test_sigmas_are_those_of_a_dark_pixel(plane: EffectPlan) -> None:
+    ambient = next(decision.bound for decision in plane.decisions if decision.effect.name == "ambient")
+    assert ambient.dn == pytest.approx(0.002 * 1000 / 3)
+    assert ambient.sigmas == pytest.approx(ambient.dn / np.sqrt(1 + 1 / 12))
+
+
+def test_a_darker_plan_allows_more_to_be_left_out() -> None:
+    path = world_of("plane").everything()
+    dark = (Setting(exposure_ms=1.0, level=0.02),)
+    names = [plan_effects(path, settings=settings).names for settings in (dark, Limits(path).settings)]
+    assert names[0] < names[1]
+
+
+def test_texts_of_choices() -> None:
+    assert Choice.of("all").names == frozenset(NAMES)
+    assert Choice.of("none").names == NEEDED
+    assert Choice.of("usual").names == frozenset(NAMES) - {extra.name for extra in EXTRAS}
+    assert Choice.of("auto").names is None
+    assert Choice.of("halo, glare").names == NEEDED | {"halo", "glare"}
+    with pytest.raises(DeviceError, match=r"'hallo'.*second-orders"):
+        Choice.of("hallo,glare")
+
+
+@pytest.mark.parametrize("text", ["", "DN", "-1", "1 mm", "nan", "1e3"])
+def test_bad_tolerances_are_refused(text: str) -> None:
+    with pytest.raises(DeviceError, match=r"0\.5DN"):
+        Tolerance.of(text)
+
+
+def world_in(rig: DeviceRig) -> World:
+    assert isinstance(rig.camera, SimCamera)
+    return rig.camera.world
+
+
+def test_the_twin_renders_what_it_is_asked_to_and_notes_it() -> None:
+    options = {"size": "64x42", "scene": "plane"}
+    usual = open_twin(options)
+    assert "effects" not in usual.notes
+    assert isinstance(world_in(usual).renderer, Renderer)
+    auto = open_twin({**options, "effects": "auto", "tolerance": "0.5sigma"})
+    note = json.loads(auto.notes["effects"])
+    plan = world_in(auto).effect_plan()
+    assert note == json.loads(json.dumps(describe(plan, "auto")))
+    assert note["tolerance"] == "0.5 sigma"
+    assert {effect["name"] for effect in note["effects"] if effect["on"]} == plan.names
+    assert {extra.name for extra in world_in(auto).path.extras} == plan.names - USUAL
+    none = open_twin({**options, "effects": "none"})
+    path = world_in(none).path
+    assert path.orders == (1, -1)
+    assert path.extras == ()
+    assert path.rig.sensor.read_noise_dn == 0
+    with pytest.raises(DeviceError, match="no effect"):
+        open_twin({**options, "effects": "sparkle"})
+
+
+def test_leaving_out_everything_ends_in_an_ideal_rig() -> None:
+    world = world_of("sphere")
+    path = with_effects(world.everything(), NEEDED)
+    rig = path.rig
+    assert not any(rig.camera.distortion + rig.projector.distortion)
+    assert rig.film.bend_per_mm == rig.film.tilt_x_deg == rig.film.roll_deg == 0
+    assert rig.projector_response.gamma == 1
+    assert rig.projector_response.halo_peak_per_px == rig.projector_response.black_fraction == 0
+    assert path.truth.lit.all()
+    # What is true of the scene stays true.
+    assert world.rig.camera.distortion != rig.camera.distortion
+
+
+def test_a_moved_stage_and_a_brighter_exposure_are_decided_anew() -> None:
+    world = world_of("plane", effects=Choice.of("auto"), noise=False)
+    world.scene_at = lambda position_mm: world_of("box" if position_mm > 750 else "plane").scene
+    assert world.path.extra("interreflection") is None
+    world.move_to(760.0)
+    assert world.path.extra("interreflection") is not None
+    world.move_to(740.0)
+    assert world.path.ambient_dn_per_ms == 0
+    world.show(np.zeros((HEIGHT, WIDTH), np.uint8))
+    world.expose(300.0, 0)
+    assert world.path.ambient_dn_per_ms == 0
+    world.expose(2000.0, 1)
+    assert world.path.ambient_dn_per_ms > 0
+    assert world.settings[-1].exposure_ms == 2000.0
