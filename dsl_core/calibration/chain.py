@@ -36,13 +36,14 @@ from dsl_core.calibration.chain_equations import (
     zero_order_equations,
     zero_order_ratios,
 )
+from dsl_core.calibration.emission_shift import stretched
 from dsl_core.errors import CalibrationError
 from dsl_core.model.chain import ChainCorrection, apply_chain
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, correspondence
 from dsl_core.optics.spectra import chain_response
-from dsl_core.solve.smooth_functions import SmoothPrior, SmoothSolution, solve_given, solve_smooth
+from dsl_core.solve.smooth_functions import Equations, SmoothPrior, SmoothSolution, solve_given, solve_smooth
 
 __all__ = ["LineScan", "chain_correction"]
 
@@ -54,6 +55,10 @@ UNKNOWNS = Unknowns(np.arange(400.0, 701.0, 10.0))
 LEVEL_STD, RISE_STD = 0.05, 0.1
 AMPLITUDES, LENGTHS, NOISE_FACTORS = (0.003, 0.01, 0.03, 0.1), (20.0, 40.0, 80.0, 160.0), (1.0, 2.0, 4.0, 8.0)
 ROUNDS = 2
+#: What is known beforehand of the scale of wavelengths.
+SCALE_STD = 0.02
+#: A smaller one moves the emission by less than its flanks are wide.
+LINEAR_SCALE, SCALE_ROUNDS = 3e-4, 4
 #: Parts of the image (down, across) between which the scatter is taken.
 PARTS = (3, 4)
 MIN_PIXELS = 50
@@ -64,13 +69,17 @@ MODEL_STD = 2.5e-3
 
 @dataclass(frozen=True)
 class _Solved:
-    """A round: the solution, its misfit, and the chain's relative deviation at the nodes of each order."""
+    """A round: the solution, its misfit, and the chain's relative deviation at the nodes of each order.
+
+    ``scale`` is that of the wavelengths, with its deviation.
+    """
 
     solution: SmoothSolution
     chi_square: float
     chain_std: dict[int, Floats]
     ratio_std: float
     pixels: int
+    scale: tuple[float, float]
 
 
 def chain_correction(
@@ -87,12 +96,16 @@ def chain_correction(
         reflectance if isinstance(reflectance, SpectralCurve) else SpectralCurve.of([550.0], [reflectance])
     )
     factors, corrected = np.ones(UNKNOWNS.count), rig
-    for _ in range(ROUNDS):
+    scale = 0.0, 0.0
+    for round_ in range(ROUNDS):
         solved = _solve(
             corrected, [without_outliers(corrected, scan, target) for scan in scans], model, target
         )
         factors = factors * (1 + solved.solution.values)
-        record = _record(factors, solved)
+        if round_ == 0:
+            # Later rounds have put into the curves what a wrong scale does.
+            scale = _refined_scale(rig, scans, model, target, solved.scale)
+        record = _record(factors, solved, scale)
         corrected = apply_chain(record, rig)
     return record
 
@@ -111,9 +124,10 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
         for part in _parts(rig, scan)
     ]
     zero = zero_order_equations(rig, ratio, ratio_std, target, UNKNOWNS)
-    total = reduce(add, parts)
+    with_scale = reduce(add, parts) + zero
+    total = _corrections(with_scale)
     solution = solve_smooth(
-        total + zero,
+        total,
         [SmoothPrior(UNKNOWNS.nodes_nm, LEVEL_STD, RISE_STD)] * (len(ORDERS) + 3),
         [LEVEL_STD],
         amplitudes=AMPLITUDES,
@@ -122,18 +136,56 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
     )
     used = [part for part in parts if part.count]
     without = [
-        solve_given(total - part + zero, solution.prior, solution.noise_factor).values for part in used
+        solve_given(total - _corrections(part), solution.prior, solution.noise_factor).values for part in used
     ]
-    x = solution.values
-    misfit = total.square - 2 * x @ total.right + x @ total.normal @ x
+    x, first = solution.values, _corrections(with_scale - zero)
+    misfit = first.square - 2 * x @ first.right + x @ first.normal @ x
     chain_std = {order: _chain_std(rig, order, solution, np.array(without)) for order in ORDERS}
     return _Solved(
         solution,
-        float(misfit / max(total.count, 1)),
+        float(misfit / max(first.count, 1)),
         chain_std,
         float(np.sqrt((ratio_std**2).mean() / 3)),
         pixels,
+        _scale(solution, with_scale, used),
     )
+
+
+def _corrections(equations: Equations) -> Equations:
+    """The equations of the corrections alone, wavelengths taken as they are."""
+    n = UNKNOWNS.count
+    return Equations(equations.normal[:n, :n], equations.right[:n], equations.square, equations.count)
+
+
+def _scale(solution: SmoothSolution, equations: Equations, parts: list[Equations]) -> tuple[float, float]:
+    """The wavelengths' scale beside corrections as smooth as without it; deviation by leaving out parts."""
+    prior = np.zeros((UNKNOWNS.count + 1,) * 2)
+    prior[:-1, :-1], prior[-1, -1] = solution.prior, SCALE_STD**2
+    found = solve_given(equations, prior, solution.noise_factor)
+    without = [solve_given(equations - part, prior, solution.noise_factor).values[-1] for part in parts]
+    return float(found.values[-1]), float(np.hypot(found.std[-1], np.std(without) * np.sqrt(len(parts) - 1)))
+
+
+def _refined_scale(
+    rig: Rig,
+    scans: Sequence[LineScan],
+    model: Correspondence,
+    target: SpectralCurve,
+    found: tuple[float, float],
+) -> tuple[float, float]:
+    """The scale of wavelengths, solved again with the emission moved where it is too large to be linear."""
+    scale, std = found
+    for _ in range(SCALE_ROUNDS):
+        if abs(scale) < LINEAR_SCALE:
+            break
+        moved = stretched(rig, 1 / (1 + scale))
+        more, std = _solve(
+            moved, [without_outliers(moved, scan, target) for scan in scans], model, target
+        ).scale
+        scale += more
+        if abs(more) < LINEAR_SCALE:
+            break
+    return scale, std
 
 
 def _parts(rig: Rig, scan: LineScan) -> list[LineScan]:
@@ -181,11 +233,11 @@ def _product(rig: Rig, order: int) -> Floats:
     product[:, UNKNOWNS.efficiency(order)] = np.eye(n)
     for colour in range(3):
         product[:, UNKNOWNS.response(colour)] = np.diag(weight[colour])
-    product[:, -1] = 1
+    product[:, UNKNOWNS.white] = 1
     return product
 
 
-def _record(factors: Floats, solved: _Solved) -> ChainCorrection:
+def _record(factors: Floats, solved: _Solved, scale: tuple[float, float]) -> ChainCorrection:
     def curve(block: slice) -> SpectralCurve:
         values = SpectralCurve.of(UNKNOWNS.nodes_nm, factors[block])
         return values.model_copy(update={"std": tuple(solved.solution.std[block].tolist())})
@@ -195,10 +247,12 @@ def _record(factors: Floats, solved: _Solved) -> ChainCorrection:
     return ChainCorrection(
         efficiency_factors={order: curve(UNKNOWNS.efficiency(order)) for order in ORDERS},
         response_factors=(red, green, blue),
-        white_scale_factor=float(factors[-1]),
+        white_scale_factor=float(factors[UNKNOWNS.white]),
         white_scale_rel_std=solved.ratio_std,
         chain_rel_std=SpectralCurve.of(UNKNOWNS.nodes_nm, both),
         largest_correction=float(np.abs(factors - 1).max()),
+        wavelength_scale=scale[0],
+        wavelength_scale_std=scale[1],
         pixels=solved.pixels,
         chi_square=solved.chi_square,
     )

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dsl_core.calibration.emission_shift import steepness
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -91,14 +92,28 @@ class LineScan:
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Places of the corrections: efficiency of each order, response of each colour, white scale."""
+    """Places of the corrections: efficiency of each order, response of each colour, white scale.
+
+    Behind them equations hold one more unknown, the wavelengths' ``scale``: by which share light is of a
+    longer wavelength than the film's fit says, judged by the emission alone.
+    """
 
     nodes_nm: Floats
 
     @property
     def count(self) -> int:
         """Length of the vector."""
-        return (len(ORDERS) + 3) * len(self.nodes_nm) + 1
+        return self.white + 1
+
+    @property
+    def white(self) -> int:
+        """Place of the white scale."""
+        return (len(ORDERS) + 3) * len(self.nodes_nm)
+
+    @property
+    def scale(self) -> int:
+        """Place of the wavelengths' scale."""
+        return self.count
 
     def efficiency(self, order: int) -> slice:
         """Correction of an order's efficiency at the nodes."""
@@ -157,10 +172,11 @@ def zero_order_equations(
     signals = zero_order_signals(rig, reflectance)
     nm = np.arange(BANDS_NM[0], BANDS_NM[-1] + 1)
     share = signals / signals.sum(-1, keepdims=True)
-    design = np.zeros((3, unknowns.count))
+    # All wavelengths together: their scale plays no part.
+    design = np.zeros((3, unknowns.count + 1))
     for colour in range(3):
         design[colour, unknowns.response(colour)] = share[colour] @ unknowns.hats(nm)
-    design[:, -1] = 1
+    design[:, unknowns.white] = 1
     return Equations.of(design, ratio - 1, std)
 
 
@@ -173,13 +189,14 @@ def first_order_equations(
     unknowns: Unknowns,
 ) -> Equations:
     """The first orders of a scan, whose zero orders are ``ratio`` (3,) times what the rig expects."""
-    total = Equations(np.zeros((unknowns.count,) * 2), np.zeros(unknowns.count), 0.0, 0)
+    size = unknowns.count + 1
+    total = Equations(np.zeros((size, size)), np.zeros(size), 0.0, 0)
     colours = colours_of(rig, scan)
     expected = zero_order_signals(rig, reflectance).sum(-1) * ratio
     for order in ORDERS:
         moments, centroids = hat_moments(rig, order, BANDS_NM, STEP_NM)
         white = moments.sum(1) * reflectance.at(centroids)
-        hats = unknowns.hats(centroids)
+        hats, steep = unknowns.hats(centroids), steepness(rig, order, BANDS_NM, STEP_NM)
         for colour, which in _chunks(colours, scan.column_px):
             part = scan.at(which)
             footprint = _trace(model, part, order, centroids)
@@ -191,7 +208,14 @@ def first_order_equations(
             light = _light(rig, part, columns)
             scale = part.amplitude / expected[colour]
             total = total + _of_colour(
-                rig, part, light * scale[:, None], white[colour], hats, unknowns, order, colour
+                rig,
+                part,
+                light * scale[:, None],
+                white[colour],
+                np.column_stack([hats, steep[colour]]),
+                unknowns,
+                order,
+                colour,
             )
     return total
 
@@ -231,22 +255,27 @@ def _of_colour(
     scan: LineScan,
     light: Floats,
     white: Floats,
-    hats: Floats,
+    changes: Floats,
     unknowns: Unknowns,
     order: int,
     colour: int,
 ) -> Equations:
-    """Equations of the pixels of one colour through one order; ``light`` (frames, P, bands) with shading."""
+    """Equations of the pixels of one colour through one order; ``light`` (frames, P, bands) with shading.
+
+    ``changes`` (bands, nodes + 1) are relative changes of the bands by the nodes and by the scale.
+    """
     expected = light * white
     predicted = expected.sum(-1)
     direct = scan.radiance - scan.offset - scan.amplitude * _halo(rig, scan)
     lit = (light.max(-1) > 0) & np.isfinite(scan.std)
     std = np.hypot(scan.std[lit], MODEL_ERROR * predicted[lit])
-    part = Equations.of(expected[lit] @ hats, (direct - predicted)[lit], std)
+    part = Equations.of(expected[lit] @ changes, (direct - predicted)[lit], std)
     # Efficiency, response and white scale act alike on these signals.
-    spread = np.zeros((hats.shape[1], unknowns.count))
-    spread[:, unknowns.efficiency(order)] = spread[:, unknowns.response(colour)] = np.eye(hats.shape[1])
-    spread[:, -1] = 1
+    nodes = changes.shape[1] - 1
+    spread = np.zeros((nodes + 1, unknowns.count + 1))
+    spread[:nodes, unknowns.efficiency(order)] = spread[:nodes, unknowns.response(colour)] = np.eye(nodes)
+    spread[:nodes, unknowns.white] = 1
+    spread[nodes, unknowns.scale] = 1
     return Equations(spread.T @ part.normal @ spread, spread.T @ part.right, part.square, part.count)
 
 

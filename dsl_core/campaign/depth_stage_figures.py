@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dsl_core.model.chain import ChainCorrection
 from dsl_core.model.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import Figure
 
@@ -11,6 +12,9 @@ MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
 MAX_PULL = 1.8
 #: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
 MAX_BOW_MM, BOW_SIGMAS = 0.2, 3.0
+#: Filters and LEDs may disagree by so much (nm, at a wavelength) or so many deviations: the larger counts.
+#: The film's line density makes up for filters that are all off by one share; only the LEDs' spectra tell.
+MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
 
 
 def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
@@ -33,17 +37,6 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             ("film's bend", "bend_per_mm", "1/mm"),
         )
     ]
-    chain = []
-    if record.chain is not None:
-        chain = [
-            Figure(
-                name="largest correction of the chain",
-                value=100 * record.chain.largest_correction,
-                unit="%",
-                high=15.0,
-                advice="Calibrate Spectralon, Color Checker and bandpass filters again.",
-            )
-        ]
     return (
         Figure(
             name="scatter about the plane",
@@ -77,7 +70,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice="Use more filters or positions, lines closer together, or longer exposures.",
         ),
         *film,
-        *chain,
+        *_chain(record.chain),
         Figure(
             name="captures in doubt",
             value=float(len(record.warnings)),
@@ -86,6 +79,33 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice=". ".join(record.warnings),
         ),
     )
+
+
+def _chain(chain: ChainCorrection | None) -> tuple[Figure, ...]:
+    if chain is None:
+        return ()
+    correction = Figure(
+        name="largest correction of the chain",
+        value=100 * chain.largest_correction,
+        unit="%",
+        high=15.0,
+        advice="Calibrate Spectralon, Color Checker and bandpass filters again.",
+    )
+    if chain.wavelength_scale is None:
+        return (correction,)
+    std_nm = MIDDLE_NM * chain.wavelength_scale_std
+    limit = max(MAX_FILTERS_NM, FILTER_SIGMAS * std_nm)
+    filters = Figure(
+        name=f"filters against the LEDs' spectra, at {MIDDLE_NM:g} nm",
+        value=MIDDLE_NM * chain.wavelength_scale,
+        unit="nm",
+        std=std_nm,
+        low=-limit,
+        high=limit,
+        advice="All filters together pass other light than stated: to the blue when they are tilted. Put them"
+        " flat before the lens, and check their transmissions and the spectroradiometer's wavelengths.",
+    )
+    return correction, filters
 
 
 def _bow(record: DepthStageCalibration) -> tuple[Figure, ...]:

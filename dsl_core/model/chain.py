@@ -16,7 +16,9 @@ class ChainCorrection(Record):
     ``white_scale_factor`` multiplies its white scale. ``chain_rel_std`` is the relative deviation that a
     reflectance keeps from the corrected chain, the scatter over the image included.
     ``largest_correction`` is the largest relative change of any curve where it was measured;
-    ``pixels`` is how many were used and ``chi_square`` their reduced chi-square.
+    ``wavelength_scale`` is by which share light is of a longer wavelength than the film's fit says, by the
+    steep flanks of the emission (None in older records; nothing is corrected by it). ``pixels`` is how many
+    were used and ``chi_square`` their reduced chi-square.
     """
 
     efficiency_factors: dict[int, SpectralCurve]
@@ -25,6 +27,8 @@ class ChainCorrection(Record):
     white_scale_rel_std: float = Field(ge=0)
     chain_rel_std: SpectralCurve
     largest_correction: float
+    wavelength_scale: float | None = None
+    wavelength_scale_std: float = 0.0
     pixels: int
     chi_square: float
 

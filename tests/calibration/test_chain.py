@@ -33,6 +33,18 @@ def lines(scanned: tuple[Rig, MemoryScan]) -> LineScan:
     return diffuser_lines(scanned[1], scanned[0], pixels=2500)
 
 
+@pytest.mark.parametrize("scale", [0.0, -0.004])
+def test_filters_that_are_all_off_alike_are_measured_by_the_leds(
+    scanned: tuple[Rig, MemoryScan], lines: LineScan, scale: float
+) -> None:
+    # A film of fewer lines sends light of longer wavelengths where it went.
+    rig = wrong(scanned[0])
+    film = rig.film.model_copy(update={"lines_per_mm": rig.film.lines_per_mm * (1 + scale)})
+    record = chain_correction(rig.model_copy(update={"film": film}), [lines])
+    assert record.wavelength_scale == pytest.approx(scale, abs=2e-4)
+    assert record.wavelength_scale_std < 2e-4
+
+
 def wrong(rig: Rig) -> Rig:
     """Curves with smooth errors of a few percent, each its own."""
 

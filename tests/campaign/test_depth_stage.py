@@ -13,8 +13,10 @@ from dsl_core.campaign.depth_stage import NOTE_NAME, DepthStageRecipe
 from dsl_core.campaign.recipe import Bench
 from dsl_core.campaign.step_scan import scan_of
 from dsl_core.errors import CalibrationError
+from dsl_core.model.chain import ChainCorrection
 from dsl_core.model.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, correspondence, zero_order
 from dsl_core.progress import NoProgress
 from dsl_core.reconstruction.depth import triangulate
@@ -71,6 +73,34 @@ def test_record_goes_through_json_and_its_figures_pass(record: DepthStageCalibra
     assert record.held_out_px < 0.1
     assert record.frames == 2 * (20 + 2 + 128 + 1 + 128) + 6 * 41
     assert len(record.model_dump_json()) < 100_000
+
+
+@pytest.mark.parametrize(("scale", "told"), [(-0.004, True), (0.001, False)])
+def test_filters_that_are_all_off_alike_are_told(
+    record: DepthStageCalibration, scale: float, told: bool
+) -> None:
+    flat = SpectralCurve.of([400.0, 700.0], [1.0, 1.0])
+    chain = ChainCorrection(
+        efficiency_factors={1: flat, -1: flat},
+        response_factors=(flat, flat, flat),
+        white_scale_factor=1.0,
+        white_scale_rel_std=0.001,
+        chain_rel_std=flat,
+        largest_correction=0.0,
+        wavelength_scale=scale,
+        wavelength_scale_std=1e-4,
+        pixels=100,
+        chi_square=1.0,
+    )
+    figures = RECIPE.figures(record.model_copy(update={"chain": chain}))
+    failed = [str(figure) for figure in failures(figures)]
+    assert failed == (["filters against the LEDs' spectra, at 550 nm -2.200 ± 0.055 nm"] if told else [])
+
+
+def test_a_bulge_is_told_in_mm(record: DepthStageCalibration) -> None:
+    assert record.bow_mm == pytest.approx(0.0, abs=3 * record.bow_std_mm)
+    figures = RECIPE.figures(record.model_copy(update={"bow_mm": 0.5}))
+    assert [figure.name for figure in failures(figures)] == ["bulge of the target over 300 mm"]
 
 
 def test_finished_scan_is_not_taken_again(bench: Bench) -> None:

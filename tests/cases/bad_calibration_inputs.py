@@ -19,6 +19,7 @@ from tests.cases.tiny_campaign import Ending, contents, give, with_options
 Prepare = Callable[[Path], None]
 #: Positions of the plane without filter.
 PLANES = ("position-620", "position-740", "position-850")
+FILTERED = tuple(f"{plane}-filter-{nm}" for plane in PLANES for nm in (450, 640))
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class BadInput:
     ``command`` follows ``dsl-scan calibrate`` (its campaign put behind the first word); the twin has the
     options ``mishap``, and ``prepare`` changes the campaign before. ``told`` must be found in what the
     command says, and names the step, the picture or the file. ``code`` is how it ends. Only files below
-    ``touched`` may differ afterwards.
+    ``touched`` may differ afterwards. One that is not ``quick`` is left to the table.
     """
 
     name: str
@@ -39,6 +40,7 @@ class BadInput:
     prepare: Prepare | None = None
     code: int = 2
     touched: tuple[str, ...] = ()
+    quick: bool = True
 
 
 @dataclass(frozen=True)
@@ -234,6 +236,15 @@ CASES = (
         r"Position 740 mm, filter of 640 nm: .* about -\d\.\d nm off. .* not tilted",
         {"filter_tilt_deg": "12"},
         touched=_depth_stage("position-740-filter-640"),
+    ),
+    BadInput(
+        "all filters tilted alike",
+        "figures of the depth stage",
+        (*_redo("depth-stage", *FILTERED), "--set=chain=true"),
+        r"Depth stage was not accepted: .*filters against the LEDs' spectra, at 550 nm -[12]\.\d+ ± \d",
+        {"filter_tilt_deg": "10"},
+        touched=_depth_stage(*FILTERED),
+        quick=False,
     ),
     BadInput(
         "plane not flat at one position",
