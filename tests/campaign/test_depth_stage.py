@@ -115,14 +115,6 @@ def test_stage_notes_where_it_was(bench: Bench) -> None:
     assert ["850.0" in note for note in notes] == [False] * 4 + [True] * 4
 
 
-def test_a_wrong_filter_is_named(bench: Bench, tmp_path: Path) -> None:
-    step = RECIPE.steps(bench)[FILTERED]
-    other = without(bench, tmp_path, step)
-    take(RECIPE, other, step, filter_nm=560.0)
-    with pytest.raises(CalibrationError, match=r"850 mm, filter of 540 nm: .* \+(19|2[01])\.\d nm off"):
-        RECIPE.fit(other, NoProgress())
-
-
 def test_a_capture_without_first_orders_is_named(bench: Bench, tmp_path: Path) -> None:
     step = RECIPE.steps(bench)[FILTERED]
     other = without(bench, tmp_path, step)
