@@ -31,7 +31,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Page:
-    """One activity of the rail."""
+    """One activity of the rail; ``help`` is the help page of who has no better one."""
 
     key: str
     title: str
@@ -41,15 +41,11 @@ class Page:
 
 
 PAGES: tuple[Page, ...] = (
-    Page("rig", "Rig", "rig", "Devices, live camera, projector, self-test", "help/rig.md"),
-    Page(
-        "calibrate", "Calibrate", "calibrate", "Guided calibrations and their library", "help/calibrating.md"
-    ),
-    Page("scan", "Scan", "scan", "Plan, run and watch a scan", "help/scanning.md"),
-    Page(
-        "results", "Results", "results", "Spectra, depth, quality and the 3D cloud", "help/how-it-measures.md"
-    ),
-    Page("compare", "Compare", "compare", "Two scans, or a scan against truth", "help/comparing.md"),
+    Page("rig", "Rig", "rig", "Devices, live camera, projector, self-test", "rig"),
+    Page("calibrate", "Calibrate", "calibrate", "Guided calibrations and their library", "calibrating"),
+    Page("scan", "Scan", "scan", "Plan, run and watch a scan", "scanning"),
+    Page("results", "Results", "results", "Spectra, depth, quality and the 3D cloud", "numbers"),
+    Page("compare", "Compare", "compare", "Two scans, or a scan against truth", "comparing"),
 )
 
 ACTIONS: tuple[Action, ...] = (
@@ -133,7 +129,7 @@ ACTIONS: tuple[Action, ...] = (
         "results",
         separator=True,
     ),
-    Action("help_page", "&Help on this page", "Help", "F1", "What this page does and what its numbers mean"),
+    Action("help_page", "&Help on this page", "Help", "F1", "Explains what has the focus, and its numbers"),
     Action("tour", "Guided &tour", "Help", "", "What is where in this window, in seven steps"),
     Action("demo", "&Demo", "Help", "", "A finished scan of the simulated rig", separator=True),
     Action("live_demo", "Demo, &live", "Help", "", "A short scan of the simulated rig, while you watch"),

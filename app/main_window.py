@@ -30,6 +30,7 @@ from app.state.undo import UndoStack
 from app.theme import DARK, Theme
 from app.widgets import text_windows
 from app.widgets.drops import dropped_paths, open_after_drop
+from app.widgets.help_window import help_of, help_window
 from app.widgets.job_strip import JobStrip
 from app.widgets.menus import Menus
 from app.widgets.page import PageWidget
@@ -228,9 +229,9 @@ class MainWindow(QMainWindow):
             self.toasts.tell("info", "This page does nothing now that a command could do.")
 
     def do_help_page(self) -> None:
-        """Show the help of the open page."""
+        """Explain what has the focus, else the open page."""
         page = next(page for page in PAGES if page.key == self.page)
-        text_windows.help_window(page.help, page.title, self).open()
+        help_window(help_of(self.focusWidget()) or page.help, self).show()
 
     def do_tour(self) -> None:
         """Show what is where."""

@@ -102,7 +102,7 @@ class CampaignController:
             if self.state.campaign.value == facts:
                 self.state.rows.set(rows)
 
-        self._runner.submit(Job("Read the campaign", work, done, self._tell))
+        self._runner.submit(Job("Read the campaign", work, done, self._tell, is_minor=True))
 
     def _fits(self, facts: CampaignFacts) -> bool:
         choice = self._rig.state.choice.value

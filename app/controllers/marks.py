@@ -79,7 +79,13 @@ class MarksController:
             self._add(replace(region, name=self._name("region"), colour=self._colour()))
 
         self._runner.submit(
-            Job("Mean of a region", lambda progress: fill_region(draft, result, progress), done, self._tell)
+            Job(
+                "Mean of a region",
+                lambda progress: fill_region(draft, result, progress),
+                done,
+                self._tell,
+                is_minor=True,
+            )
         )
 
     def _add(self, mark: Mark) -> None:
@@ -154,7 +160,13 @@ class MarksController:
 
         if kept != Annotations():
             self._runner.submit(
-                Job("Marks", lambda progress: marks_of(kept, result, progress), done, self._tell)
+                Job(
+                    "Marks",
+                    lambda progress: marks_of(kept, result, progress),
+                    done,
+                    self._tell,
+                    is_minor=True,
+                )
             )
 
     def _save(self) -> None:

@@ -69,9 +69,9 @@ class ResultsController:
         self._start(f"Reconstruct {session.name}", work)
 
     def _load(self, path: Path) -> None:
-        self._start(f"Open {path.name}", lambda progress: load_arrays(path, progress))
+        self._start(f"Open {path.name}", lambda progress: load_arrays(path, progress), is_minor=True)
 
-    def _start(self, title: str, work: Callable[[Progress], ResultArrays]) -> None:
+    def _start(self, title: str, work: Callable[[Progress], ResultArrays], is_minor: bool = False) -> None:
         if self.state.busy.value:
             self._notifier.tell(
                 "info", f"{self.state.busy.value} is not finished yet. Wait for it or cancel."
@@ -89,7 +89,15 @@ class ResultsController:
             return arrays, picture_of(arrays["rgb"]) if "rgb" in arrays.arrays else None
 
         self._runner.submit(
-            Job(title, both, self._opened, self._failed, lambda: self.state.busy.set(""), exclusive="opening")
+            Job(
+                title,
+                both,
+                self._opened,
+                self._failed,
+                lambda: self.state.busy.set(""),
+                exclusive="opening",
+                is_minor=is_minor,
+            )
         )
 
     def _opened(self, opened: tuple[ResultArrays, NDArray[np.uint8] | None]) -> None:
@@ -201,7 +209,7 @@ class ResultsController:
             if self.state.result.value is result:
                 self.state.search.set(search)
 
-        self._runner.submit(Job(f"Look for {name}", work, done, self._tell))
+        self._runner.submit(Job(f"Look for {name}", work, done, self._tell, is_minor=True))
 
     def limit_search(self, within_rad: float, within_delta_e: float) -> None:
         """Change the limits of the search; the image follows at once."""

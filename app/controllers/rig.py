@@ -67,7 +67,8 @@ class RigController:
             devices.projector = self._wrap(devices.projector)
             return devices
 
-        self.run(Job(f"Connect {choice.name}", work, self._connected, self._refused, exclusive=RIG))
+        title = f"Connect {choice.name}"
+        self.run(Job(title, work, self._connected, self._refused, exclusive=RIG, is_minor=True))
 
     def disconnect(self) -> None:
         """Close the devices."""
@@ -75,7 +76,7 @@ class RigController:
         self.state.devices.set(None)
         self.state.link.set(Link.CLOSED)
         if old is not None:
-            self.run(Job("Disconnect", lambda progress: old.close(), exclusive=RIG))
+            self.run(Job("Disconnect", lambda progress: old.close(), exclusive=RIG, is_minor=True))
 
     def _connected(self, devices: DeviceRig) -> None:
         self.state.devices.set(devices)

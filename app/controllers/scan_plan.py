@@ -159,7 +159,8 @@ class ScanPlanController:
             self.refresh()
 
         work = lambda progress: self._library.find(choice.key).rig  # noqa: E731
-        self._runner.submit(Job(f"Open the calibration {choice.key}", work, done, self._tell))
+        title = f"Open the calibration {choice.key}"
+        self._runner.submit(Job(title, work, done, self._tell, is_minor=True))
 
     def set_override(self, on: bool) -> None:
         """Use the calibration although settings differ from it."""

@@ -28,6 +28,7 @@ from app.state.compare import CompareState, Pair, Shown, Side
 from app.state.results import Pixel, spectrum_of_pixel
 from app.theme import Theme
 from app.widgets.forms import ChoiceBox, label, set_role
+from app.widgets.help_window import set_help
 from app.widgets.page import PageWidget
 from app.widgets.plots import calm_plot, theme_plots
 from app.widgets.spectrum_curve import SpectrumCurve
@@ -106,6 +107,7 @@ class ComparePage(PageWidget):
         self.plot.setYRange(0, 1, padding=0.02)
         self._curves = [SpectrumCurve(self.plot.getPlotItem(), with_band=i == 0) for i in range(2)]
         self.table = _table()
+        set_help(self.table, "comparing#figures")
         self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 from app.panels.results_commands import ResultCommands
 from app.state.results import ResultsState
 from app.widgets.forms import set_role
+from app.widgets.help_window import add_help_key
 
 #: Format, ending, what it is for, and whether it needs spectra.
 FORMATS = (
@@ -42,10 +43,13 @@ class ExportDialog(QDialog):
         assert result is not None
         self.setWindowTitle("Export")
         self.resize(560, 360)
+        add_help_key(self, "exporting")
         self.folder = QLineEdit(str(result.path.parent))
         self.folder.setAccessibleName("Folder")
+        self.folder.setToolTip("Where the files are written")
         self.name = QLineEdit(result.path.stem)
         self.name.setAccessibleName("Name without ending")
+        self.name.setToolTip("Each format adds its own ending")
         browse = QPushButton("Choose…")
         browse.setToolTip("Choose the folder to write to")
         browse.clicked.connect(self._browse)
@@ -67,6 +71,8 @@ class ExportDialog(QDialog):
         self.text.setWordWrap(True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.write = self.buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
+        self.write.setToolTip("Write the chosen formats")
+        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Write nothing (Escape)")
         self.buttons.accepted.connect(self._export)
         self.buttons.rejected.connect(self.reject)
         self.folder.textChanged.connect(lambda _: self._check())

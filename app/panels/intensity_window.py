@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QCheckBox, QDialog, QVBoxLayout, QWidget
 from app.state.results import ResultsState
 from app.theme import DARK, Theme
 from app.widgets.forms import label
+from app.widgets.help_window import add_help_key
 from app.widgets.plots import RGB_COLOURS
 from dsl_core.inspection import IntensityGraph
 
@@ -28,6 +29,7 @@ class IntensityWindow(QDialog):
         self._theme, self._graph = DARK, state.graph.value
         self.setWindowTitle("Intensity graph")
         self.resize(860, 440)
+        add_help_key(self, "reading-an-intensity-graph")
         self.plot = pg.PlotWidget()
         self.plot.setAccessibleName("Intensity graph")
         self.plot.setToolTip(

@@ -8,7 +8,6 @@ from collections import deque
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import (
     QApplication,
-    QComboBox,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -17,6 +16,8 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
     QWidget,
 )
+
+from app.widgets.forms import ChoiceBox
 
 MOST_LINES = 5000
 LEVELS = (("Everything", logging.DEBUG), ("Information", logging.INFO), ("Warnings", logging.WARNING))
@@ -46,15 +47,15 @@ class LogPanel(QWidget):
     def __init__(self, records: LogRecords, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._records = records
-        self._level = QComboBox()
+        self._level = ChoiceBox("Least level shown", "Leave out messages below this level")
         for name, level in LEVELS:
             self._level.addItem(name, level)
         self._level.setCurrentIndex(1)
-        self._level.setAccessibleName("Least level shown")
         self._filter = QLineEdit()
         self._filter.setPlaceholderText("Filter by text")
         self._filter.setClearButtonEnabled(True)
         self._filter.setAccessibleName("Filter by text")
+        self._filter.setToolTip("Show only messages that hold this text")
         copy = QPushButton("Copy")
         copy.setToolTip("Copy the shown lines to the clipboard")
         self.view = QPlainTextEdit()
@@ -62,6 +63,7 @@ class LogPanel(QWidget):
         self.view.setReadOnly(True)
         self.view.setMaximumBlockCount(MOST_LINES)
         self.view.setAccessibleName("Log")
+        self.view.setToolTip("What the program did and what went wrong, the latest last")
         self.view.setPlaceholderText("Nothing to tell yet.")
         row = QHBoxLayout()
         for widget in (QLabel("Show"), self._level, self._filter, copy):

@@ -31,6 +31,7 @@ from app.panels.view_bar import ViewBar
 from app.state.results import ResultsState, View
 from app.theme import Theme
 from app.widgets.forms import label
+from app.widgets.help_window import set_help
 from app.widgets.page import PageWidget
 from app.widgets.welcome import Welcome
 from dsl_core.inspection import IntensityGraph
@@ -57,13 +58,18 @@ class ResultsPage(PageWidget):
             self.about.sizePolicy().Policy.Ignored, self.about.sizePolicy().verticalPolicy()
         )
         self.bar = ViewBar(state, commands)
+        set_help(self.bar, "numbers#views")
         self.image = ResultImage(state)
+        set_help(self.image, "numbers#under-the-picture")
         self.scene = ScenePanel(state, runner)
         self.readout = Readout(state)
         self.spectra = SpectrumPanel(state)
         self.spectra.setObjectName("spectra")
+        set_help(self.spectra, "numbers#spectra")
         self.marks = MarksPanel(state, commands.marks)
+        set_help(self.marks, "numbers#pins-regions-references")
         self.search = SearchPanel(state, commands)
+        set_help(self.search, "numbers#look-for")
         self.graph = IntensityWindow(state, self)
         self._panels = (self.image, self.scene, self.spectra, self.marks, self.graph)
         self.stack = QStackedWidget()

@@ -21,6 +21,7 @@ from app.state.rig import Link, RigChoice, RigState
 from app.theme import Theme
 from app.views import RigCommands
 from app.widgets.forms import ChoiceBox, NumberBox, label, set_role
+from app.widgets.help_window import set_help
 from app.widgets.page import PageWidget
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 
@@ -42,7 +43,9 @@ class RigPage(PageWidget):
         self._stops: list[Callable[[], None]] = []
         self.live = LiveView()
         self.live.setObjectName("live-view")
+        set_help(self.live, "rig#live-picture")
         self.projector = ProjectorPanel()
+        set_help(self.projector, "rig#projector")
         self._rig = ChoiceBox("Rig", "The rig to connect")
         for name in rigs:
             self._rig.addItem(name, name)
@@ -52,6 +55,7 @@ class RigPage(PageWidget):
         self._options.setToolTip("Options as key=value, separated by spaces; see Help on this page")
         self._connect_button = QPushButton("Connect")
         self._connect_button.setProperty("role", "primary")
+        self._connect_button.setToolTip("Open the devices of this rig, or let them go")
         self._light = label("")
         self._trouble = label("")
         self._trouble.setProperty("role", "bad")

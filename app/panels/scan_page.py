@@ -17,6 +17,7 @@ from app.panels.scan_view import FramePicture, GraphPlot
 from app.state.scan import Phase, ScanState
 from app.theme import Theme
 from app.widgets.banner import Banner
+from app.widgets.help_window import set_help
 from app.widgets.page import PageWidget
 from dsl_core.evaluation.operating_points import OperatingPoints
 from dsl_core.model.presets import PRESETS, on_cycles
@@ -44,11 +45,18 @@ class ScanPage(PageWidget):
         )
         self.plan = PlanEditor()
         self.plan.setObjectName("scan-plan")
+        set_help(self.plan, "scanning#the-plan")
         self.curve = OperatingCurve(points)
+        set_help(self.curve, "scanning#accuracy-against-time")
         self.picture, self.graph = FramePicture(), GraphPlot()
+        set_help(self.picture, "scanning#while-it-runs")
+        set_help(self.graph, "reading-an-intensity-graph")
         self.calibration = CalibrationBox(state, commands)
+        set_help(self.calibration, "calibrating#using-a-calibration")
         self.target, self.run = TargetBox(state, commands), RunBox(state, commands)
         self.run.setObjectName("scan-run")
+        set_help(self.target, "scanning#before-it-starts")
+        set_help(self.run, "scanning#while-it-runs")
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
         self._timer.timeout.connect(commands.take_news)

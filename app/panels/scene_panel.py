@@ -75,7 +75,9 @@ class ScenePanel(QWidget):
         if self.scene is None and not self._is_preparing:
             self._is_preparing = True
             self._hint.setText("Preparing the 3D view …")
-            self._runner.submit(Job("Prepare the 3D view", lambda progress: prepare_scene(), self._make))
+            self._runner.submit(
+                Job("Prepare the 3D view", lambda progress: prepare_scene(), self._make, is_minor=True)
+            )
         self._new_result()
 
     def _make(self, _: None) -> None:

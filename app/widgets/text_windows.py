@@ -1,4 +1,4 @@
-"""Windows that only show text: help pages, shortcuts, a command line, what the program is."""
+"""Windows that only show text: shortcuts, a command line, what the program is."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from PySide6.QtWidgets import (
 
 from app.actions import Action
 from dsl_core import __version__
-from dsl_core.errors import StoreError
-from dsl_core.resources import resource_path
 
 
 def _window(title: str, content: QWidget, parent: QWidget, width: int, height: int) -> QDialog:
@@ -31,23 +29,12 @@ def _window(title: str, content: QWidget, parent: QWidget, width: int, height: i
     window.setWindowTitle(title)
     window.resize(width, height)
     buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+    buttons.button(QDialogButtonBox.StandardButton.Close).setToolTip("Close this window (Escape)")
     buttons.rejected.connect(window.reject)
     column = QVBoxLayout(window)
     column.addWidget(content, 1)
     column.addWidget(buttons)
     return window
-
-
-def help_window(page: str, title: str, parent: QWidget) -> QDialog:
-    """A help page of the resources, given as ``help/NAME.md``; says so when it is not there."""
-    browser = QTextBrowser()
-    browser.setOpenExternalLinks(True)
-    browser.setAccessibleName("Help")
-    try:
-        browser.setMarkdown(resource_path(page).read_text(encoding="utf-8"))
-    except StoreError as error:
-        browser.setPlainText(str(error))
-    return _window(f"Help – {title}", browser, parent, 760, 680)
 
 
 def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
@@ -59,6 +46,7 @@ def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
     ]
     browser = QTextBrowser()
     browser.setAccessibleName("Keyboard shortcuts")
+    browser.setToolTip("Every action that has a key")
     browser.setMarkdown("\n".join(["| Action | Keys | What it does |", "|---|---|---|", *rows]))
     return _window("Keyboard shortcuts", browser, parent, 720, 620)
 
@@ -73,8 +61,10 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     text.setReadOnly(True)
     text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
     text.setAccessibleName("Command line")
+    text.setToolTip("Give this in a terminal to do the same")
     window = _window("Command line", text, parent, 640, 220)
     copy = QPushButton("Copy")
+    copy.setToolTip("Copy the command")
     copy.clicked.connect(lambda: QApplication.clipboard().setText(command))
     box = window.findChild(QDialogButtonBox)
     assert isinstance(box, QDialogButtonBox)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
 
 from app.state.wizard import Doing, WizardState
 from app.theme import Theme
 from app.widgets.banner import Banner
-from app.widgets.text_windows import help_window
+from app.widgets.help_window import add_help_key
 from app.wizards.fit_page import FitPage
 from app.wizards.settings_page import SettingsPage
 from app.wizards.step_list import StepList
@@ -22,7 +21,7 @@ from app.wizards.wizard_commands import WizardCommands
 #: How often frames and progress are fetched, ms.
 FETCH_MS = 100
 SMALLEST, USUAL = QSize(900, 600), QSize(1120, 720)
-HELP = "help/calibrating.md"
+HELP = "calibrating"
 
 
 class CalibrationWizard(QDialog):
@@ -69,7 +68,7 @@ class CalibrationWizard(QDialog):
         self.fit.settings_wanted.connect(lambda values: commands.change_settings(values, then_fit=True))
         self.fit.allowed.connect(self._show_acceptable)
         self.buttons.left.connect(self.reject)
-        QShortcut(QKeySequence("F1"), self, lambda: help_window(HELP, state.title, self).open())
+        add_help_key(self, HELP)
         self._stops: list[Callable[[], None]] = [
             *self.step.stops,
             *self.fit.stops,

@@ -1,0 +1,191 @@
+"""The help: pages of the resources with links between them, and which of them explains a widget."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QKeySequence, QShortcut, QTextBlock, QTextCursor
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QSplitter,
+    QTextBrowser,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_core.errors import StoreError
+from dsl_core.resources import resource_path
+
+FOLDER = "help"
+#: The pages in the order in which they are read; others follow.
+ORDER = (
+    "rig",
+    "calibrating",
+    "scanning",
+    "numbers",
+    "reading-an-intensity-graph",
+    "comparing",
+    "exporting",
+    "how-it-measures",
+)
+_PROPERTY = "help"
+
+
+def set_help(widget: QWidget, topic: str) -> None:
+    """F1 on a widget or anything in it opens this topic: ``PAGE`` or ``PAGE#heading-in-small-letters``."""
+    widget.setProperty(_PROPERTY, topic)
+
+
+def help_of(widget: QWidget | None) -> str:
+    """The topic of a widget or of the nearest one around it; empty where there is none."""
+    while widget is not None:
+        topic = widget.property(_PROPERTY)
+        if topic:
+            return str(topic)
+        widget = widget.parentWidget()
+    return ""
+
+
+def add_help_key(window: QWidget, topic: str) -> None:
+    """Let F1 work in a window of its own, which the keys of the main window do not reach."""
+    set_help(window, topic)
+    key = QShortcut(QKeySequence(Qt.Key.Key_F1), window)
+    key.activated.connect(lambda: help_window(help_of(window.focusWidget() or window), window).open())
+
+
+def help_window(topic: str, parent: QWidget) -> HelpWindow:
+    """A help window at a topic."""
+    window = HelpWindow(parent)
+    window.show_topic(topic)
+    return window
+
+
+class HelpWindow(QDialog):
+    """All pages at the left, one at the right; Back and Forward as in a browser."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setModal(False)
+        self.setWindowTitle("Help")
+        self.resize(960, 720)
+        self.pages = QListWidget()
+        self.pages.setAccessibleName("Help pages")
+        self.pages.setToolTip("All pages of the help")
+        self.text = QTextBrowser()
+        self.text.setAccessibleName("Help")
+        self.text.setToolTip("Links lead to other pages (Alt+Left goes back)")
+        self.text.setOpenExternalLinks(True)
+        self.text.document().setDocumentMargin(14)
+        self.back = _button("&Back", "The page before (Alt+Left)", "Alt+Left")
+        self.forward = _button("&Forward", "The page after (Alt+Right)", "Alt+Right")
+        self.close_button = _button("&Close", "Close the help (Escape)", "")
+        self._lay_out()
+        for page in help_pages():
+            item = QListWidgetItem(title_of(page))
+            item.setData(Qt.ItemDataRole.UserRole, page.stem)
+            self.pages.addItem(item)
+        self.pages.currentItemChanged.connect(self._choose)
+        self.back.clicked.connect(self.text.backward)
+        self.forward.clicked.connect(self.text.forward)
+        self.close_button.clicked.connect(self.accept)
+        self.text.backwardAvailable.connect(self.back.setEnabled)
+        self.text.forwardAvailable.connect(self.forward.setEnabled)
+        self.text.sourceChanged.connect(self._arrived)
+        for button in (self.back, self.forward):
+            button.setEnabled(False)
+
+    def _lay_out(self) -> None:
+        head = QHBoxLayout()
+        head.addWidget(self.back)
+        head.addWidget(self.forward)
+        head.addStretch(1)
+        head.addWidget(self.close_button)
+        parts = QSplitter(Qt.Orientation.Horizontal)
+        parts.setChildrenCollapsible(False)
+        parts.addWidget(self.pages)
+        parts.addWidget(self.text)
+        parts.setSizes([230, 730])
+        parts.setStretchFactor(1, 1)
+        column = QVBoxLayout(self)
+        column.addLayout(head)
+        column.addWidget(parts, 1)
+
+    @property
+    def page(self) -> str:
+        """Name of the page that is shown."""
+        return Path(self.text.source().path()).stem
+
+    def show_topic(self, topic: str) -> None:
+        """Show a page, at one of its headings if the topic names one; says so when it is not there."""
+        name, _, heading = topic.partition("#")
+        try:
+            url = QUrl.fromLocalFile(str(resource_path(f"{FOLDER}/{name}.md")))
+        except StoreError as error:
+            self.text.setPlainText(str(error))
+            return
+        url.setFragment(heading)
+        self.text.setSource(url)
+
+    def _choose(self, item: QListWidgetItem | None) -> None:
+        if item is not None and item.data(Qt.ItemDataRole.UserRole) != self.page:
+            self.show_topic(str(item.data(Qt.ItemDataRole.UserRole)))
+
+    def _arrived(self, url: QUrl) -> None:
+        name = Path(url.path()).stem
+        for i in range(self.pages.count()):
+            item = self.pages.item(i)
+            if item.data(Qt.ItemDataRole.UserRole) == name:
+                self.pages.blockSignals(True)
+                self.pages.setCurrentItem(item)
+                self.pages.blockSignals(False)
+                self.setWindowTitle(f"Help – {item.text()}")
+        if url.fragment():
+            self._scroll_to(url.fragment())
+
+    def _scroll_to(self, heading: str) -> None:
+        """Show a heading at the top; Markdown has no anchors of its own."""
+        block: QTextBlock = self.text.document().begin()
+        while block.isValid():
+            if block.blockFormat().headingLevel() and slug(block.text()) == heading:
+                self.text.moveCursor(QTextCursor.MoveOperation.End)
+                self.text.setTextCursor(QTextCursor(block))
+                return
+            block = block.next()
+
+
+def help_pages() -> list[Path]:
+    """Files of all pages, in the order of reading."""
+    found = {path.stem: path for path in sorted(resource_path(FOLDER).glob("*.md"))}
+    first = [found[name] for name in ORDER if name in found]
+    return [*first, *(path for name, path in found.items() if name not in ORDER)]
+
+
+def title_of(page: Path) -> str:
+    """The first heading of a page."""
+    first = page.read_text(encoding="utf-8").splitlines()[0]
+    return first.lstrip("# ").strip()
+
+
+def slug(heading: str) -> str:
+    """A heading as links name it.
+
+    >>> slug("Pins, regions, references")
+    'pins-regions-references'
+    """
+    return re.sub(r"[^\w]+", "-", heading.lower()).strip("-")
+
+
+def _button(text: str, tip: str, keys: str) -> QPushButton:
+    button = QPushButton(text)
+    button.setToolTip(tip)
+    button.setAutoDefault(False)
+    if keys:
+        button.setShortcut(QKeySequence(keys))
+    return button
