@@ -8,6 +8,7 @@ from PySide6.QtCore import QObject, QTimer
 from PySide6.QtGui import QGuiApplication
 
 from app.main_window import MainWindow
+from app.panels.projector_panel import LOST
 from app.projector_window import ProjectorWindow, ScreenLabel, describe_screen
 from dsl_core.errors import DslError
 
@@ -45,7 +46,7 @@ class ProjectorScreens(QObject):
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)
         for signal in (application.screenAdded, application.screenRemoved):
-            signal.connect(lambda _screen: page.projector.refresh_screens(self._armed()))
+            signal.connect(lambda _screen: self._list(page))
 
     def identify(self) -> None:
         """Show every screen's name on it for a while."""
@@ -54,10 +55,13 @@ class ProjectorScreens(QObject):
             label.show()
             QTimer.singleShot(IDENTIFY_MS, label, label.close)
 
-    def _armed(self) -> str:
-        return self.beam.screen().name() if self.beam.is_armed else ""
+    def _list(self, page: RigPage) -> None:
+        beam = self.beam
+        page.projector.refresh_screens(beam.screen().name() if beam.is_armed else "", beam.lost_screen)
 
     def _choose(self, page: RigPage, name: str) -> None:
+        if name == LOST:
+            return
         found = next((s for s in QGuiApplication.screens() if s.name() == name), None)
         try:
             if found is None:
@@ -70,4 +74,4 @@ class ProjectorScreens(QObject):
                 self.beam.arm(found)
         except DslError as error:
             self._window.toasts.tell("error", str(error))
-        page.projector.refresh_screens(self._armed())
+        self._list(page)

@@ -135,6 +135,12 @@ class ProjectorWindow(QWidget):
         """Whether the window covers its screen."""
         return self._screen_id is not None and self.isVisible()
 
+    @property
+    def lost_screen(self) -> str:
+        """Name of the screen that went away while it was covered; empty once another choice is made."""
+        screen = self._screen_id
+        return screen.name if screen is not None and not self.isVisible() else ""
+
     def show_pixels(self, image: NDArray[np.uint8], painted: threading.Event | None = None) -> None:
         """Show drive levels, shape (height, width, 3), centred and enlarged by the largest whole factor.
 
@@ -212,6 +218,11 @@ class ScreenProjector(Projector):
             raise DeviceError(
                 f"The projector was given an image of shape {image.shape} and type {image.dtype}; it shows"
                 f" {info.height_px} x {info.width_px} pixels of uint8, grey or RGB."
+            )
+        if self._window.lost_screen:
+            raise DeviceError(
+                f"The projector's screen {self._window.lost_screen} is gone. Connect it again and choose it"
+                " on the Rig page."
             )
         if not self._window.is_armed:
             if self._behind is None:

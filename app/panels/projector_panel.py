@@ -21,6 +21,8 @@ from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
 #: How fast a looped line moves, ms a step.
 LOOP_MS = 120
 NO_SCREEN = "The rig's own"
+#: Stands for a screen that went away while it was used; choosing it changes nothing.
+LOST = "lost"
 
 
 class ProjectorPanel(QGroupBox):
@@ -98,14 +100,16 @@ class ProjectorPanel(QGroupBox):
         self._slider.setRange(0, last)
         self._note.setText(f"{info.model}, {info.width_px} × {info.height_px} logical pixels")
 
-    def refresh_screens(self, chosen: str) -> None:
-        """List the screens that there are now, and mark the chosen one."""
+    def refresh_screens(self, chosen: str, lost: str = "") -> None:
+        """List the screens that there are now, and mark the chosen one, or the one that is ``lost``."""
         self._screen.blockSignals(True)
         self._screen.clear()
         self._screen.addItem(NO_SCREEN, "")
         for screen in QGuiApplication.screens():
             self._screen.addItem(_describe(screen), screen.name())
-        index = self._screen.findData(chosen)
+        if lost:
+            self._screen.addItem(f"{lost} was lost", LOST)
+        index = self._screen.findData(LOST if lost else chosen)
         self._screen.setCurrentIndex(max(index, 0))
         self._screen.blockSignals(False)
 

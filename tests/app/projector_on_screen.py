@@ -12,6 +12,7 @@ from PySide6.QtGui import QGuiApplication, QImage, QScreen
 from PySide6.QtWidgets import QApplication
 
 from app.projector_window import ProjectorWindow, ScreenProjector, mirrors, pixel_size
+from dsl_core.devices.base import Projector, ProjectorInfo
 from dsl_core.errors import DeviceError
 from tests.app.two_screens import PROJECTOR, plug, set_monitor, unplug
 
@@ -47,6 +48,20 @@ def pattern(width: int, height: int) -> NDArray[np.uint8]:
     image[:256, :256] = np.arange(256, dtype=np.uint8)[:, None, None]
     image[:40, 256:] = 255 * (np.indices((40, width - 256)).sum(0) % 2)[..., None]
     return image
+
+
+class RecordingProjector(Projector):
+    """Counts what it is shown."""
+
+    def __init__(self) -> None:
+        self.shown = 0
+
+    @property
+    def info(self) -> ProjectorInfo:
+        return ProjectorInfo("none", "", 640, 360, 1.0, 16.7)
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        self.shown += 1
 
 
 def main() -> None:
@@ -87,11 +102,23 @@ def main() -> None:
     unplug(display)
     wait(lambda: told == ["lost PROJECTOR"])
     assert not window.isVisible()
+    assert window.lost_screen == PROJECTOR
     show(image)
     assert isinstance(errors.pop(), DeviceError)
+    # Patterns that nobody sees would spoil a scan: the projector behind does not get them either.
+    behind = RecordingProjector()
+    try:
+        ScreenProjector(window, behind).show(half)
+    except DeviceError as error:
+        print("lost:", error)
+    assert behind.shown == 0
     plug(display)
     wait(lambda: told == ["lost PROJECTOR", "restored PROJECTOR"])
     assert not window.isVisible()
+    window.disarm()
+    assert not window.lost_screen
+    ScreenProjector(window, behind).show(half)
+    assert behind.shown == 1
 
     set_monitor(display, "MIRROR", "1280/300x720/170+1280+0", "none")
     wait(lambda: screen("MIRROR") is not None)

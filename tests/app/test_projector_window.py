@@ -28,9 +28,10 @@ def test_pixels_are_exact_and_the_window_survives_unplugging(scale: str) -> None
             cwd=ROOT,
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=110,
         )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "differing pixels at 1:1: 0" in done.stdout
     assert "differing pixels at 1:2: 0" in done.stdout
     assert "mirrored: The screen" in done.stdout
+    assert "lost: The projector's screen PROJECTOR is gone." in done.stdout
