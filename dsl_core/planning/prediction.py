@@ -31,7 +31,7 @@ from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]
 #: What the linear model leaves open in the mean of many pixels, relative to reflectance: interpolation
-#: between bands, tabulated profiles, depth. Found by noise-free scans of the twin.
+#: between bands, tabulated profiles, depth. Of the size that noise-free scans of the twin left.
 MODEL_FLOOR = 0.003
 #: Spectral step of the truth behind the width of narrow peaks, nm, and samples that state it.
 FINE_STEP_NM, PEAK_SAMPLES = 1.0, 4
