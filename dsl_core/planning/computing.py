@@ -6,9 +6,9 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.line_set import LineSet
 
-#: Core seconds a million pixels at `BANDS` bands, least squares over 68 reconstructions of small pieces of the
-#: twin: single lines, fixed and an exposure (scatter 24 %); all other sets, fixed and a pattern (11 %). Pieces
-#: pay the start of every tile, so that whole pictures take less.
+#: Core seconds a million pixels at `BANDS` bands, least squares over 68 reconstructions of small pieces of
+#: the twin: single lines, fixed and an exposure (scatter 24 %); all other sets, fixed and a pattern (11 %).
+#: Pieces pay the start of every tile, so that whole pictures take less.
 LINES_S, EXPOSURE_S = 41.0, 0.042
 DENSE_S, PATTERN_S = 229.0, 9.9
 BANDS = 47

@@ -93,8 +93,8 @@ def columns_of(levels: NDArray[np.uint8]) -> Columns:
 def starting_comb(frames: int) -> LineComb:
     """The comb that a search of ``frames`` patterns starts from; raises `PlanError`.
 
-    Among combs of 16, 32 and 64 frames these were predicted to be best, or nearly, on the published rig: lines
-    whose two edges fall on different columns.
+    Among combs of 16, 32 and 64 frames these were predicted to be best, or nearly, on the published rig: the
+    two edges of their lines fall on different columns.
     """
     if not 8 <= frames <= 160:
         raise PlanError(f"A set of {frames} patterns cannot be designed; choose 8 to 160.")
