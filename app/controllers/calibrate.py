@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
+from app.controllers.calibrate_everything import Everything, words_of
 from app.controllers.calibration_library import LibraryController
 from app.controllers.calibration_words import calibrate_command
 from app.controllers.campaign import CampaignController, Kinds
 from app.controllers.campaign_lock import CampaignLock
 from app.controllers.rig import RIG, RigController
 from app.controllers.scan_facts import sentence_of
-from app.controllers.unattended import Unattended
 from app.controllers.wizard import WizardController
 from app.jobs.base import Job, JobRunner
 from app.state.calibrate import ABOUT, CalibrateState, CampaignFacts
 from app.state.evented import Event
 from app.state.wizard import WizardState
 from app.views import Notifier
-from dsl_core.campaign.guide import calibrate_all, calibrated_rig
+from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
-from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DslError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CAMPAIGN_NAME, CampaignFolder
@@ -50,7 +48,7 @@ class CalibrateController:
         self.wizard_ready: Event[tuple[WizardState, WizardController]] = Event()
         self._wizard: WizardController | None = None
         self._lock = CampaignLock()
-        self._everything: Job[Products] | None = None
+        self._everything = Everything(state, rig, self._kinds, self._store, self._ended)
 
     # Campaign --------------------------------------------------------------------------------------
 
@@ -141,46 +139,18 @@ class CalibrateController:
             return
         if not self._take_lock(facts.path):
             return
-        own = replace(devices)  # scans of a calibration must not change the rig of the window
-        job = Job(
-            "Calibrate everything",
-            lambda progress: self._all(facts.path, own, progress),
-            lambda made: self._ended(f"Everything is calibrated. {_words(made)}"),
-            lambda error: self._ended("", error),
-            lambda: self._ended("Stopped. Everything captured is kept; start again to go on."),
-            exclusive=RIG,
-        )
-        self._everything = job
-        self.state.everything.set("starting")
-        self._rig.run(job, lambda text: self._ended("", DslError(text)))
-
-    def _all(self, path: Path, devices: DeviceRig, progress: Progress) -> Products:
-        campaign = CampaignFolder.open(path)
-        guide, recipes = Unattended(progress), self._kinds.recipes(campaign)
-        rig = calibrate_all(campaign, devices, guide, guide, library_name(path), recipes)
-        guide.title = "Report"
-        guide.report("write", 0, 0)
-        return write_products(campaign, rig, library_name(path), recipes=recipes, library=self._store)
+        self._everything.run(facts.path, devices, library_name(facts.path))
 
     def cancel_everything(self) -> None:
         """Stop it at the next safe point; everything captured stays."""
-        if self._everything is not None:
-            self._everything.cancel()
-            self.state.everything.set("stopping")
+        self._everything.cancel()
 
     def take_news(self) -> None:
         """Say how far everything is; called by the window's clock."""
-        job = self._everything
-        if job is None or job.token.is_cancelled:
-            return
-        told = job.progress
-        count = f", {told.done} of {told.total}" if told.total else ""
-        self.state.everything.set(f"{told.stage or 'starting'}{count}")
+        self._everything.take_news()
 
-    def _ended(self, note: str, error: Exception | None = None) -> None:
-        self._everything = None
+    def _ended(self, note: str, error: Exception | None) -> None:
         self._lock.release()
-        self.state.everything.set("")
         self.state.note.set(note)
         self.refresh()
         self.library.load()
@@ -206,7 +176,7 @@ class CalibrateController:
             return write_products(campaign, rig, name, recipes=recipes, library=self._store)
 
         def done(made: Products) -> None:
-            self.state.note.set(_words(made))
+            self.state.note.set(words_of(made))
             self.library.load()
 
         self._runner.submit(Job("Keep the rig", work, done, self._tell))
@@ -227,7 +197,7 @@ class CalibrateController:
     def _is_busy(self) -> bool:
         """Whether a calibration runs; then the person is told which."""
         running = "" if self._wizard is None else self._wizard.state.title
-        if self._everything is not None:
+        if self._everything.is_running:
             running = "The calibration of everything"
         if running:
             self._notifier.tell("warning", f"{running} is still running. Finish or leave it first.")
@@ -270,8 +240,3 @@ def library_name(folder: Path) -> str:
     """
     name = re.sub(r"[^\w .+-]", "-", folder.name).lstrip(" .+-")
     return name or "campaign"
-
-
-def _words(made: Products) -> str:
-    kept = f" It is in the library as {made.entry!r}." if made.entry else ""
-    return f"The rig lies in {made.rig}, its report in {made.report}.{kept}"

@@ -9,19 +9,13 @@ from pathlib import Path
 from app.controllers.rig import RigController
 from app.controllers.scan_facts import sentence_of
 from app.controllers.wizard_jobs import WizardJobs
+from app.controllers.wizard_look import Looking
+from app.controllers.wizard_verdict import Library, Verdict
 from app.controllers.wizard_work import Captured, Opened, Recipes, WizardWork
 from app.jobs.base import JobRunner
 from app.state.rig import Link
-from app.state.wizard import Doing, Fit, Look, Seen, WizardState
-from dsl_core.campaign.products import Products
-from dsl_core.capture.preview import quick_picture, statistics
+from app.state.wizard import Doing, WizardState
 from dsl_core.devices.base import DeviceRig
-from dsl_core.io.calibration_library import CalibrationLibrary
-
-#: Under which name, None for not at all, and in which library the rig is kept; asked in a job.
-Library = Callable[[], tuple[str | None, CalibrationLibrary]]
-#: Pause between two looks, s.
-LOOK_PAUSE_S = 0.8
 
 
 class WizardController:
@@ -41,10 +35,11 @@ class WizardController:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.state, self._path, self._rig = state, path, rig
-        self._recipes, self._library, self._clock = recipes, library, clock
+        self._recipes = recipes
         self._work: WizardWork | None = None
         self._jobs = WizardJobs(state, rig, runner)
-        self._looked_at = 0.0
+        self._looking = Looking(state, self._jobs, clock)
+        self._verdict = Verdict(state, self._jobs, library)
         self._devices: DeviceRig | None = None
         self._unfollow: Callable[[], None] = lambda: None
 
@@ -128,38 +123,13 @@ class WizardController:
 
     def check(self, on: bool) -> None:
         """Look at the step again and again, or stop that."""
-        if self.state.status is not None:
-            self.state.is_checking.set(on)
-            self._look_if_due(self._clock() + LOOK_PAUSE_S)
+        self._looking.check(on, self._the_work)
 
     def take_news(self) -> None:
         """Bring frames and progress to the state and look again when it is time; called by a clock."""
-        self._show_frame()
         self._jobs.take_news()
-        self._look_if_due(self._clock())
-
-    def _show_frame(self) -> None:
-        frame = None if self._work is None else self._work.camera.take_frame()
-        if frame is None or self._devices is None:
-            return
-        info = self._devices.camera.info
-        full_scale = 2**info.bit_depth - 1
-        picture = quick_picture(frame.pixels, info.bayer, full_scale, show_saturation=True)
-        self.state.seen.set(Seen(picture, max(statistics(frame.pixels, info.bayer, full_scale).saturated)))
-
-    def _look_if_due(self, now: float) -> None:
-        status = self.state.status
-        due = self.state.is_checking.value and self._jobs.is_free and now - self._looked_at >= LOOK_PAUSE_S
-        if not due or status is None:
-            return
-        step, work = status.step, self._the_work
-        self._jobs.start(Doing.LOOKING, f"Look at {step.title}", lambda p: work.look(step, p), self._looked)
-
-    def _looked(self, look: Look) -> None:
-        self._looked_at = self._clock()
-        status = self.state.status
-        if status is not None and status.step.key == look.key:
-            self.state.look.set(look)
+        if self._work is not None:
+            self._looking.take_news(self._work)
 
     # Capture ---------------------------------------------------------------------------------------
 
@@ -226,57 +196,15 @@ class WizardController:
 
     def fit(self) -> None:
         """Calibrate from the captures of all steps."""
-        self._jobs.after_look(
-            lambda: self._jobs.start(
-                Doing.FITTING, "Fit", self._the_work.fit, self._fitted, failed=self._not_fitted
-            )
-        )
-
-    def _not_fitted(self, error: Exception) -> None:
-        self._jobs.fail(error)
-        self.state.misfit.set(self._the_work.session)
-
-    def _fitted(self, fit: Fit) -> None:
-        self.state.misfit.set(None)
-        self.state.fit.set(fit)
-        self.state.at.set(self.state.last)
-        self.state.note.set("")
+        self._verdict.fit(self._the_work)
 
     def accept(self) -> None:
         """Let the fit be the campaign's calibration, and write down the rig as far as it is known."""
-        fit, work = self.state.fit.value, self._the_work
-        if fit is not None and not fit.is_accepted and self._jobs.is_free:
-            self._jobs.start(Doing.KEEPING, "Accept", lambda progress: work.accept(), self._accepted)
-
-    def _accepted(self, fit: Fit) -> None:
-        work, title = self._the_work, self.state.title
-        self.state.fit.set(fit)
-        self.state.note.set(f"{title} is accepted.")
-        self._jobs.start(
-            Doing.KEEPING,
-            "Write the rig",
-            lambda progress: self._write(work),
-            self._written,
-        )
-
-    def _write(self, work: WizardWork) -> Products:
-        name, library = self._library()
-        return work.write(name, library)
-
-    def _written(self, made: Products) -> None:
-        kept = f" In the library it is {made.entry!r}." if made.entry else ""
-        self.state.note.set(f"{self.state.title} is accepted. The rig lies in {made.rig}.{kept}")
+        self._verdict.accept(self._the_work)
 
     def discard(self) -> None:
         """Forget the fit that waits; captures and the accepted calibration stay."""
-        fit, work = self.state.fit.value, self._the_work
-        if fit is not None and not fit.is_accepted and self._jobs.is_free:
-            self._jobs.start(
-                Doing.KEEPING,
-                "Discard the fit",
-                lambda progress: work.discard(),
-                lambda _: self.state.fit.set(None),
-            )
+        self._verdict.discard(self._the_work)
 
     # Settings --------------------------------------------------------------------------------------
 

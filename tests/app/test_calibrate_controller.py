@@ -152,12 +152,12 @@ def test_a_look_that_is_not_good_advises_and_repeats(bench: CalibrateBench) -> N
     assert look is not None
     assert not look.is_good
     assert look.figures[0].advice == "Move the target closer."
-    control._looked_at -= 10.0
+    control._looking._looked_at -= 10.0
     control.take_news()
     assert state.look.value is not look
     control.check(False)
     now = state.look.value
-    control._looked_at -= 10.0
+    control._looking._looked_at -= 10.0
     control.take_news()
     assert state.look.value is now, "it looked although nobody wants it to"
 
