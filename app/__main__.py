@@ -23,8 +23,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     # pyvistaqt and superqt ask which Qt to use before anything of ours is imported by them.
     os.environ.setdefault("QT_API", "pyside6")
+    from PySide6.QtCore import QTimer
+
     from app.application import ExceptionHook, make_application, make_window
     from app.composition import Composition, Wish
+    from app.jobs.warm_up import WarmUp
     from app.state.rig import RigChoice
 
     application = make_application(sys.argv[:1])
@@ -36,7 +39,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     hook.install()
     window.show()
     composition.start(window)
-    return application.exec()
+    warm_up = WarmUp()
+    QTimer.singleShot(0, warm_up.start)
+    code = application.exec()
+    warm_up.stop()
+    return code
 
 
 def has_screen(platform: str, environment: Mapping[str, str]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import logging
 import sys
 import threading
@@ -32,8 +33,14 @@ _SCHEMES = {
 }
 
 
+#: How long a thread keeps Python's lock that the window wants, s: the window asks often while it paints.
+SWITCH_S = 0.001
+
+
 def make_application(arguments: Sequence[str]) -> QApplication:
     """The one Qt application, in a style that looks alike on all systems."""
+    sys.setswitchinterval(SWITCH_S)
+    _import_plainly()
     application = QApplication.instance()
     if not isinstance(application, QApplication):
         application = QApplication(list(arguments))
@@ -41,6 +48,14 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     application.setDesktopFileName("dsl-scan")
     application.setStyle("Fusion")
     return application
+
+
+def _import_plainly() -> None:
+    """Undo that PySide reads and keeps the source of every module, to see if it wants ``snake_case`` names.
+
+    It makes imports slower by a tenth and the program larger by a hundred megabytes.
+    """
+    builtins.__import__ = getattr(builtins, "__orig_import__", builtins.__import__)
 
 
 def set_theme(name: str) -> Theme:
