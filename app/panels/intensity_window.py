@@ -30,14 +30,13 @@ class IntensityWindow(QDialog):
         self.setWindowTitle("Intensity graph")
         self.resize(860, 440)
         add_help_key(self, "reading-an-intensity-graph")
-        self.plot = pg.PlotWidget()
+        self.plot = pg.PlotWidget(enableMenu=False)
         self.plot.setAccessibleName("Intensity graph")
         self.plot.setToolTip(
             "Points are measured, lines are the model of the reconstructed spectrum. The dashed line is the"
             " zero order; wavelengths of the first orders stand above."
         )
         self.item = self.plot.getPlotItem()
-        self.item.setMenuEnabled(False)
         self.item.hideButtons()
         self.item.setLabel("bottom", "Frame of the line set")
         self.item.setLabel("left", "Signal (DN/ms)")

@@ -21,14 +21,13 @@ class SpectrumPanel(QWidget):
     def __init__(self, state: ResultsState) -> None:
         super().__init__()
         self._state, self._theme = state, DARK
-        self.plot = pg.PlotWidget()
+        self.plot = pg.PlotWidget(enableMenu=False)
         self.plot.setAccessibleName("Spectra")
         self.plot.setToolTip(
             "Reflectance with its 95 % band; dashed where the prior and not the data decides."
             " Regions show the mean and one deviation of their pixels. Drag the line to change the band."
         )
         self.item = self.plot.getPlotItem()
-        self.item.setMenuEnabled(False)
         self.item.hideButtons()
         self.item.setLabel("bottom", "Wavelength (nm)")
         self.item.setLabel("left", "Reflectance")

@@ -15,11 +15,10 @@ RGB_COLOURS = ("#e0524d", "#2fa84f", "#4c8dff")
 
 def calm_plot(name: str, tip: str, left: str, bottom: str, left_width: int = 52) -> Any:
     """A plot widget without menus and buttons that keeps its axes in place."""
-    plot = pg.PlotWidget()
+    plot = pg.PlotWidget(enableMenu=False)
     plot.setAccessibleName(name)
     plot.setToolTip(tip)
     item = plot.getPlotItem()
-    item.setMenuEnabled(False)
     item.hideButtons()
     item.showGrid(x=True, y=True, alpha=0.18)
     for side, text in (("left", left), ("bottom", bottom)):
