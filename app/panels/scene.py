@@ -22,7 +22,9 @@ Points = NDArray[np.float32]
 COARSE, SLOW_S = 30_000, 0.12
 #: How long after the last move the whole cloud comes back, ms.
 SETTLE_MS = 250
-POINT_PX, COARSE_PX = 2, 3
+POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 6
+#: Pixels of a view that a cloud covers, about; points that are few are drawn larger, so that it is no veil.
+COVERED_PX = 200_000
 
 
 class Scene(Protocol):
@@ -109,8 +111,9 @@ class _Cloud:
         self._points = points
         # A fixed random order, so that a part of the cloud is even and does not flicker.
         self._order = np.random.default_rng(0).permutation(len(points)).astype(np.int32)
-        self._fill("whole", self._order, colours, POINT_PX)
-        self._fill("coarse", self._order[:COARSE], colours, COARSE_PX)
+        size_px = point_size(len(points))
+        self._fill("whole", self._order, colours, size_px)
+        self._fill("coarse", self._order[:COARSE], colours, max(size_px, COARSE_PX))
         self.be_coarse(False)
         return True
 
@@ -269,6 +272,15 @@ class GlScene:
         """Let go of the graphics context."""
         self._timer.stop()
         self._plotter.close()
+
+
+def point_size(count: int) -> int:
+    """Size of the points of a cloud, px.
+
+    >>> point_size(500_000), point_size(14_000), point_size(100)
+    (2, 4, 6)
+    """
+    return min(max(round((COVERED_PX / max(count, 1)) ** 0.5), POINT_PX), LARGEST_PX)
 
 
 def normalised(position: QPointF, widget: QWidget) -> tuple[float, float]:
