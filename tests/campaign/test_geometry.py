@@ -82,7 +82,7 @@ def test_columns_of_the_drawn_rig_come_back(bench: Bench, record: GeometryCalibr
     for depth_mm in (600.0, 700.0, 850.0):
         off = columns(found, depth_mm) - columns(truth, depth_mm)
         nominal_off = columns(bench.rig, depth_mm) - columns(truth, depth_mm)
-        assert np.sqrt((off**2).mean()) < 0.02
+        assert np.sqrt((off**2).mean()) < 0.035  # six poses of coarse pixels
         assert np.sqrt((nominal_off**2).mean()) > 1.0
     assert 0.001 < found.column_std_px < 0.03
     assert found.geometry_covariance is not None
@@ -216,8 +216,8 @@ def test_both_devices_see_the_whole_board_in_every_pose(board: Checkerboard | Ch
     assert len(poses) == 12
     assert all(in_view(pose, board, published_rig()) for pose in poses)
     assert np.ptp([pose.depth_mm for pose in poses]) > 150
-    assert max(abs(pose.tilt_x_deg) for pose in poses) >= 25
-    assert "lower edge tilted away by about 25°" in poses[1].instruction(published_rig())
+    assert max(abs(pose.tilt_x_deg) for pose in poses) >= 35
+    assert "lower edge tilted away by about 35°" in poses[1].instruction(published_rig())
 
 
 def test_a_board_too_large_is_refused() -> None:
