@@ -206,7 +206,7 @@ def change_of_frames(worlds: list[World]) -> float:
     lens, worst = worlds[0].rig.projector, 0.0
     line = np.zeros((lens.height_px, lens.width_px), np.uint8)
     line[:, lens.width_px // 2 : lens.width_px // 2 + 5] = bright
-    for image in (line, np.full_like(line, faint), np.full_like(line, bright)):
+    for image in (line, *(np.full_like(line, level) for level in (0, faint, bright))):
         frames = []
         for world in worlds:
             world.show(image)

@@ -14,7 +14,7 @@ from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.simulation.effects.base import ExtraEffect, with_response
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
-from dsl_core.simulation.effects.machine import PLAIN_NS, slowness
+from dsl_core.simulation.effects.machine import PLAIN_MS, PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
 from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.truth import Parts
@@ -117,7 +117,7 @@ class DepthOfField(ExtraEffect):
         pictures = len(layers(blurs.camera_px)[0])
         colours = 3 if self.needs_colours(limits.path) else 1
         ns = PLAIN_NS * twice + self.ns_per_pixel * pictures * limits.pixel_count
-        return 1e-9 * colours * ns * slowness()
+        return colours * (1e-9 * ns + 1e-3 * PLAIN_MS * (len(weights) - 1)) * slowness()
 
 
 def _blur(depth_mm: Floats, scale: float) -> Floats:

@@ -12,7 +12,7 @@ from dsl_core.simulation.effects.base import Effect
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
 from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.machine import PLAIN_NS, slowness
+from dsl_core.simulation.effects.machine import PLAIN_MS, PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import LightPath
 
 
@@ -152,7 +152,8 @@ def plan_effects(
         )
         for effect in EFFECTS
     )
-    return EffectPlan(tolerance, decisions, 1e-9 * PLAIN_NS * limits.pixel_count * slowness())
+    plain_s = 1e-9 * PLAIN_NS * limits.pixel_count + 1e-3 * PLAIN_MS
+    return EffectPlan(tolerance, decisions, plain_s * slowness())
 
 
 def _weighed(
