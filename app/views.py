@@ -46,6 +46,9 @@ class RigCommands(Protocol):
     def set_exposure(self, exposure_ms: float) -> None:
         """Expose live frames so long."""
 
+    def expose_automatically(self, region_px: tuple[int, int, int, int] | None) -> None:
+        """Find the exposure that suits a region of the picture (x, y, width, height), or all of it."""
+
     def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
         """Project a picture."""
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+from app.controllers.auto_exposer import AutoExposer, Region
 from app.jobs.base import Job, JobRunner
-from app.state.rig import Link, RigChoice, RigState
+from app.state.rig import FrameCounts, Link, RigChoice, RigState
 from app.views import Notifier
 from dsl_core.devices.base import DeviceRig, Projector
 from dsl_core.errors import DeviceError, DslError
@@ -43,8 +45,8 @@ class RigController:
         self._waiting: list[tuple[Job[Any], Callable[[str], object]]] = []
         self._mail: Frame | None = None
         self._lock = threading.Lock()
-        self.frames_seen = 0
-        self.frames_lost = 0
+        self._counts = FrameCounts()
+        self._exposer = AutoExposer(state, notifier, self.set_exposure)
 
     # Connect ---------------------------------------------------------------------------------------
 
@@ -110,6 +112,7 @@ class RigController:
             self._notifier.tell("warning", str(error))
             return
         self._live_job = job
+        self._counts = FrameCounts()
         self.state.live.set(True)
 
     def stop_live(self) -> None:
@@ -123,27 +126,38 @@ class RigController:
             frame, self._mail = self._mail, None
         if frame is not None:
             self.state.frame.set(frame)
+            self.state.counts.set(self._counts)
+            self._exposer.judge(frame)
 
     def _look(self, devices: DeviceRig, progress: Progress) -> None:
         lost = 0
         while True:
-            progress.report("live", self.frames_seen, 0)
+            progress.report("live", self._counts.shown, 0)
             start = time.monotonic()
             try:
                 devices.camera.configure(self.state.exposure_ms.value)
                 frame = devices.camera.snap()
             except DeviceError:
-                lost, self.frames_lost = lost + 1, self.frames_lost + 1
+                lost += 1
+                self._counts = replace(self._counts, lost=self._counts.lost + 1)
                 if lost >= LOST_AFTER:
                     raise
                 continue
-            lost, self.frames_seen = 0, self.frames_seen + 1
-            with self._lock:
-                self._mail = frame
+            lost = 0
+            self._post(frame)
             time.sleep(max(LIVE_PERIOD_S - (time.monotonic() - start), 0))
+
+    def _post(self, frame: Frame) -> None:
+        """Lay a frame ready for `take_frame`; one that nobody took meanwhile is skipped."""
+        with self._lock:
+            skipped = int(self._mail is not None)
+            self._mail = frame
+        counts = self._counts
+        self._counts = replace(counts, shown=counts.shown + 1 - skipped, skipped=counts.skipped + skipped)
 
     def _live_ended(self) -> None:
         self._live_job = None
+        self._exposer.end()
         self.state.live.set(False)
         waiting, self._waiting = self._waiting, []
         for job, refused in waiting:
@@ -189,6 +203,15 @@ class RigController:
             devices.projector.show(picture)
         except DslError as error:
             self._notifier.tell("error", str(error))
+
+    def expose_automatically(self, region_px: Region | None) -> None:
+        """Find the exposure that suits a region of the picture, starting the live view where it is off."""
+        if self.state.devices.value is None:
+            self._notifier.tell("info", "No camera is connected. Connect a rig first.")
+            return
+        self.start_live()
+        if self._live_job is not None:
+            self._exposer.begin(region_px)
 
     def set_exposure(self, exposure_ms: float) -> None:
         """Expose live frames so long from now on, within what the camera can do."""

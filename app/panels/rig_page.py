@@ -70,6 +70,12 @@ class RigPage(PageWidget):
         self._exposure = NumberBox(
             "Exposure", low, high, state.exposure_ms.value, "ms", 2, "Exposure of live frames"
         )
+        self.auto = QPushButton("&Auto exposure")
+        self.auto.setToolTip(
+            "Expose as long as nothing that matters saturates, for whole LED cycles; only the region counts,"
+            " where one is shown"
+        )
+        self._cycles = label("", "muted")
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
         self._timer.timeout.connect(commands.take_frame)
@@ -92,6 +98,8 @@ class RigPage(PageWidget):
         camera = QGroupBox("Camera")
         camera_form = QFormLayout(camera)
         camera_form.addRow("Exposure", self._exposure)
+        camera_form.addRow("", self._cycles)
+        camera_form.addRow("", self.auto)
         camera_form.addRow("", self._live_button)
         left, right = QWidget(), QWidget()
         for side, boxes in ((left, (devices, camera)), (right, (self.projector,))):
@@ -111,6 +119,7 @@ class RigPage(PageWidget):
         self._connect_button.clicked.connect(self._toggle_link)
         self._live_button.clicked.connect(self._toggle_live)
         self._exposure.valueChanged.connect(commands.set_exposure)
+        self.auto.clicked.connect(lambda: commands.expose_automatically(self.live.region))
         self.projector.wanted.connect(commands.show)
         self._stops = [
             state.link.follow(self._show_link),
@@ -118,7 +127,9 @@ class RigPage(PageWidget):
             state.trouble.follow(self._show_trouble),
             state.live.follow(self._show_live),
             state.frame.follow(self.live.show_frame),
-            state.exposure_ms.follow(self._exposure.setValue),
+            state.exposure_ms.follow(self._show_exposure),
+            state.counts.follow(self.live.show_counts),
+            state.is_exposing.follow(lambda _: self._show_auto()),
         ]
 
     def _toggle_link(self) -> None:
@@ -148,8 +159,21 @@ class RigPage(PageWidget):
         self._live_button.setEnabled(devices is not None)
         self.selftest.setEnabled(devices is not None)
         self._exposure.setEnabled(devices is not None)
+        self._show_exposure(self._state.exposure_ms.value)
+        self._show_auto()
         if camera is not None:
             self._exposure.setRange(*camera.exposure_range_ms)
+
+    def _show_exposure(self, exposure_ms: float) -> None:
+        # The box shows two decimals; what was asked for stays exact.
+        self._exposure.blockSignals(True)
+        self._exposure.setValue(exposure_ms)
+        self._exposure.setSingleStep(self._state.cycle_ms or 1.0)
+        self._exposure.blockSignals(False)
+        self._cycles.setText(cycles_text(exposure_ms, self._state.cycle_ms))
+
+    def _show_auto(self) -> None:
+        self.auto.setEnabled(self._state.devices.value is not None and not self._state.is_exposing.value)
 
     def _show_trouble(self, text: str) -> None:
         self._trouble.setText(text)
@@ -186,3 +210,19 @@ def parse_options(text: str) -> tuple[tuple[str, str], ...]:
     """Options from ``key=value`` texts separated by spaces; a word without ``=`` is switched on."""
     pairs = [part.partition("=") for part in text.split()]
     return tuple((key, value if sign else "on") for key, sign, value in pairs)
+
+
+def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
+    """How many LED cycles an exposure holds, and what is wrong with a part of one.
+
+    >>> cycles_text(50.0, 1000 / 60)
+    '3 LED cycles'
+    """
+    if not cycle_ms:
+        return ""
+    cycles = exposure_ms / cycle_ms
+    whole = round(cycles)
+    # The box rounds to a hundredth of a millisecond.
+    if whole and abs(exposure_ms - whole * cycle_ms) < 0.006:
+        return f"{whole} LED cycle{'' if whole == 1 else 's'}"
+    return f"{cycles:.2f} LED cycles: colours vary"

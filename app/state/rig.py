@@ -38,10 +38,20 @@ class RigChoice:
         return ", ".join((self.name, *(f"{key} {value}" for key, value in self.options)))
 
 
+@dataclass(frozen=True)
+class FrameCounts:
+    """Live frames so far: shown, lost on the way from the camera, and skipped because the window was busy."""
+
+    shown: int = 0
+    lost: int = 0
+    skipped: int = 0
+
+
 class RigState:
     """Values that the rig's controller sets and pages follow.
 
     ``frame`` is the latest live frame; ``trouble`` a sentence on why the rig is not there (empty: nothing).
+    ``is_exposing`` says that an exposure is being looked for.
     """
 
     def __init__(self, choice: RigChoice) -> None:
@@ -52,6 +62,8 @@ class RigState:
         self.live = Value(False)
         self.frame: Value[Frame | None] = Value(None)
         self.exposure_ms = Value(1000.0 / 6.0)
+        self.counts = Value(FrameCounts())
+        self.is_exposing = Value(False)
 
     @property
     def camera(self) -> CameraInfo | None:
@@ -64,3 +76,12 @@ class RigState:
         """What the projector is; None while there is none."""
         devices = self.devices.value
         return None if devices is None else devices.projector.info
+
+    @property
+    def cycle_ms(self) -> float | None:
+        """The projector's colour cycle, as the self-test found it, else as its driver says; None without."""
+        devices = self.devices.value
+        if devices is None:
+            return None
+        known = devices.calibration
+        return devices.projector.info.frame_period_ms if known is None else known.frame_period_ms

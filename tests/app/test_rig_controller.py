@@ -10,7 +10,7 @@ from pytestqt.qtbot import QtBot
 from app.controllers.rig import LOST_AFTER, RigController
 from app.jobs.base import InlineRunner, Job
 from app.jobs.qt_runner import QtRunner
-from app.state.rig import Link, RigChoice, RigState
+from app.state.rig import FrameCounts, Link, RigChoice, RigState
 from app.views import RecordingNotifier
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
@@ -121,6 +121,52 @@ def test_a_camera_that_goes_silent_is_lost_and_told(
     monkeypatch.setattr(SimCamera, "snap", silent)
     rig, notifier, runner = live()
     qtbot.waitUntil(lambda: rig.state.link.value is Link.LOST)
-    assert rig.frames_lost == LOST_AFTER
+    assert rig._counts.lost == LOST_AFTER
     assert "Check its cable" in notifier.told[-1][1]
     runner.shut_down()
+
+
+def test_one_click_exposes_for_whole_cycles_of_what_the_camera_sees(qtbot: QtBot, live: Live) -> None:
+    rig, notifier, _ = live()
+    rig.show("white", 0.3)
+    rig.set_exposure(900.0)
+    rig.expose_automatically((8, 8, 40, 30))
+    assert rig.state.is_exposing.value
+
+    def is_done() -> bool:
+        rig.take_frame()
+        return not rig.state.is_exposing.value
+
+    qtbot.waitUntil(is_done, timeout=20_000)
+    cycle_ms, frame = rig.state.cycle_ms, rig.state.frame.value
+    assert cycle_ms is not None
+    assert frame is not None
+    cycles = rig.state.exposure_ms.value / cycle_ms
+    assert cycles == pytest.approx(round(cycles), abs=1e-6)
+    assert notifier.told[-1][1].startswith("Exposed for")
+    part = frame.pixels[8:38, 8:48]
+    assert np.quantile(part, 0.99) < 4095
+    rig.stop_live()
+
+
+def test_frames_that_nobody_took_are_counted_as_skipped() -> None:
+    rig, _ = controller()
+    for number in range(3):
+        rig._post(Frame(np.zeros((4, 4), np.uint16), 10.0, frame_id=number))
+    rig.take_frame()
+    assert rig.state.counts.value == FrameCounts(shown=1, lost=0, skipped=2)
+    frame = rig.state.frame.value
+    assert frame is not None
+    assert frame.frame_id == 2
+
+
+def test_the_cycle_is_the_calibrated_one() -> None:
+    rig, _ = controller()
+    rig.connect(TWIN)
+    devices = rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    devices.calibration = devices.calibration.model_copy(update={"frame_period_ms": 8.0})
+    assert rig.state.cycle_ms == 8.0
+    devices.calibration = None
+    assert rig.state.cycle_ms == devices.projector.info.frame_period_ms

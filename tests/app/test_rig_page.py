@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from app.controllers.rig import RigController
 from app.jobs.qt_runner import QtRunner
-from app.panels.rig_page import RigPage, parse_options
+from app.panels.rig_page import RigPage, cycles_text, parse_options
 from app.state.rig import Link, RigChoice, RigState
 from app.theme import LIGHT
 from app.views import RecordingNotifier
@@ -111,3 +111,49 @@ def test_options_as_people_type_them() -> None:
         ("film", "off"),
         ("noise", "on"),
     )
+
+
+def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, notifier = bench
+    connect(qtbot, page, state)
+    assert not page.live.rectangle.isVisible()
+    click(page._live_button)
+    qtbot.waitUntil(lambda: state.frame.value is not None, timeout=20_000)
+    page.live.region_box.click()
+    region = page.live.region
+    assert region is not None
+    x, y, width, height = region
+    assert (x % 2, y % 2, width % 2, height % 2) == (0, 0, 0, 0)
+    assert 0 < width < 64
+    assert 0 < height < 48
+    page.live.rectangle.setPos(-20, -20)
+    moved = page.live.region
+    assert moved is not None
+    assert moved[:2] == (0, 0)
+    page.live.rectangle.setPos(0, 0)
+    click(page.auto)
+    qtbot.waitUntil(lambda: bool(notifier.told), timeout=30_000)
+    assert "LED cycle" in page._cycles.text()
+    assert "vary" not in page._cycles.text()
+    assert page.auto.isEnabled()
+
+
+def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    click(page._live_button)
+    qtbot.waitUntil(lambda: state.frame.value is not None, timeout=20_000)
+    click(page._live_button)
+    qtbot.waitUntil(lambda: not state.live.value)
+    QTest.keyClick(page.live, Qt.Key.Key_Right)
+    QTest.keyClick(page.live, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+    frame = state.frame.value
+    assert frame is not None
+    assert page.live._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN"
+    QTest.keyClick(page.live, Qt.Key.Key_F)
+
+
+def test_parts_of_a_cycle_are_named() -> None:
+    assert cycles_text(1000 / 6, 1000 / 60) == "10 LED cycles"
+    assert cycles_text(160.0, 1000 / 60) == "9.60 LED cycles: colours vary"
+    assert cycles_text(160.0, None) == ""

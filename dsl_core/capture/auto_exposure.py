@@ -1,0 +1,102 @@
+"""The longest exposure that saturates nothing that matters, found from live frames one after the other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Share of full scale that the brightest pixels may reach, and the share from which that is near enough.
+FILL, NEAR = 0.9, 0.8
+#: Share of pixels that may be brighter than the brightness that is judged: glints and hot pixels.
+BRIGHTEST_SHARE = 0.005
+#: A saturated frame says only that it is too long, a dark one little of how much too short.
+SHORTEN, LENGTHEN = 4.0, 16.0
+#: At the longest exposure, less than this share of full scale is too dark to measure anything.
+TOO_DARK = 0.1
+MOST_FRAMES = 12
+#: No more pixels than these are judged, evenly spread: enough for a quantile, quick enough for a live view.
+_PIXELS = 200_000
+
+
+class ExposureSearch:
+    """Judges frames and says how long to expose the next one, until it is `found` or there is `trouble`.
+
+    Exposures are whole cycles of ``cycle_ms``, so that each holds all colours of a projector that flashes
+    them one after the other; None leaves them free.
+    """
+
+    def __init__(
+        self,
+        range_ms: tuple[float, float],
+        full_scale_dn: int,
+        cycle_ms: float | None,
+        black_level_dn: float = 0.0,
+    ) -> None:
+        """``range_ms`` is what the camera can do."""
+        self._cycle_ms = cycle_ms
+        low, high = range_ms
+        self._low = math.ceil(low / cycle_ms) * cycle_ms if cycle_ms else low
+        self._high = max(self._whole(high), self._low)
+        self._full, self._black = full_scale_dn, black_level_dn
+        self._judged = 0
+        self.found = False
+        self.trouble = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no further frame is needed."""
+        return self.found or bool(self.trouble)
+
+    def start_from(self, exposure_ms: float) -> float:
+        """The first exposure to try: the one at hand, within the range and on whole cycles."""
+        return min(max(self._whole(exposure_ms), self._low), self._high)
+
+    def judge(self, pixels: NDArray[np.uint16], exposure_ms: float) -> float:
+        """How long to expose the next frame after one of raw ``pixels``; the same once it `is_over`."""
+        self._judged += 1
+        share = self._brightness(pixels)
+        if share >= 1.0:
+            if exposure_ms <= self._low:
+                self.trouble = (
+                    f"Even {exposure_ms:.4g} ms saturates, the shortest exposure there is. Close the"
+                    " aperture, or lower the projector's intensity."
+                )
+                return exposure_ms
+            wanted = exposure_ms / SHORTEN
+        else:
+            wanted = exposure_ms * min(FILL / max(share, 1e-6), LENGTHEN)
+        following = min(max(self._whole(wanted), self._low), self._high)
+        if share < 1.0 and (NEAR <= share <= FILL or following == exposure_ms):
+            self._end(share, exposure_ms)
+            return exposure_ms
+        if self._judged >= MOST_FRAMES:
+            self.trouble = "The light changes while it is judged. Hold everything still and try again."
+        return following
+
+    def _end(self, share: float, exposure_ms: float) -> None:
+        if share < TOO_DARK:
+            self.trouble = (
+                f"Even {exposure_ms:.4g} ms, the longest exposure there is, reaches only {share:.0%} of full"
+                " scale. Open the aperture, or raise the projector's intensity."
+            )
+        else:
+            self.found = True
+
+    def _brightness(self, pixels: NDArray[np.uint16]) -> float:
+        """The brightest pixels that count, as a share of the range above black; 1 if saturated."""
+        flat = pixels.ravel()
+        judged = flat[:: max(flat.size // _PIXELS, 1)]
+        place = min(int(judged.size * (1.0 - BRIGHTEST_SHARE)), judged.size - 1)
+        level = float(np.partition(judged, place)[place])
+        if level >= self._full:
+            return 1.0
+        return max(level - self._black, 0.0) / (self._full - self._black)
+
+    def _whole(self, exposure_ms: float) -> float:
+        """The longest whole number of cycles within an exposure."""
+        if not self._cycle_ms:
+            return exposure_ms
+        # A hair of rounding does not cost a cycle.
+        return max(math.floor(exposure_ms / self._cycle_ms + 1e-6), 1) * self._cycle_ms

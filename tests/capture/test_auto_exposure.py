@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.auto_exposure import FILL, ExposureSearch
+
+FULL = 4095
+CYCLE_MS = 1000 / 60
+
+
+def scene(dn_per_ms: float, black_dn: float = 200.0, noise_dn: float = 3.0, seed: int = 0) -> object:
+    """A camera that looks at an even scene with a glint in a thousandth of it."""
+    rng = np.random.default_rng(seed)
+
+    def snap(exposure_ms: float) -> NDArray[np.uint16]:
+        signal = np.full((60, 80), black_dn + dn_per_ms * exposure_ms)
+        signal[0, :4] *= 50
+        return np.asarray((signal + rng.normal(0, noise_dn, signal.shape)).clip(0, FULL), np.uint16)
+
+    return snap
+
+
+def find(
+    dn_per_ms: float, start_ms: float, cycle_ms: float | None = CYCLE_MS
+) -> tuple[ExposureSearch, float]:
+    snap = scene(dn_per_ms)
+    assert callable(snap)
+    search = ExposureSearch((0.02, 5000.0), FULL, cycle_ms, black_level_dn=200.0)
+    exposure_ms = search.start_from(start_ms)
+    while not search.is_over:
+        exposure_ms = search.judge(snap(exposure_ms), exposure_ms)
+    return search, exposure_ms
+
+
+@pytest.mark.parametrize("dn_per_ms", [1.0, 4.0, 20.0])
+@pytest.mark.parametrize("start_ms", [0.1, 166.0, 4000.0])
+def test_it_ends_below_the_limit_at_whole_cycles(dn_per_ms: float, start_ms: float) -> None:
+    search, exposure_ms = find(dn_per_ms, start_ms)
+    assert search.found, search.trouble
+    cycles = exposure_ms / CYCLE_MS
+    assert cycles == pytest.approx(round(cycles))
+    share = dn_per_ms * exposure_ms / (FULL - 200)
+    assert share < FILL + 0.02
+    assert share + dn_per_ms * CYCLE_MS / (FULL - 200) > 0.8
+
+
+def test_without_a_cycle_any_exposure_will_do() -> None:
+    search, exposure_ms = find(700.0, 100.0, cycle_ms=None)
+    assert search.found
+    assert 0.8 <= 700.0 * exposure_ms / (FULL - 200) <= FILL + 0.02
+
+
+def test_what_no_exposure_can_mend_is_said() -> None:
+    bright, _ = find(1000.0, 100.0)
+    assert "Close the aperture" in bright.trouble
+    dark, _ = find(0.01, 100.0)
+    assert "Open the aperture" in dark.trouble
+
+
+def test_light_that_flickers_ends_the_search() -> None:
+    search = ExposureSearch((1.0, 5000.0), FULL, CYCLE_MS)
+    exposure_ms, bright = 100.0, False
+    while not search.is_over:
+        bright = not bright
+        exposure_ms = search.judge(np.full((4, 4), FULL if bright else 50, np.uint16), exposure_ms)
+    assert "Hold everything still" in search.trouble
