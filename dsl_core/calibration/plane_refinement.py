@@ -109,13 +109,13 @@ def refine_planes(
     `CalibrationError` that names the position whose plane is not flat, or whose step is not what was asked.
     """
     require_tiles(positions_mm, samples)
-    start = _start(rig, positions_mm, samples, stage_std_mm)
+    start, rise = _start(rig, positions_mm, samples, stage_std_mm)
     problem = StageProblem(rig, positions_mm, samples, covariance, stage_std_mm)
     free = np.arange(SHARED if covariance is None else 0, len(start))
     numbers, posterior = _gauss_newton(problem, start, free)
     found = _summary(rig, problem, numbers, posterior)
     require_flat(positions_mm, found.plane_rms_mm)
-    require_agreement(found.pull, found.bow_mm, found.bow_std_mm)
+    require_agreement(found.pull, found.bow_mm, found.bow_std_mm, rise)
     return found
 
 
@@ -168,8 +168,8 @@ def _bow(problem: StageProblem, numbers: Floats, posterior: Floats) -> tuple[flo
 
 def _start(
     rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
-) -> Floats:
-    """Plane of each position for itself under the geometry given; checks the steps between them."""
+) -> tuple[Floats, float]:
+    """Plane of each position for itself under the geometry given, and how long steps are by it."""
     slopes, distances, scatter = [], [], []
     for part in samples:
         alone = StageProblem(rig, [0.0], [part], None, stage_std_mm)
@@ -182,12 +182,12 @@ def _start(
         distances.append(float(numbers[DISTANCE]))
         scatter.append(_rms(alone.residual_px(numbers) / _per_mm(alone, numbers)))
     require_alike(positions_mm, np.array(scatter))
-    require_steps(positions_mm, np.array(distances))
+    rise = require_steps(positions_mm, np.array(distances))
     start = np.zeros(STEPS + len(samples))
     start[SLOPES] = np.mean(slopes, 0)
     steps = np.asarray(positions_mm) - positions_mm[0]
     start[DISTANCE] = np.median(np.array(distances) - steps)
-    return start
+    return start, rise
 
 
 def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats) -> PlaneRefinement:

@@ -36,8 +36,11 @@ def require_tiles(positions_mm: Sequence[float], samples: Sequence[ColumnSamples
             )
 
 
-def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> None:
-    """Raise `CalibrationError` unless the planes stand as far apart as the stage says."""
+def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> float:
+    """How many times as far apart as the stage says the planes stand by the geometry before it is refined.
+
+    Raises `CalibrationError` when that is far from one, or one of them stands elsewhere.
+    """
     positions = np.asarray(positions_mm, float)
     tolerance = MAX_STEP_ERROR_MM + UNSURE_SCALE * float(np.ptp(positions))
     rise, offset = np.polyfit(positions - positions.mean(), distances_mm, 1)
@@ -57,6 +60,7 @@ def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> None:
             f" {', '.join(f'{p:g}' for p in positions)} mm. Check the unit of the stage, that it moves along"
             " the camera's axis, and the printed size of the board that the geometry was calibrated with."
         )
+    return float(rise)
 
 
 def require_alike(positions_mm: Sequence[float], rms_mm: Floats) -> None:
@@ -78,15 +82,17 @@ def require_flat(positions_mm: Sequence[float], rms_mm: Floats, limit_mm: float 
         )
 
 
-def require_agreement(pull: float, bow_mm: float, bow_std_mm: float) -> None:
+def require_agreement(pull: float, bow_mm: float, bow_std_mm: float, rise: float) -> None:
     """Raise `CalibrationError` when planes would need other lenses than the board's, far beyond its doubts.
 
-    A target that bulges alike at every position looks like lenses that distort otherwise.
+    A target that bulges alike at every position looks like lenses that distort otherwise, and steps that are
+    all too long, by the ratio ``rise``, like devices that stand farther apart.
     """
     if pull > MAX_PULL:
         raise CalibrationError(
             f"The planes contradict the geometry calibration: it would have to move by {pull:.1f} of"
             f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat: it looks"
             f" as if it bulged towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm."
+            f" By the printed board, the stage's steps are {rise:.3f} times as long as it says: check both."
             " Calibrate the geometry again if camera or projector were touched since."
         )

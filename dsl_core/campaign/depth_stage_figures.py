@@ -58,7 +58,8 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             value=record.geometry_pull,
             unit="deviations",
             high=MAX_PULL,
-            advice="Use a flatter target, or calibrate the geometry again: one of both is not what it seems.",
+            advice="Use a flatter target, check the stage's scale and the board's printed size, or calibrate"
+            " the geometry again: one of them is not what it seems.",
         ),
         *_bow(record),
         Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),

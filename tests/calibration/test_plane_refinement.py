@@ -165,6 +165,17 @@ def test_a_stage_of_another_scale_is_noticed() -> None:
         refine_planes(small_rig(), tuple(p / 1.05 for p in POSITIONS_MM), samples, None, STAGE_STD_MM)
 
 
+def test_steps_a_little_too_long_are_told_by_their_ratio() -> None:
+    truth, rng = random_rig(6, small_rig()), np.random.default_rng(6)
+    board = board_calibrated(truth, small_rig(), 6)
+    samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
+    assert board.geometry_covariance is not None
+    covariance = np.array(board.geometry_covariance).reshape(24, 24)
+    said = tuple(700 + (p - 700) / 1.01 for p in POSITIONS_MM)
+    with pytest.raises(CalibrationError, match=r"steps are 1\.0(09|10|11) times as long"):
+        refine_planes(board, said, samples, covariance, STAGE_STD_MM)
+
+
 def test_captures_of_another_rig_are_named() -> None:
     samples = _samples(small_rig())
     samples[0] = seen(random_rig(5, small_rig()), 600.0, np.random.default_rng(0))
