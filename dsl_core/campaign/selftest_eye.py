@@ -19,7 +19,7 @@ Drive = tuple[int, int, int]
 BLACK: Drive = (0, 0, 0)
 #: Attempts at a frame before a camera counts as broken.
 _ATTEMPTS = 3
-_TIMEOUT_MS = 5000.0
+_TIMEOUT_MS = 1500.0
 #: A camera may round the exposure it is asked for by this share.
 _EXPOSURE_TOLERANCE = 0.05
 #: Wait after a new picture until the latency is known.

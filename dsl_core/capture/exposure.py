@@ -29,12 +29,12 @@ class RetryPolicy:
     """How patient a runner is with a shot.
 
     ``attempts`` exposures at most, ``wait_ms`` between them after a lost frame; ``timeout_ms`` is added to
-    the exposure before a frame counts as lost.
+    the exposure before a frame counts as lost: long for any camera, and short for a person who cancels.
     """
 
     attempts: int = 4
     wait_ms: float = 200.0
-    timeout_ms: float = 5000.0
+    timeout_ms: float = 1500.0
 
 
 class _StaleFrameError(DeviceError):

@@ -194,6 +194,24 @@ def test_cancel_acts_between_shots_and_keeps_what_is_stored(
     assert len(sink.frames) == plan.shot_count
 
 
+def test_cancel_leaves_a_camera_that_hangs_within_two_seconds(
+    rig: DeviceRig, bench: Any, plan: CapturePlan, pattern: Pattern, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waited_ms: list[float] = []
+    runner = Runner(rig, plan, MemorySink(plan), pattern)
+
+    def hang(timeout_ms: float = 5000.0) -> Frame:
+        waited_ms.append(timeout_ms)
+        runner.cancel()
+        raise DeviceError("No frame arrived.")
+
+    monkeypatch.setattr(rig.camera, "snap", hang)
+    with pytest.raises(Cancelled):
+        runner.run()
+    assert len(waited_ms) == 1
+    assert waited_ms[0] + 1000 * sum(bench.slept_s) < 2000
+
+
 def test_pause_waits_before_the_next_shot(
     rig: DeviceRig, bench: Any, plan: CapturePlan, pattern: Pattern
 ) -> None:
