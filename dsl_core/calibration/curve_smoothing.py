@@ -46,15 +46,15 @@ def smooth_curve(wavelengths_nm: Floats, values: Floats, std: Floats) -> SmoothC
     for length in LENGTHS_NM:
         shape = _matern(distance / length) * np.outer(envelope, envelope)
         for scale in SCALES:
-            # numpy's lets other threads run meanwhile, scipy's does not.
+            # numpy's lets other threads run meanwhile, scipy's does not; with one right side that is brief.
             factor = np.linalg.cholesky(scale**2 * shape + np.diag(noise**2)), True
             evidence = -0.5 * y @ cho_solve(factor, y) - np.log(np.diag(factor[0])).sum()
             if evidence > best[0]:
                 best = (float(evidence), float(length), scale**2 * shape)
     _, length_nm, prior = best
-    factor = np.linalg.cholesky(prior + np.diag(noise**2)), True
-    mean = prior @ cho_solve(factor, y)
-    spread = np.diag(prior) - np.einsum("ij,ij->j", prior, cho_solve(factor, prior))
+    solved = np.linalg.solve(prior + np.diag(noise**2), np.column_stack([y, prior]))
+    mean = prior @ solved[:, 0]
+    spread = np.diag(prior) - np.einsum("ij,ij->j", prior, solved[:, 1:])
     return SmoothCurve(mean * peak, np.sqrt(np.maximum(spread, 0)) * peak, length_nm)
 
 
