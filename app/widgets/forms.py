@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QWidget
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
@@ -73,6 +73,13 @@ class ChoiceBox(CalmWheel, QComboBox):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(name)
         self.setToolTip(tip or name)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Tell of an entry that was found by typing, which Qt does only for the arrow keys."""
+        before = self.currentIndex()
+        super().keyPressEvent(event)
+        if self.currentIndex() != before and event.text().isprintable() and event.text():
+            self.activated.emit(self.currentIndex())
 
 
 def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
