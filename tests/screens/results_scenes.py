@@ -68,6 +68,7 @@ def views(stage: Stage) -> None:
     page._commands.point_at((60, 40))
     for view in View:
         stage.window.do(view.value)
+        stage.idle()
         stage.shoot(view.value.removeprefix("view_"))
     stage.window.do("view_quality")
     for quality in Quality:
@@ -82,6 +83,7 @@ def marks(stage: Stage) -> None:
     state.selected.set(state.marks.value[0].key)
     stage.shoot("compared")
     stage.window.do("view_cloud")
+    stage.idle()
     stage.shoot("cloud")
     page.marks.remove_selected()
     stage.shoot("undo")
@@ -127,7 +129,7 @@ def export(stage: Stage) -> None:
         box.setChecked(box.isEnabled())
     stage.shoot()
     (stage.folder / "scans" / "chart.ply").touch()
-    dialog.folder.setText(str(stage.folder / "scans"))
+    dialog.name.setText("chart ")
     stage.shoot("taken")
 
 

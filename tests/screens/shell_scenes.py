@@ -41,6 +41,7 @@ def texts(stage: Stage) -> None:
         stage.window.do("help_page")
         stage.shoot(f"help-{page.key}")
         _close(stage)
+    stage.window.open_page("scan")
     for key in ("shortcuts", "about", "show_command"):
         stage.window.do(key)
         stage.shoot(key.replace("_", "-"))

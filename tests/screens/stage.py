@@ -25,8 +25,9 @@ from tests.screens.material import CHART, Material
 
 W = TypeVar("W", bound=QWidget)
 CHART_RIG = RigChoice("twin", tuple(CHART.items()))
-#: How long the window settles before a picture is taken, s.
+#: How long the window settles before a picture is taken, s, and in how many rounds of its events at least.
 SETTLE_S = 0.25
+ROUNDS = 20
 PATIENCE_S = 300.0
 
 
@@ -102,9 +103,12 @@ class Stage:
         self.wait(lambda: not self.window.parts.runner.active)
 
     def settle(self) -> None:
-        """Let the window paint what it has to."""
-        limit = time.monotonic() + SETTLE_S
-        self.wait(lambda: time.monotonic() > limit)
+        """Let the window paint what it has to, however long one painting takes."""
+        limit, rounds = time.monotonic() + SETTLE_S, 0
+        while rounds < ROUNDS or time.monotonic() < limit:
+            QApplication.processEvents()
+            time.sleep(0.005)
+            rounds += 1
 
     # See -------------------------------------------------------------------------------------------
 

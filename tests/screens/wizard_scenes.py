@@ -6,6 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from PySide6.QtWidgets import QLineEdit
+
 from app.panels.calibrate_page import CalibratePage
 from app.state.calibrate import ABOUT
 from app.state.wizard import Doing, WizardState
@@ -88,8 +90,10 @@ def lacking(stage: Stage) -> None:
     wizard.go_to(wizard.state.last)
     stage.shoot("fit")
     wizard.go_to(0)
-    key = wizard.state.settings.value[0].key
-    wizard.window._commands.change_settings({key: "many"})
+    field = wizard.window.settings.findChildren(QLineEdit)[0]
+    field.setText("many")
+    field.editingFinished.emit()
+    stage.wait(lambda: wizard.state.settings_trouble.value)
     wizard.idle()
     stage.shoot("setting")
 
