@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.solve.determinant import log_determinant
 
 Floats = NDArray[np.float64]
 
@@ -162,8 +163,6 @@ def refined_curves(rig: Rig, found: Refinement) -> tuple[Rgb, Rgb, float]:
 
 def _solve(rig: Rig, data: SurfaceSignals, weight: float, error: float) -> Refinement:
     """Gauss and Newton from the start curves, and the evidence by Laplace's approximation."""
-    from scipy.linalg import cho_solve
-
     model = SpectralModel(rig)
     std = _total_std(data, error)
     prior = _prior(rig, weight, _unit(data, std))
@@ -172,15 +171,16 @@ def _solve(rig: Rig, data: SurfaceSignals, weight: float, error: float) -> Refin
         predicted, slope = model.predict(x, data)
         a = (slope / std[..., None]).reshape(-1, model.size)
         miss = ((data.signal - predicted) / std).ravel()
-        # numpy's lets other threads run meanwhile, scipy's does not.
-        root = np.linalg.cholesky(a.T @ a + prior)
-        step = cho_solve((root, True), a.T @ miss - prior @ x)
+        # numpy's solvers let other threads run meanwhile, scipy's do not.
+        curvature = a.T @ a + prior
+        step = np.linalg.solve(curvature, a.T @ miss - prior @ x)
         x = x + np.clip(step, -0.5, 0.5)
         if np.abs(step).max() < 1e-6:
             break
+    root = np.linalg.cholesky(curvature)
     predicted, _ = model.predict(x, data)
     cost = float((((data.signal - predicted) / std) ** 2).sum() + x @ prior @ x)
-    evidence = -0.5 * cost - float(np.log(std).sum()) + 0.5 * float(np.linalg.slogdet(prior)[1])
+    evidence = -0.5 * cost - float(np.log(std).sum()) + 0.5 * log_determinant(prior)
     evidence -= float(np.log(np.diag(root)).sum())
     inverse = np.linalg.inv(root)
     covariance = (inverse.T @ inverse)[:-1, :-1]

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.determinant import log_determinant
+
 Floats = NDArray[np.float64]
 
 #: Lengths (units of the nodes) and amplitudes that are tried where nothing else is asked for.
@@ -128,16 +130,8 @@ def solve_given(equations: Equations, prior: Floats, noise_factor: float) -> Smo
     values = covariance @ equations.right * precision
     explained = float(values @ equations.right) * precision
     misfit = equations.square * precision - explained
-    log_evidence = -0.5 * (_log_determinant(system) + misfit + 2 * equations.count * np.log(noise_factor))
+    log_evidence = -0.5 * (log_determinant(system) + misfit + 2 * equations.count * np.log(noise_factor))
     return SmoothSolution(values, covariance, np.nan, np.nan, noise_factor, prior, float(log_evidence))
-
-
-def _log_determinant(matrix: Floats) -> float:
-    """Logarithm of the size of a determinant; unlike numpy's, other threads run meanwhile."""
-    from scipy.linalg.lapack import dgetrf
-
-    triangles, _, _ = dgetrf(matrix)
-    return float(np.log(np.abs(np.diag(triangles))).sum())
 
 
 def _prior(
