@@ -1,0 +1,132 @@
+"""The actors of a point cloud in a pyvista plotter: a part while it moves, all that is quick at rest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float32]
+#: Points drawn while the view turns.
+COARSE = 30_000
+#: A picture at rest may take so long, s. Steps that add less than a share of what is there are not worth it.
+SLOW_S, LEAST_STEP = 0.1, 0.25
+POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 6
+#: Pixels of a view that a cloud covers, about; points that are few are drawn larger, so that it is no veil.
+COVERED_PX = 200_000
+
+
+class Cloud:
+    """Shows a few points at once; `grow` adds more of them, step by step, as long as that is quick."""
+
+    def __init__(self, plotter: Any) -> None:
+        self.plotter = plotter
+        self.shown = 0
+        self._actors: dict[str, Any] = {}
+        self._meshes: dict[str, Any] = {}
+        self._points: Points | None = None
+        self._colours: NDArray[np.uint8] = np.empty((0, 3), np.uint8)
+        self._parts: dict[str, NDArray[np.int32]] = {}
+        self._order = np.empty(0, np.int32)
+        self._is_coarse = False
+
+    def show(self, points: Points, colours: NDArray[np.uint8]) -> bool:
+        """Show a cloud; True when it is another than before, and not only of other colours."""
+        self._colours = colours
+        if points is self._points:
+            for name, index in self._parts.items():
+                self._meshes[name]["colours"] = colours[index]
+            return False
+        for name in self._parts:
+            self.plotter.remove_actor(self._actors.pop(name), reset_camera=False, render=False)
+        self._points, self._parts, self.shown = points, {}, 0
+        # A fixed random order, so that a part of the cloud is even and does not flicker.
+        self._order = np.random.default_rng(0).permutation(len(points)).astype(np.int32)
+        self._add(COARSE)
+        return True
+
+    def grow(self, frame_s: float) -> bool:
+        """Add points, if a picture that took ``frame_s`` stays quick; False where there is nothing to add."""
+        left = len(self._order) - self.shown
+        room = int(self.shown * min(SLOW_S / max(frame_s, 1e-4) - 1, 1.0))
+        if left == 0 or room < min(left, LEAST_STEP * self.shown):
+            return False
+        self._add(min(room, left))
+        return True
+
+    def _add(self, count: int) -> None:
+        assert self._points is not None
+        name, index = f"part {len(self._parts)}", self._order[self.shown : self.shown + count]
+        self._parts[name] = index
+        self.shown += len(index)
+        self._put(name, self._points[index], self._colours[index], POINT_PX)
+        self.be_coarse(self._is_coarse)
+
+    def _put(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: int) -> None:
+        import pyvista
+
+        if name in self._actors:
+            self.plotter.remove_actor(self._actors.pop(name), reset_camera=False, render=False)
+        if len(points) == 0:
+            # VTK wants at least one point; this one is never in view.
+            points, colours = np.full((1, 3), -1e6, np.float32), np.zeros((1, 3), np.uint8)
+        mesh = pyvista.PolyData(np.ascontiguousarray(points))
+        mesh["colours"] = colours
+        self._meshes[name] = mesh
+        self._actors[name] = self.plotter.add_mesh(
+            mesh,
+            scalars="colours",
+            rgb=True,
+            style="points",
+            point_size=size_px,
+            lighting=False,
+            reset_camera=False,
+            render=False,
+        )
+
+    def mark(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: int) -> None:
+        """Show some points in front of the cloud's own."""
+        # A little nearer to the eye that took them, so that their neighbours do not hide them.
+        near = np.asarray(points * 0.997, np.float32)
+        old = self._meshes.get(name)
+        if old is not None and len(points) and old.n_points == len(points):
+            old.points = near
+            old["colours"] = colours
+        else:
+            self._put(name, near, colours, size_px)
+
+    def be_coarse(self, coarse: bool) -> None:
+        """Show the first part alone, or all of them; the fewer points, the larger."""
+        self._is_coarse = coarse
+        size_px = point_size(min(COARSE, self.shown) if coarse else self.shown)
+        for number, name in enumerate(self._parts):
+            actor = self._actors[name]
+            actor.SetVisibility(number == 0 or not coarse)
+            actor.GetProperty().SetPointSize(min(size_px, COARSE_PX) if self.shown > COARSE else size_px)
+
+    def reset(self, width: int, height: int) -> None:
+        """Look along the camera's axis, as the picture does, so that all fits into a window's size."""
+        if self._points is None or len(self._order) == 0:
+            return
+        low, high = np.percentile(self._points[self._order[:COARSE]], (0.5, 99.5), axis=0)
+        centre, span = (low + high) / 2, (high - low) / 2
+        camera = self.plotter.camera
+        camera.position, camera.up, camera.focal_point = (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), tuple(centre)
+        reach = 1.1 * max(span[1], span[0] * height / max(width, 1))
+        camera.view_angle = float(np.degrees(2 * np.arctan2(reach, low[2])))
+        self.plotter.reset_camera_clipping_range()
+
+    def projection(self, width: int, height: int) -> NDArray[np.float64]:
+        """From points to normalised screen coordinates, 4 x 4."""
+        matrix = self.plotter.camera.GetCompositeProjectionTransformMatrix(width / max(height, 1), -1, 1)
+        return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
+
+
+def point_size(count: int) -> int:
+    """Size of the points of a cloud, px.
+
+    >>> point_size(500_000), point_size(14_000), point_size(100)
+    (2, 4, 6)
+    """
+    return min(max(round((COVERED_PX / max(count, 1)) ** 0.5), POINT_PX), LARGEST_PX)
