@@ -29,7 +29,7 @@ from app.panels.search_panel import SearchPanel
 from app.panels.spectrum_panel import SpectrumPanel
 from app.panels.view_bar import ViewBar
 from app.state.results import ResultsState, View
-from app.theme import Theme
+from app.theme import DARK, Theme
 from app.widgets.forms import label
 from app.widgets.help_window import set_help
 from app.widgets.page import PageWidget
@@ -70,8 +70,9 @@ class ResultsPage(PageWidget):
         set_help(self.marks, "numbers#pins-regions-references")
         self.search = SearchPanel(state, commands)
         set_help(self.search, "numbers#look-for")
-        self.graph = IntensityWindow(state, self)
-        self._panels = (self.image, self.scene, self.spectra, self.marks, self.graph)
+        self._graph: IntensityWindow | None = None
+        self._theme = DARK
+        self._panels = (self.image, self.scene, self.spectra, self.marks)
         self.stack = QStackedWidget()
         self._open, self._export = QPushButton("Open…"), QPushButton("Export…")
         self._inspect = QPushButton("Intensity graph")
@@ -200,8 +201,11 @@ class ResultsPage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
+        self._theme = theme
         for panel in self._panels:
             panel.apply_theme(theme)
+        if self._graph is not None:
+            self._graph.apply_theme(theme)
 
     # Do --------------------------------------------------------------------------------------------
 
@@ -229,9 +233,18 @@ class ResultsPage(PageWidget):
         """Show what the pixel under the cursor saw; its window comes when that is known."""
         self._commands.inspect()
 
+    @property
+    def graph(self) -> IntensityWindow:
+        """The window of intensity graphs; made when it is first wanted, since that takes a moment."""
+        if self._graph is None:
+            self._graph = IntensityWindow(self._state, self)
+            self._graph.apply_theme(self._theme)
+        return self._graph
+
     def _show_graph(self, graph: IntensityGraph | None) -> None:
         if graph is None:
-            self.graph.hide()
+            if self._graph is not None:
+                self._graph.hide()
         elif not self.graph.isVisible():
             self.graph.show()
 
@@ -253,5 +266,6 @@ class ResultsPage(PageWidget):
     def release(self) -> None:
         """Let go of the graphics context and of the recent files."""
         self.welcome.release()
-        self.graph.close()
+        if self._graph is not None:
+            self._graph.close()
         self.scene.release()
