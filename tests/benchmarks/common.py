@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +50,17 @@ def write_json(path: Path | None, figures: Mapping[str, Any]) -> None:
     """Write the figures when a file was asked for."""
     if path is not None:
         path.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+
+
+def as_on_screen(display: str) -> dict[str, str]:
+    """An environment for a program on a display that starts as an installed one does: with its bytecode.
+
+    The first start makes that, and the list of fonts; only the next one's times count.
+    """
+    kept = Path(tempfile.gettempdir()) / "dsl-scan-bytecode"
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    environment |= {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "QT_API": "pyside6"}
+    return {**environment, "PYTHONPYCACHEPREFIX": str(kept), "MPLCONFIGDIR": str(kept / "matplotlib")}
 
 
 def with_noise(rig: Rig, sigma: float) -> Rig:

@@ -1,0 +1,212 @@
+"""A person who clicks and types whatever comes to hand, on the composed application."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QWidget
+
+from app.application import ExceptionHook, make_window
+from app.composition import Composition, Wish
+from app.main_window import MainWindow
+from app.panels.scan_page import ScanPage
+from app.state.rig import Link, RigChoice
+
+RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "112x72")))
+NEVER = ("quit", "report_bundle")
+KEYS = (
+    *(Qt.Key.Key_1, Qt.Key.Key_2, Qt.Key.Key_3, Qt.Key.Key_4, Qt.Key.Key_5),
+    *(Qt.Key.Key_Tab, Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Escape, Qt.Key.Key_Delete),
+    *(Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_F, Qt.Key.Key_P),
+)
+PAGES = ("rig", "calibrate", "scan", "results", "compare")
+#: How long a question may stand before it is given up, and how long a scan may take, s.
+QUESTION_S, PATIENCE_S = 0.4, 400.0
+PAUSE_S = 0.05
+
+
+class RandomPerson:
+    """Everything it does comes from ``dice``; `done` says what it did, the latest last."""
+
+    def __init__(self, home: Path, theme: str, dice: random.Random) -> None:
+        self._home, self._dice = home, dice
+        self.done: list[str] = []
+        self.scans = 0
+        self._composition = Composition(Wish())
+        self.window: MainWindow = make_window(
+            self._composition.pages, home, "light" if theme == "light" else "dark", self._composition.commands
+        )
+        self.window.parts.settings.output_folder = str(home / "scans")
+        self._hook = ExceptionHook(self.window.toasts)
+        self._hook.install()
+        self.window.show()
+        self._questions = QTimer(self.window)
+        self._questions.setInterval(int(1000 * QUESTION_S))
+        self._questions.timeout.connect(_give_up)
+        self._questions.start()
+        self._composition.session(self.window).start()
+
+    # At random -------------------------------------------------------------------------------------
+
+    def act(self) -> None:
+        """Do one thing."""
+        kinds: list[tuple[Callable[[], str], int]] = [
+            (self._press, 6),
+            (self._click, 5),
+            (self._type, 5),
+            (self._do, 3),
+            (self._drag, 2),
+            (self._choose, 2),
+            (self._turn_page, 3),
+        ]
+        acts, weights = zip(*kinds, strict=True)
+        act = self._dice.choices(acts, weights)[0]
+        self.done.append(act.__name__.strip("_"))
+        said = act()
+        self.done[-1] += f" {said}"
+        self._live(self._dice.uniform(0.5, 2) * PAUSE_S)
+
+    @property
+    def _top(self) -> QWidget:
+        """The dialog that is open, else the window."""
+        return QApplication.activeModalWidget() or self.window
+
+    def _press(self) -> str:
+        buttons = [b for b in self._top.findChildren(QAbstractButton) if b.isVisible() and b.isEnabled()]
+        if not buttons:
+            return "nothing"
+        button = self._dice.choice(buttons)
+        name = button.text() or button.accessibleName()
+        QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+        return repr(name)
+
+    def _click(self) -> str:
+        at = self._spot(self._top)
+        hit = self._top.childAt(at) or self._top
+        kind = type(hit).__name__
+        QTest.mouseMove(hit, hit.mapFrom(self._top, at))
+        QTest.mouseClick(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, at))
+        return f"{at.x()},{at.y()} {kind}"
+
+    def _drag(self) -> str:
+        start, end = self._spot(self._top), self._spot(self._top)
+        hit = self._top.childAt(start) or self._top
+        kind = type(hit).__name__
+        QTest.mousePress(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, start))
+        for step in (0.3, 0.7, 1.0):
+            QTest.mouseMove(hit, hit.mapFrom(self._top, start + (end - start) * step))
+        QTest.mouseRelease(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, end))
+        return f"{start.x()},{start.y()} to {end.x()},{end.y()} {kind}"
+
+    def _type(self) -> str:
+        key = self._dice.choice(KEYS)
+        QTest.keyClick(QApplication.focusWidget() or self._top, key)
+        return key.name
+
+    def _do(self) -> str:
+        actions = self.window.actions_by_key
+        can = [key for key, action in actions.items() if action.isEnabled() and action.isVisible()]
+        key = self._dice.choice([key for key in can if key not in NEVER])
+        if QApplication.activeModalWidget() is None:
+            actions[key].trigger()
+        return key
+
+    def _choose(self) -> str:
+        boxes = [box for box in self._top.findChildren(QComboBox) if box.isVisible() and box.isEnabled()]
+        boxes = [box for box in boxes if box.count()]
+        if not boxes:
+            return "nothing"
+        box = self._dice.choice(boxes)
+        box.setCurrentIndex(self._dice.randrange(box.count()))
+        box.activated.emit(box.currentIndex())
+        return f"{box.accessibleName()!r} {box.currentText()!r}"
+
+    def _turn_page(self) -> str:
+        page = self._dice.choice(PAGES)
+        if QApplication.activeModalWidget() is None:
+            self.window.open_page(page)
+        return page
+
+    def _spot(self, widget: QWidget) -> QPoint:
+        return QPoint(self._dice.randrange(widget.width()), self._dice.randrange(widget.height()))
+
+    # On purpose ------------------------------------------------------------------------------------
+
+    def scan(self) -> None:
+        """Connect where need be, scan and reconstruct; one in five is cancelled in between."""
+        self.rest()
+        rig = self._composition.rig(self.window)
+        if rig.state.link.value is not Link.OPEN or rig.state.choice.value != RIG:
+            self.done.append("connect")
+            rig.connect(RIG)
+            self._wait(lambda: rig.state.link.value is Link.OPEN)
+        page = self.window.open_page("scan")
+        assert isinstance(page, ScanPage)
+        self.rest()
+        state, control = page._state, self._composition._scans
+        assert control is not None
+        control.leave_session()
+        control.plans.choose_preset("preview")
+        control.plans.set_target(self._home / "scans" / f"scan-{self.scans}.dsl")
+        state.then_reconstruct.set(True)
+        self.done.append("scan")
+        control.start()
+        if self._dice.random() < 0.2:
+            self._live(self._dice.uniform(0.2, 2.0))
+            control.cancel()
+        self._wait(lambda: not state.phase.value.is_busy)
+        self.rest(cancel=False)
+        self.scans += 1
+        for old in sorted((self._home / "scans").glob("*"), key=lambda path: path.stat().st_mtime)[:-4]:
+            shutil.rmtree(old, ignore_errors=True)
+
+    def rest(self, cancel: bool = True) -> None:
+        """Leave all dialogs and let everything come to its end."""
+        for _ in range(20):
+            dialogs = [w for w in QApplication.topLevelWidgets() if isinstance(w, QDialog) and w.isVisible()]
+            if not dialogs:
+                break
+            dialogs[-1].reject()
+            self._live(0.1)
+        if cancel:
+            self.window.parts.runner.cancel_all()
+        self._wait(lambda: not self.window.parts.runner.active)
+        for toast in list(self.window.toasts.shown):
+            toast.dismiss()
+        self._live(0.2)
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+    def close(self) -> None:
+        """Leave."""
+        self.rest()
+        self._questions.stop()
+        self.window.close()
+
+    def _wait(self, holds: Callable[[], object]) -> None:
+        limit = time.monotonic() + PATIENCE_S
+        while not holds():
+            assert time.monotonic() < limit, "it never came true"
+            self._live(0.02)
+
+    @staticmethod
+    def _live(seconds: float) -> None:
+        limit = time.monotonic() + seconds
+        while time.monotonic() < limit:
+            QApplication.processEvents()
+            time.sleep(0.003)
+
+
+def _give_up() -> None:
+    """Reject a question that stands in the way, such as one for a file."""
+    asked = QApplication.activeModalWidget()
+    popup = QApplication.activePopupWidget()
+    if popup is not None:
+        popup.close()
+    elif isinstance(asked, QDialog):
+        asked.reject()

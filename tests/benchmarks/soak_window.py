@@ -1,0 +1,161 @@
+"""Scans, reconstructions, clicks and keys at random on the whole application, for as long as one likes.
+
+Run ``python -m tests.benchmarks.soak_window --minutes 60``. Every round takes a handful of random actions and
+one scan with its result, and then counts what should not grow: widgets, threads, open files, memory. An
+exception, or growth beyond the limits, ends it with the seed and the last actions.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import logging
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import psutil
+
+from tests.app.virtual_display import virtual_display
+from tests.benchmarks.common import as_on_screen
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+    from tests.benchmarks.random_person import RandomPerson
+
+INSIDE = "DSL_SOAK_WINDOW"
+#: Rounds in which caches fill; growth counts from then on.
+WARM_ROUNDS = 3
+#: What may grow by so many between the first and the last third, a round: random pages differ a little.
+MOST_WIDGETS, MOST_THREADS, MOST_FILES, MOST_MB = 40, 1, 3, 40.0
+ACTIONS_A_ROUND = 25
+
+
+def main() -> None:
+    """Start on a display of its own unless already there."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--theme", choices=("light", "dark"), default="dark")
+    wanted = parser.parse_args()
+    if INSIDE not in os.environ:
+        with virtual_display(1280, 800) as display:
+            command = [sys.executable, "-m", "tests.benchmarks.soak_window", *sys.argv[1:]]
+            raise SystemExit(subprocess.run(command, env={**as_on_screen(display), INSIDE: "1"}).returncode)
+    raise SystemExit(_soak(wanted.minutes, wanted.seed, wanted.theme))
+
+
+def _soak(minutes: float, seed: int, theme: str) -> int:
+    from app.application import make_application
+    from tests.benchmarks.random_person import RandomPerson
+
+    application = make_application([])
+    with tempfile.TemporaryDirectory(prefix="dsl-scan-") as home:
+        os.environ["HOME"] = os.environ["DSL_SCAN_HOME"] = home
+        errors = _Errors()
+        person = RandomPerson(Path(home), theme, random.Random(seed))
+        rounds: list[tuple[float, ...]] = []
+        limit = time.monotonic() + 60 * minutes
+        head = ["round", "widgets", "objects", "threads", "files", "MB", "actions", "load"]
+        print("".join(f"{word:>10}" for word in head), flush=True)
+        wrong = ""
+        try:
+            while time.monotonic() < limit and not wrong:
+                person.scan()
+                for _ in range(ACTIONS_A_ROUND):
+                    person.act()
+                    if errors.told:
+                        break
+                person.rest()
+                rounds.append(_count(application))
+                print("".join(f"{word:>10}" for word in _row(len(rounds), rounds[-1], person)), flush=True)
+                wrong = errors.told or _growth(rounds)
+        except Exception as error:
+            wrong = f"{type(error).__name__}: {error}"
+            logging.getLogger(__name__).exception("the soak stopped")
+        finally:
+            person.close()
+        wrong = wrong or errors.told
+    if wrong:
+        print(f"\nseed {seed}: {wrong}\nlast actions: {', '.join(person.done[-12:])}")
+        return 1
+    judged = "nothing grew" if _is_long_enough(rounds) else "too few rounds to say whether anything grew"
+    print(f"\nseed {seed}: {len(rounds)} rounds, {len(person.done)} actions, {person.scans} scans; {judged}")
+    return 0
+
+
+class _Errors(logging.Handler):
+    """What nobody expected: uncaught exceptions, failures that are no sentence to a person, Qt's warnings."""
+
+    def __init__(self) -> None:
+        from PySide6.QtCore import qInstallMessageHandler
+
+        super().__init__(logging.WARNING)
+        self.told = ""
+        logging.getLogger().addHandler(self)
+        qInstallMessageHandler(self._hear)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the first that is a fault of the program."""
+        from dsl_core.errors import DslError
+
+        error = record.exc_info[1] if record.exc_info else None
+        expected = error is not None and isinstance(error, DslError | OSError)
+        if not self.told and (record.levelno >= logging.ERROR or error is not None) and not expected:
+            self.told = record.getMessage() + "\n" + logging.Formatter().format(record)
+
+    def _hear(self, kind: object, _context: object, text: str) -> None:
+        from PySide6.QtCore import QtMsgType
+
+        if kind is not QtMsgType.QtDebugMsg and kind is not QtMsgType.QtInfoMsg and not self.told:
+            self.told = f"Qt: {text}"
+
+
+def _count(application: QApplication) -> tuple[float, ...]:
+    """Widgets, Python's objects, threads, open files, memory in MB."""
+    gc.collect()
+    process = psutil.Process()
+    return (
+        len(application.allWidgets()),
+        len(gc.get_objects()),
+        process.num_threads(),
+        process.num_fds(),
+        process.memory_info().rss / 1e6,
+    )
+
+
+def _row(number: int, counted: tuple[float, ...], person: RandomPerson) -> list[str]:
+    figures = [f"{value:.0f}" for value in counted]
+    return [str(number), *figures, str(len(person.done)), f"{os.getloadavg()[0]:.1f}"]
+
+
+def _is_long_enough(rounds: list[tuple[float, ...]]) -> bool:
+    return len(rounds) >= WARM_ROUNDS + 9
+
+
+def _growth(rounds: list[tuple[float, ...]]) -> str:
+    """What grew between the first and the last third of all rounds; empty while that cannot be said."""
+    if not _is_long_enough(rounds):
+        return ""
+    settled = rounds[WARM_ROUNDS:]
+    third = len(settled) // 3
+    before, after = (np.median(part, axis=0) for part in (settled[:third], settled[-third:]))
+    limits = (MOST_WIDGETS, np.inf, MOST_THREADS, MOST_FILES, MOST_MB)
+    names = ("widgets", "objects", "threads", "open files", "MB of memory")
+    grown = [
+        f"{name} from {old:.0f} to {new:.0f}"
+        for name, old, new, most in zip(names, before, after, limits, strict=True)
+        if new - old > most
+    ]
+    return "; ".join(grown)
+
+
+if __name__ == "__main__":
+    main()

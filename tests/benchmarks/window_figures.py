@@ -1,0 +1,135 @@
+"""Single figures of the window: to the screen, cursor to spectrum, change of band, frames of a cloud, memory.
+
+Each is given by the clock and as computing time of the window's thread, which a busy machine leaves alone.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import psutil
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent
+from PySide6.QtWidgets import QApplication, QWidget
+
+from app.panels.results_page import ResultsPage
+from app.panels.scene import GlScene
+from tests.screens.stage import Stage
+
+#: Runs in a process of its own, up to the first picture on the screen.
+TO_THE_SCREEN = """
+import os, resource, sys, time
+import app.__main__
+from app.application import ExceptionHook, make_application, make_window
+from app.composition import Composition, Wish
+application = make_application([])
+composition = Composition(Wish())
+window = make_window(composition.pages, commands=composition.commands)
+window.show()
+while not window.windowHandle().isExposed():
+    application.processEvents()
+application.processEvents()
+import psutil
+print(time.time() - psutil.Process().create_time(), sum(os.times()[:2]))
+"""
+
+
+def start_figures(home: Path, times: int = 3) -> dict[str, tuple[float, float]]:
+    """Milliseconds (clock, computing) until the window is on the screen; the best of some starts."""
+    found = []
+    for _ in range(times):
+        out = subprocess.run(
+            [sys.executable, "-c", TO_THE_SCREEN],
+            env={**os.environ, "DSL_SCAN_HOME": str(home)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        found.append(tuple(1000 * float(word) for word in out.split()))
+    return {"window on screen": (min(clock for clock, _ in found), min(cpu for _, cpu in found))}
+
+
+def result_figures(stage: Stage, count: int = 40) -> dict[str, tuple[float, float]]:
+    """Milliseconds (clock, computing) of what a mouse does on a result that is open; medians."""
+    page = stage.window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    state, commands = page._state, page._commands
+    assert state.result.value is not None
+    rows, columns = state.result.value.shape
+    stage.window.do("view_colour")
+    stage.settle()
+    rng = np.random.default_rng(0)
+    spots = [(int(rng.integers(columns)), int(rng.integers(rows // 10, rows))) for _ in range(count)]
+    figures = {"cursor to spectrum": _timed([partial(commands.point_at, at) for at in spots])}
+    stage.window.do("view_band")
+    stage.settle()
+    last = len(state.result.value.wavelengths_nm)
+    figures["change of band"] = _timed([partial(state.band.set, b % last) for b in range(3, 3 + count)])
+    return figures
+
+
+def turn_cloud(stage: Stage, moves: int = 40) -> tuple[float, float, float]:
+    """Frames/s while a cloud is dragged, by clock and computing time, and seconds of the frame at rest."""
+    page = stage.window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    stage.window.do("view_cloud")
+    stage.idle()
+    stage.settle()
+    scene = page.scene.scene
+    assert isinstance(scene, GlScene), "no OpenGL here"
+    widget, at = scene.widget, scene.widget.rect().center()
+    _mouse(widget, QEvent.Type.MouseButtonPress, at)
+    QApplication.processEvents()
+    clock, cpu = time.perf_counter(), time.process_time()
+    for i in range(moves):
+        at += QPoint(3 if i % 20 < 10 else -3, 1)
+        _mouse(widget, QEvent.Type.MouseMove, at)
+        QApplication.processEvents()
+    clock, cpu = time.perf_counter() - clock, time.process_time() - cpu
+    rest = time.process_time()
+    _mouse(widget, QEvent.Type.MouseButtonRelease, at)
+    QApplication.processEvents()
+    return moves / clock, moves / cpu, time.process_time() - rest
+
+
+def _mouse(widget: QWidget, kind: QEvent.Type, at: QPoint) -> None:
+    left, none = Qt.MouseButton.LeftButton, Qt.MouseButton.NoButton
+    changed = none if kind is QEvent.Type.MouseMove else left
+    held = none if kind is QEvent.Type.MouseButtonRelease else left
+    where = QPointF(at)
+    event = QMouseEvent(kind, where, QPointF(widget.mapToGlobal(at)), changed, held, Qt.KeyboardModifier(0))
+    QApplication.sendEvent(widget, event)
+
+
+def memory_of(stage: Stage, path: Path) -> tuple[float, float]:
+    """Megabytes that the program grows by when a result is opened, and those of the result itself."""
+    page = stage.window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    state, process = page._state, psutil.Process()
+    state.result.set(None)
+    stage.settle()
+    before = process.memory_info().rss
+    stage.window.open_path(path)
+    stage.wait(lambda: state.result.value is not None)
+    stage.idle()
+    stage.settle()
+    assert state.result.value is not None
+    return (process.memory_info().rss - before) / 1e6, state.result.value.bytes / 1e6
+
+
+def _timed(acts: list[Callable[[], object]]) -> tuple[float, float]:
+    clocks, computed = [], []
+    for act in acts:
+        clock, cpu = time.perf_counter(), time.thread_time()
+        act()
+        QApplication.processEvents()
+        clocks.append(1000 * (time.perf_counter() - clock))
+        computed.append(1000 * (time.thread_time() - cpu))
+    return float(np.median(clocks)), float(np.median(computed))

@@ -1,0 +1,239 @@
+"""What a person lets the application do while `bench_window` watches how the window comes round."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+from app.jobs.warm_up import WarmUp
+from app.panels.compare_page import ComparePage
+from app.panels.results_page import ResultsPage
+from app.panels.rig_page import RigPage
+from app.panels.scan_page import ScanPage
+from app.state.calibrate import ABOUT
+from app.state.rig import Link, RigChoice
+from app.state.scan import Phase
+from app.state.wizard import Doing
+from app.wizards.wizard import CalibrationWizard
+from dsl_core.io.campaign_folder import CampaignFolder
+from tests.benchmarks.stall_watch import Stalls, StallWatch
+from tests.screens.stage import Stage
+
+#: Large enough that renderings and solvers are heavy, small enough that a busy machine ends in minutes.
+SCAN_RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "222x145")))
+#: The camera at its full size.
+LIVE_RIG = RigChoice("twin", (("scene", "color-checker"),))
+LIVE_S = 8.0
+#: How long any job may take on a machine that others keep busy, s.
+PATIENCE_S = 1800.0
+
+
+class WindowJobs:
+    """The composed application and what is done in it; each job is watched and timed.
+
+    ``full`` is a result of full size.
+    """
+
+    def __init__(self, stage: Stage, watch: StallWatch, full: Path) -> None:
+        self.stage, self._watch, self._full = stage, watch, full
+        self._warm_up = WarmUp()
+        #: Stalls and seconds of each job, and seconds until a cancel acted.
+        self.stalls: dict[str, Stalls] = {}
+        self.seconds: dict[str, float] = {}
+        self.cancel_s: dict[str, float] = {}
+
+    def _wait(self, holds: Callable[[], object]) -> None:
+        self.stage.wait(holds, PATIENCE_S)
+
+    @contextmanager
+    def _job(self, name: str) -> Iterator[None]:
+        start = time.perf_counter()
+        with self._watch.during(name) as stalls:
+            yield
+            self.stage.settle()
+        self.stalls[name], self.seconds[name] = stalls, time.perf_counter() - start
+
+    def _cancel(self, name: str, stop: Callable[[], object], is_over: Callable[[], object]) -> None:
+        with self._job(f"{name}, cancelled"):
+            start = time.perf_counter()
+            stop()
+            self._wait(is_over)
+            self.cancel_s[name] = time.perf_counter() - start
+
+    def all(self) -> dict[str, Callable[[], None]]:
+        """Groups of jobs by name, in an order that works."""
+        calibrations = {name: partial(self._calibrate, name) for name in ABOUT}
+        return {
+            "start": self._start,
+            "live": self._live,
+            "scan": self._scan,
+            **calibrations,
+            "results": self._results,
+            "export": self._export,
+            "compare": self._compare,
+        }
+
+    def _start(self) -> None:
+        campaign = self.stage.copied(self.stage.material.complete)
+        with self._job("start and connect"):
+            self.stage.open(library=True, campaign=campaign)
+            self.stage.composition.start(self.stage.window)
+            self._warm_up.start()
+            rig = self.stage.composition.rig(self.stage.window)
+            self._wait(lambda: rig.state.link.value is Link.OPEN)
+        with self._job("at rest after the start"):
+            self._wait(lambda: self._warm_up.is_over)
+        for page in ("rig", "scan", "calibrate", "results", "compare"):
+            with self._job(f"open page {page}"):
+                self.stage.window.open_page(page)
+        self.stage.idle()
+
+    def _live(self) -> None:
+        with self._job("connect full size"):
+            self.stage.connect(LIVE_RIG)
+        page = self.stage.window.open_page("rig")
+        assert isinstance(page, RigPage)
+        rig = self.stage.composition.rig(self.stage.window)
+        with self._job("live view full size"):
+            rig.start_live()
+            limit = time.monotonic() + LIVE_S
+            self._wait(lambda: time.monotonic() > limit)
+        self._cancel("live view", rig.stop_live, lambda: not rig.state.live.value)
+        self.stage.idle()
+
+    # Scan ------------------------------------------------------------------------------------------
+
+    def _scan(self) -> None:
+        with self._job("connect"):
+            self.stage.connect(SCAN_RIG)
+        page = self.stage.window.open_page("scan")
+        assert isinstance(page, ScanPage)
+        self.stage.idle()
+        control, state = self.stage.composition._scans, page._state
+        assert control is not None
+        state.then_reconstruct.set(False)
+        control.plans.choose_preset("reference")
+        control.start()
+        with self._job("scan, its first frames"):
+            self._wait(lambda: state.status.value.done > 8)
+        self._cancel("scan", control.cancel, lambda: state.phase.value is Phase.STOPPED)
+        control.leave_session()
+        control.plans.choose_preset("preview")
+        control.point_at((60, 40))
+        with self._job("scan"):
+            self.stage.press("Start scan", page)
+            self._wait(lambda: state.phase.value is Phase.DONE)
+            self.stage.idle()
+        self._reconstruct(_latest(state.target.value))
+
+    def _reconstruct(self, session: Path) -> None:
+        page = self.stage.window.open_page("results")
+        assert isinstance(page, ResultsPage)
+        commands, state = page._commands, page._state
+        state.result.set(None)
+        self.stage.window.open_path(session)
+        self._wait(lambda: state.offer.value is not None)
+        commands.reconstruct()
+        with self._job("reconstruct, its beginning"):
+            self._wait(lambda: any(job.progress.done > 0 for job in self.stage.window.parts.runner.active))
+        cancel = self.stage.window.parts.runner.cancel_all
+        self._cancel("reconstruct", cancel, lambda: not state.busy.value)
+        with self._job("reconstruct"):
+            commands.reconstruct()
+            self._wait(lambda: state.result.value is not None)
+            self.stage.idle()
+
+    # Calibrate -------------------------------------------------------------------------------------
+
+    def _calibrate(self, name: str) -> None:
+        campaign = self.stage.copied(self.stage.material.complete)
+        info = CampaignFolder.open(campaign).info
+        rig = self.stage.composition.rig(self.stage.window)
+        choice = RigChoice(info.rig, tuple(info.options.items()))
+        if rig.state.choice.value != choice or rig.state.link.value is not Link.OPEN:
+            self.stage.connect(choice)
+        page = self.stage.window.open_page("calibrate")
+        self.stage.idle()
+        with self._job(f"{name}: open wizard"):
+            page._commands.run(name)  # type: ignore[attr-defined]
+            wizard = self.stage.dialog(CalibrationWizard)
+            state, control = wizard._state, wizard._commands
+            self._wait(lambda: state.doing.value is Doing.IDLE)
+        with self._job(f"{name}: look"):
+            control.go_to(1)
+            control.check(True)
+            self._wait(lambda: state.look.value is not None)
+            control.check(False)
+            self._wait(lambda: state.doing.value is Doing.IDLE)
+        with self._job(f"{name}: capture"):
+            control.capture()
+            self._wait(lambda: state.doing.value is Doing.CAPTURING)
+            self._wait(lambda: state.doing.value is Doing.IDLE)
+        assert not state.trouble.value, state.trouble.value
+        with self._job(f"{name}: fit"):
+            control.fit()
+            self._wait(lambda: state.fit.value is not None or bool(state.trouble.value))
+            self._wait(lambda: state.doing.value is Doing.IDLE)
+        assert not state.trouble.value, state.trouble.value
+        control.fit()
+        limit = time.monotonic() + 0.5
+        self._wait(lambda: time.monotonic() > limit)
+        if state.doing.value is Doing.FITTING:
+            self._cancel(f"{name}: fit", control.stop, lambda: state.doing.value is Doing.IDLE)
+        wizard.reject()
+        self.stage.idle()
+
+    # Results ---------------------------------------------------------------------------------------
+
+    def _results(self) -> None:
+        page = self.stage.window.open_page("results")
+        assert isinstance(page, ResultsPage)
+        state = page._state
+        state.result.set(None)
+        with self._job("open full-size result"):
+            self.stage.window.open_path(self._full)
+            self._wait(lambda: state.result.value is not None)
+            self.stage.idle()
+        for view in ("band", "depth", "quality", "colour"):
+            with self._job(f"view {view}"):
+                self.stage.window.do(f"view_{view}")
+                self.stage.idle()
+        with self._job("3D cloud, 500,000 points"):
+            self.stage.window.do("view_cloud")
+            self.stage.idle()
+            self._wait(lambda: page.scene.scene is not None)
+        with self._job("relight"):
+            page._commands.relight("A", False)
+            self.stage.idle()
+        with self._job("look for a spectrum"):
+            page._commands.point_at((400, 300))
+            page._commands.search(page.search.what.itemData(0))
+            self.stage.idle()
+        page._commands.end_search()
+
+    def _export(self) -> None:
+        page = self.stage.window.open_page("results")
+        assert isinstance(page, ResultsPage)
+        forms = ("ply", "envi", "exr", "png")
+        with self._job("export"):
+            page._commands.export({form: self.stage.folder / f"out.{form}" for form in forms}, True)
+            self.stage.idle()
+
+    def _compare(self) -> None:
+        page = self.stage.window.open_page("compare")
+        assert isinstance(page, ComparePage)
+        with self._job("compare"):
+            for name, second in (("chart.zarr", False), ("chart-again.zarr", True)):
+                page._commands.open_side(self.stage.material.scans / name, second=second)
+                self.stage.idle()
+            self._wait(lambda: page._state.pair.value is not None)
+        with self._job("compare with truth"):
+            page._commands.use_truth()
+            self.stage.idle()
+
+
+def _latest(target: Path) -> Path:
+    return max(target.parent.glob("*.dsl"), key=lambda path: path.stat().st_mtime)
