@@ -157,7 +157,8 @@ def test_a_drawn_rig_is_unknown_and_repeatable() -> None:
     rig, world = twin(truth="4")
     assert rig.calibration is None
     assert rig.nominal is not None
-    assert world.rig == random_rig(4, rig.nominal)
+    # What is true leaves nothing open in its columns.
+    assert world.rig == random_rig(4, rig.nominal).model_copy(update={"column_std_px": 0.0})
     assert world.rig != random_rig(5, rig.nominal)
     assert 470 <= world.rig.film.lines_per_mm <= 510
     ratio = world.rig.response[1].at(550) / rig.nominal.response[1].at(550)
