@@ -34,7 +34,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rig = None if wanted.rig is None else RigChoice(wanted.rig, _options(wanted.option))
     path = None if wanted.path is None else wanted.path.absolute()
     composition = Composition(Wish(rig, path, wanted.demo, is_first_contact=True))
-    window = make_window(composition.pages, theme=wanted.theme, commands=composition.commands)
+    window = make_window(
+        composition.pages,
+        theme=wanted.theme,
+        commands=composition.commands,
+        page_waits=True,
+    )
     hook = ExceptionHook(window.toasts)
     hook.install()
     window.show()

@@ -76,10 +76,12 @@ def make_window(
     folder: Path | None = None,
     theme: Literal["system", "light", "dark"] | None = None,
     commands: dict[str, Command] | None = None,
+    page_waits: bool = False,
 ) -> MainWindow:
     """The window with its settings of a folder (default: the system's); told troubles become toasts.
 
-    ``theme`` overrides that of the settings.
+    ``theme`` overrides that of the settings. The page that was open last is there at once, or, if it
+    ``page_waits``, after the first paint, so that the window is on screen before plots are imported.
     """
     path = (folder or settings_folder()) / "settings.json"
     settings, trouble = load_settings(path)
@@ -92,7 +94,11 @@ def make_window(
     records.setParent(window)
     parts.runner.setParent(window)
     window.setWindowIcon(app_icon(window.theme))
-    window.open_page(settings.page if settings.page in pages else next(iter(pages)))
+    settings.page = settings.page if settings.page in pages else next(iter(pages))
+    if page_waits:
+        window.painted.connect(lambda: window.open_page(window.page))
+    else:
+        window.open_page(settings.page)
     if trouble:
         window.toasts.tell("warning", trouble)
     return window

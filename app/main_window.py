@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QSize, Qt, Signal
-from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtCore import QByteArray, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QAction, QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
 from PySide6.QtWidgets import (
     QDockWidget,
     QFileDialog,
@@ -68,9 +68,11 @@ class MainWindow(QMainWindow):
     """The application's window.
 
     ``pages`` makes the widget of each page of the rail; ``commands`` do the actions of the table that neither
-    a page nor the window itself can do. ``closed`` tells that the window ends well.
+    a page nor the window itself can do. ``painted`` tells once that the window is on
+    screen, ``closed`` that it ends well.
     """
 
+    painted = Signal()
     closed = Signal()
 
     def __init__(
@@ -78,6 +80,7 @@ class MainWindow(QMainWindow):
     ) -> None:
         super().__init__()
         self._commands = commands or {}
+        self._is_painted = False
         self.parts = parts
         self.theme: Theme = DARK
         self.setWindowTitle("dsl-scan")
@@ -171,7 +174,7 @@ class MainWindow(QMainWindow):
         elif key.startswith("theme_"):
             self.apply_theme(key.removeprefix("theme_"))
         else:
-            method = self._made[self.page].page_actions().get(key)
+            method = self.page_of(self.page).page_actions().get(key)
             if method is not None:
                 method()
             elif key in self._commands:
@@ -206,6 +209,13 @@ class MainWindow(QMainWindow):
             self.parts.recent.forget(path)
         self.toasts.tell("warning", refusal(path))
 
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Tell of the first paint, once what was painted has reached the screen."""
+        super().paintEvent(event)
+        if not self._is_painted:
+            self._is_painted = True
+            QTimer.singleShot(0, self, self.painted.emit)
+
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Files may be dropped anywhere."""
         if dropped_paths(event.mimeData()):
@@ -222,7 +232,7 @@ class MainWindow(QMainWindow):
 
     def do_show_command(self) -> None:
         """Show the command line of the open page."""
-        command = self._made[self.page].command_line()
+        command = self.page_of(self.page).command_line()
         if command:
             text_windows.command_window(command, self).open()
         else:

@@ -120,7 +120,7 @@ class LiveView(QWidget):
         self.region_box.setEnabled(camera is not None)
         self._empty.setText(NO_RIG if camera is None else NO_PICTURE)
         self._empty.setVisible(True)
-        for figure in (self._saturated, self._focus, self._rate):
+        for figure in (self._saturated, self._focus, self._rate, self._counts):
             figure.clear()
         if camera is not None:
             self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
@@ -143,7 +143,8 @@ class LiveView(QWidget):
 
     def show_counts(self, counts: FrameCounts) -> None:
         """Show how many frames were lost and skipped."""
-        self._counts.setText(f"{counts.lost} lost, {counts.skipped} skipped")
+        none = counts == FrameCounts()
+        self._counts.setText("" if none else f"{counts.lost} lost, {counts.skipped} skipped")
         set_role(self._counts, "warn" if counts.lost else "muted")
 
     def apply_theme(self, theme: Theme) -> None:

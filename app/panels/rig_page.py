@@ -170,7 +170,9 @@ class RigPage(PageWidget):
         self._exposure.setValue(exposure_ms)
         self._exposure.setSingleStep(self._state.cycle_ms or 1.0)
         self._exposure.blockSignals(False)
-        self._cycles.setText(cycles_text(exposure_ms, self._state.cycle_ms))
+        text = cycles_text(exposure_ms, self._state.cycle_ms)
+        self._cycles.setText(text)
+        self._cycles.setVisible(bool(text))
 
     def _show_auto(self) -> None:
         self.auto.setEnabled(self._state.devices.value is not None and not self._state.is_exposing.value)

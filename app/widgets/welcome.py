@@ -37,7 +37,9 @@ class Welcome(QWidget):
         self.files = QListWidget()
         self.files.setAccessibleName("Recent files")
         self.files.setToolTip("Double click or press Enter to open")
-        self.files.setMaximumHeight(220)
+        self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.files.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        self.files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.files.itemActivated.connect(self._open)
         self._title = label("Recent", "heading")
         hint = label(HINT, "muted")
@@ -66,6 +68,8 @@ class Welcome(QWidget):
             if not path.exists():
                 item.setForeground(self.palette().placeholderText())
             self.files.addItem(item)
+        rows = max(self.files.sizeHintForRow(0), 1) * self.files.count()
+        self.files.setFixedHeight(rows + 2 * self.files.frameWidth())
         for widget in (self._title, self.files):
             widget.setVisible(self.files.count() > 0)
 

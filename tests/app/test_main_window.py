@@ -145,3 +145,13 @@ def test_only_work_that_somebody_would_miss_keeps_the_window_open(
     threading.Timer(0.1, free.set).start()
     window.close()
     assert len(questions) == asked
+
+
+def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -> None:
+    made = make_window({"rig": lambda window: Page(window, "rig")}, tmp_path, page_waits=True)
+    qtbot.addWidget(made)
+    made.show()
+    assert made.stack.count() == 0
+    qtbot.waitUntil(lambda: made.stack.count() == 1)
+    assert made.windowTitle().startswith("Rig")
+    made.close()

@@ -77,7 +77,7 @@ def live(qtbot: QtBot) -> Live:
         runner = QtRunner()
         rig, notifier = controller(runner)
         rig.connect(TWIN)
-        qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN)
+        qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=60_000)
         rig.start_live()
         return rig, notifier, runner
 
