@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -129,4 +130,4 @@ def point_size(count: int) -> int:
     >>> point_size(500_000), point_size(14_000), point_size(100)
     (2, 4, 6)
     """
-    return min(max(round((COVERED_PX / max(count, 1)) ** 0.5), POINT_PX), LARGEST_PX)
+    return min(max(round(math.sqrt(COVERED_PX / max(count, 1))), POINT_PX), LARGEST_PX)

@@ -24,13 +24,13 @@ def live(stage: Stage) -> None:
     rig.show("white", 0.8)
     rig.set_exposure(20.0)
     stage.press("Start live view")
-    stage.wait(lambda: rig.frames_seen > 3)
+    stage.wait(lambda: rig.state.counts.value.shown > 3)
     page = stage.window.page_of("rig")
     assert isinstance(page, RigPage)
     stage.shoot("picture")
     rig.set_exposure(60.0)
-    count = rig.frames_seen
-    stage.wait(lambda: rig.frames_seen > count + 3)
+    count = rig.state.counts.value.shown
+    stage.wait(lambda: rig.state.counts.value.shown > count + 3)
     stage.shoot("saturated")
 
 
