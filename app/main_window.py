@@ -236,7 +236,7 @@ class MainWindow(QMainWindow):
         if command:
             text_windows.command_window(command, self).open()
         else:
-            self.toasts.tell("info", "This page does nothing now that a command could do.")
+            self.toasts.tell("info", "Open something on this page first; then its command is shown here.")
 
     def do_help_page(self) -> None:
         """Explain what has the focus, else the open page."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -167,11 +168,14 @@ class CompareController:
         )
 
     def command_line(self) -> str:
-        """The command that compares A with its truth; none compares two results."""
+        """The command that compares A with its truth, or with B; empty while one of them is missing."""
         pair = self.state.pair.value
-        if pair is None or pair.second.truth is None:
+        if pair is None:
             return ""
-        return f"dsl-scan evaluate {pair.first.arrays.path}"
+        first, second = (shlex.quote(str(side.arrays.path)) for side in (pair.first, pair.second))
+        if pair.second.truth is not None:
+            return f"dsl-scan evaluate {first}"
+        return f"dsl-scan compare {first} {second}"
 
 
 def make_pair(first: Side, second: Side, progress: Progress) -> Pair:

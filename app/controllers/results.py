@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -124,11 +125,12 @@ class ResultsController:
     def command_line(self) -> str:
         """The command that makes or exports what is open."""
         if self.state.offer.value is not None:
-            return f"dsl-scan reconstruct {self.state.offer.value}"
+            return f"dsl-scan reconstruct {shlex.quote(str(self.state.offer.value))}"
         result = self.state.result.value
-        return (
-            "" if result is None else f"dsl-scan export {result.path} ply {result.path.with_suffix('.ply')}"
-        )
+        if result is None:
+            return ""
+        path, points = (shlex.quote(str(each)) for each in (result.path, result.path.with_suffix(".ply")))
+        return f"dsl-scan export {path} ply {points}"
 
     # Look ------------------------------------------------------------------------------------------
 

@@ -97,12 +97,14 @@ class LiveView(QWidget):
         figures = QHBoxLayout()
         figures.setSpacing(16)
         figures.addWidget(self._saturated, 1)
-        for figure in (self._focus, self._rate, self._counts):
-            figures.addWidget(figure, 0, Qt.AlignmentFlag.AlignTop)
+        figures.addWidget(self._focus, 0, Qt.AlignmentFlag.AlignTop)
         switches = QHBoxLayout()
         for box in (self.saturation, self.logarithmic, self.region_box, self.fit):
             switches.addWidget(box)
         switches.addStretch(1)
+        switches.setSpacing(12)
+        for figure in (self._rate, self._counts):
+            switches.addWidget(figure)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.view, 1)

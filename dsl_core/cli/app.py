@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import calibrate, calibrations, demo, effects, files, gui, results, scans, tradeoff
+from dsl_core.cli import calibrate, calibrations, compare, demo, effects, files, gui, results, scans, tradeoff
 
 app = typer.Typer(
     name="dsl-scan",
@@ -27,6 +27,7 @@ for command in (
     scans.resume,
     results.reconstruct,
     results.evaluate,
+    compare.compare,
     results.export,
 ):
     app.command()(command)

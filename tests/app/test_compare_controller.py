@@ -39,7 +39,7 @@ def test_two_results_fill_both_sides_and_are_compared(results: tuple[Path, Path,
     assert float(rows["Depth, mean difference"]) == pytest.approx(
         float(np.nanmean(first - second)), abs=0.001
     )
-    assert compare.command_line() == ""
+    assert compare.command_line() == f"dsl-scan compare {results[0]} {results[1]}"
 
 
 def test_a_result_is_judged_against_the_truth_of_its_twin(
