@@ -190,7 +190,9 @@ def test_closing_during_a_capture_asks_and_keeps_what_is_there(
     state = stage.bench.wizards[-1][0]
     click(wizard.buttons.next)
     click(wizard.buttons.capture)
-    stage.wait(lambda: state.doing.value is Doing.CAPTURING)
+    taken = stage.bench.campaign / "selftest" / "dim" / "scan.dsl"
+    stage.wait(taken.is_dir)
+    assert state.doing.value is Doing.CAPTURING
     asked: list[str] = []
 
     def answer(which: QMessageBox.StandardButton) -> None:
@@ -208,7 +210,7 @@ def test_closing_during_a_capture_asks_and_keeps_what_is_there(
     wizard.close()
     assert not wizard.isVisible()
     stage.idle()
-    assert (stage.bench.campaign / "selftest" / "dim" / "scan.dsl").is_dir()
+    assert taken.is_dir()
     wizard = stage.wizard("selftest")
     state = stage.bench.wizards[-1][0]
     if state.at.value == 0:

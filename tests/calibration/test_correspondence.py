@@ -116,11 +116,21 @@ def test_models_have_one_interface(samples: GridSamples) -> None:
         assert torch.equal(zero.columns[0], zero.columns[-1])
 
 
+def test_second_orders_are_where_the_grating_equation_puts_them(samples: GridSamples) -> None:
+    rig, pixels, depth = with_grid(samples), torch.tensor([250_000]), torch.tensor([700.0])
+    found, expected = (
+        model.trace(pixels, depth, 2, BANDS_NM) for model in (GridModel(rig), GratingModel(rig))
+    )
+    assert torch.equal(found.columns, expected.columns)
+
+
 def test_missing_grid_order_and_unknown_model_are_told(samples: GridSamples) -> None:
     rig = with_grid(samples)
+    assert rig.correspondence is not None
+    half = rig.model_copy(update={"correspondence": rig.correspondence.model_copy(update={"orders": (1,)})})
     pixels, depth = torch.tensor([0]), torch.tensor([700.0])
     with pytest.raises(CalibrationError, match="knows orders"):
-        GridModel(rig).trace(pixels, depth, 2, BANDS_NM)
+        GridModel(half).trace(pixels, depth, -1, BANDS_NM)
     with pytest.raises(CalibrationError, match="no data-driven correspondence"):
         correspondence(published_rig(), "grid")
     with pytest.raises(CalibrationError, match="choose auto, grating, hybrid or grid"):
