@@ -84,7 +84,7 @@ QFrame#rail QToolButton:hover {{ background: {t.window}; color: {t.text}; }}
 QFrame#rail QToolButton:checked {{ color: {t.text}; border-left: 3px solid {t.accent};
   background: {t.window}; }}
 QFrame#rail QToolButton:focus {{ color: {t.text}; text-decoration: underline; }}
-QToolButton[role="choice"] {{ padding: 3px 8px; border: 1px solid {t.line}; border-radius: 4px;
+QToolButton[role="choice"] {{ padding: 3px 5px; border: 1px solid {t.line}; border-radius: 4px;
   background: {t.raised}; }}
 QToolButton[role="choice"]:hover {{ border-color: {t.muted}; }}
 QToolButton[role="choice"]:focus {{ border-color: {t.text}; }}

@@ -56,7 +56,7 @@ class LiveView(QWidget):
         self.rectangle.hide()
         self.rectangle.sigRegionChangeFinished.connect(self._repaint)
         self.view.scene().sigMouseMoved.connect(self._hover)
-        self.saturation = QCheckBox("Show saturation")
+        self.saturation = QCheckBox("Saturation")
         self.saturation.setToolTip("Paint cells red that hold a raw pixel at full scale")
         self.saturation.setChecked(True)
         self.saturation.toggled.connect(self._repaint)
@@ -102,7 +102,7 @@ class LiveView(QWidget):
         for box in (self.saturation, self.logarithmic, self.region_box, self.fit):
             switches.addWidget(box)
         switches.addStretch(1)
-        switches.setSpacing(12)
+        switches.setSpacing(6)
         for figure in (self._rate, self._counts):
             switches.addWidget(figure)
         column = QVBoxLayout(self)

@@ -57,6 +57,8 @@ class OperatingCurve(QWidget):
         for figure in FIGURES:
             self.figure.addItem(figure.title)
         self.figure.setCurrentIndex(0)
+        # In a small window the title beside it is worth more than its end.
+        self.figure.setMinimumWidth(120)
         self.plot = calm_plot(
             "Accuracy against time",
             "Measured plans. Click a point or drag the marker to choose one; below and left is better.",

@@ -27,7 +27,7 @@ from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 
 #: How often the newest live frame is fetched, ms.
 FETCH_MS = 15
-SIDE_PX = 300
+SIDE_PX = 268
 _ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
 
 
