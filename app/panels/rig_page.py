@@ -49,7 +49,7 @@ class RigPage(PageWidget):
         self._rig = ChoiceBox("Rig", "The rig to connect")
         for name in rigs:
             self._rig.addItem(name, name)
-        self._options = QLineEdit(" ".join(f"{key}={value}" for key, value in state.choice.value.options))
+        self._options = QLineEdit()
         self._options.setAccessibleName("Options of the rig")
         self._options.setPlaceholderText("scene=color-checker size=445x290")
         self._options.setToolTip("Options as key=value, separated by spaces; see Help on this page")
@@ -81,8 +81,6 @@ class RigPage(PageWidget):
         self._timer.timeout.connect(commands.take_frame)
         self._lay_out()
         self._connect()
-        index = self._rig.findData(state.choice.value.name)
-        self._rig.setCurrentIndex(max(index, 0))
 
     def _lay_out(self) -> None:
         devices = QGroupBox("Devices")
@@ -122,6 +120,7 @@ class RigPage(PageWidget):
         self.auto.clicked.connect(lambda: commands.expose_automatically(self.live.region))
         self.projector.wanted.connect(commands.show)
         self._stops = [
+            state.choice.follow(self._show_choice),
             state.link.follow(self._show_link),
             state.devices.follow(self._show_devices),
             state.trouble.follow(self._show_trouble),
@@ -143,6 +142,11 @@ class RigPage(PageWidget):
             self._commands.stop_live()
         else:
             self._commands.start_live()
+
+    def _show_choice(self, choice: RigChoice) -> None:
+        """Show what is connected, whoever asked for it."""
+        self._rig.setCurrentIndex(max(self._rig.findData(choice.name), 0))
+        self._options.setText(" ".join(f"{key}={value}" for key, value in choice.options))
 
     def _show_link(self, link: Link) -> None:
         self._light.setText(f"● {link.value}")

@@ -157,3 +157,11 @@ def test_parts_of_a_cycle_are_named() -> None:
     assert cycles_text(1000 / 6, 1000 / 60) == "10 LED cycles"
     assert cycles_text(160.0, 1000 / 60) == "9.60 LED cycles: colours vary"
     assert cycles_text(160.0, None) == ""
+
+
+def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
+    page, state, _, _ = bench
+    assert page._options.text() == "scene=plane size=64x48"
+    state.choice.set(RigChoice("replay", (("session", "first.dsl"),)))
+    assert page._rig.currentText() == "replay"
+    assert page._options.text() == "session=first.dsl"
