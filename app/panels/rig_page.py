@@ -76,6 +76,7 @@ class RigPage(PageWidget):
             " where one is shown"
         )
         self._cycles = label("", "muted")
+        self._cycles.setWordWrap(True)
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
         self._timer.timeout.connect(commands.take_frame)
