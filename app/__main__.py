@@ -25,15 +25,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("QT_API", "pyside6")
     from PySide6.QtCore import QTimer
 
-    from app.application import ExceptionHook, make_application, make_window
+    from app.application import ExceptionHook, keep_house, make_application, make_window
     from app.composition import Composition, Wish
     from app.jobs.warm_up import WarmUp
     from app.state.rig import RigChoice
 
     application = make_application(sys.argv[:1])
+    keep_house(application)
     rig = None if wanted.rig is None else RigChoice(wanted.rig, _options(wanted.option))
     path = None if wanted.path is None else wanted.path.absolute()
-    composition = Composition(Wish(rig, path, wanted.demo, is_first_contact=True))
+    composition = Composition(Wish(rig, path, wanted.demo, predicts=True, is_first_contact=True))
     window = make_window(
         composition.pages,
         theme=wanted.theme,

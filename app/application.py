@@ -11,10 +11,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Literal
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
+from app.jobs.housekeeping import COLLECT_MS, collect, share_heaps, take_over_collection
 from app.jobs.qt_runner import QtRunner
 from app.main_window import Command, MainWindow, PageMaker, Parts
 from app.panels.log import LogRecords
@@ -40,6 +41,7 @@ SWITCH_S = 0.001
 def make_application(arguments: Sequence[str]) -> QApplication:
     """The one Qt application, in a style that looks alike on all systems."""
     sys.setswitchinterval(SWITCH_S)
+    share_heaps()
     _import_plainly()
     application = QApplication.instance()
     if not isinstance(application, QApplication):
@@ -48,6 +50,15 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     application.setDesktopFileName("dsl-scan")
     application.setStyle("Fusion")
     return application
+
+
+def keep_house(application: QApplication) -> None:
+    """Look for garbage in the window's thread alone from now on."""
+    take_over_collection()
+    timer = QTimer(application)
+    timer.setInterval(COLLECT_MS)
+    timer.timeout.connect(collect)
+    timer.start()
 
 
 def _import_plainly() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -9,11 +10,14 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from app.jobs.base import Job
+from app.jobs.housekeeping import return_memory
 from dsl_core.errors import DeviceError
 
 #: How often listeners hear of progress, ms: often enough to look alive, seldom enough to cost nothing.
 TICK_MS = 100
 WORKERS = 3
+#: Jobs that took so long, s, have left freed memory behind that is worth returning.
+LONG_S = 0.5
 
 
 class QtRunner(QObject):
@@ -64,7 +68,11 @@ class QtRunner(QObject):
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def _work(self, job: Job[Any]) -> None:
-        self._ended.emit(job, job.run())
+        start_s = time.monotonic()
+        finish = job.run()
+        if time.monotonic() - start_s > LONG_S:
+            return_memory()
+        self._ended.emit(job, finish)
 
     def _finish(self, job: Job[Any], finish: Callable[[], None]) -> None:
         self._active.remove(job)

@@ -53,10 +53,11 @@ def main() -> None:
 
 
 def _soak(minutes: float, seed: int, theme: str) -> int:
-    from app.application import make_application
+    from app.application import keep_house, make_application
     from tests.benchmarks.random_person import RandomPerson
 
     application = make_application([])
+    keep_house(application)
     with tempfile.TemporaryDirectory(prefix="dsl-scan-") as home:
         os.environ["HOME"] = os.environ["DSL_SCAN_HOME"] = home
         errors = _Errors()

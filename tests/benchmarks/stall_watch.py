@@ -69,10 +69,12 @@ class StallWatch:
         self._stalls.clock.append(clock)
         self._stalls.own.append(own)
         self._stalls.quiet.append(quiet)
-        if self._trace is not None and self._samples is not None and quiet > TELL_MS:
-            self._trace.write(f"\n----- {clock:.0f} ms, {quiet:.0f} quiet, {own:.0f} own\n")
-            self._trace.write("\n".join(self._samples.between(self._before[0], now[0])) + "\n")
-            self._trace.flush()
+        if self._trace is not None and self._samples is not None:
+            self._samples.let_go()
+            if quiet > TELL_MS:
+                self._trace.write(f"\n----- {clock:.0f} ms, {quiet:.0f} quiet, {own:.0f} own\n")
+                self._trace.write("\n".join(self._samples.between(self._before[0], now[0])) + "\n")
+                self._trace.flush()
         self._before = now
 
 
@@ -83,33 +85,40 @@ class Samples:
 
     def __init__(self) -> None:
         self._kept: deque[tuple[float, str]] = deque(maxlen=3000)
+        #: Frames that were looked at, and with them their variables. The window's must end in its thread.
+        self._frames: deque[list[FrameType]] = deque()
         threading.Thread(target=self._look, name="samples", daemon=True).start()
 
     def between(self, start: float, end: float) -> list[str]:
         """What was seen from a time to another, and just after it."""
         return [text for at, text in list(self._kept) if start <= at <= end + 2 * self.PERIOD_S]
 
+    def let_go(self) -> None:
+        """Forget the frames that were looked at; called in the window's thread."""
+        self._frames.clear()
+
     def _look(self) -> None:
-        names = {thread.ident: thread.name for thread in threading.enumerate()}
         while True:
             time.sleep(self.PERIOD_S)
-            seen = []
-            for ident, frame in sys._current_frames().items():
-                if ident not in names:
-                    names = {thread.ident: thread.name for thread in threading.enumerate()}
-                if names.get(ident) != "samples":
-                    seen.append(f"  {names.get(ident, '?')}: {_stack(frame, self.DEPTH)}")
-            self._kept.append((time.perf_counter(), "\n".join(["", *seen])))
+            self._frames.append(self._look_once())
+
+    def _look_once(self) -> list[FrameType]:
+        names = {thread.ident: thread.name for thread in threading.enumerate()}
+        stacks = {names.get(ident, "?"): [frame] for ident, frame in sys._current_frames().items()}
+        seen = []
+        for name, stack in stacks.items():
+            while stack[-1].f_back is not None and len(stack) < self.DEPTH:
+                stack.append(stack[-1].f_back)
+            if name != "samples":
+                seen.append(f"  {name}: {' < '.join(map(_place, stack))}")
+        self._kept.append((time.perf_counter(), "\n".join(["", *seen])))
+        return [frame for stack in stacks.values() for frame in stack]
 
 
-def _stack(frame: FrameType | None, depth: int) -> str:
-    """The innermost frames as ``file:line function``, the innermost first."""
-    words: list[str] = []
-    while frame is not None and len(words) < depth:
-        code = frame.f_code
-        words.append(f"{'/'.join(code.co_filename.split('/')[-2:])}:{frame.f_lineno} {code.co_name}")
-        frame = frame.f_back
-    return " < ".join(words)
+def _place(frame: FrameType) -> str:
+    """A frame as ``file:line function``."""
+    code = frame.f_code
+    return f"{'/'.join(code.co_filename.split('/')[-2:])}:{frame.f_lineno} {code.co_name}"
 
 
 def _now() -> tuple[float, float, float, float]:
