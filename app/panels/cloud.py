@@ -11,8 +11,11 @@ from numpy.typing import NDArray
 Points = NDArray[np.float32]
 #: Points drawn while the view turns.
 COARSE = 30_000
-#: A picture at rest may take so long, s. Steps that add less than a share of what is there are not worth it.
-SLOW_S, LEAST_STEP = 0.1, 0.25
+#: A picture at rest may take so long, s: whoever works on meanwhile must not notice it. Steps that add less
+#: than a share of what is there are not worth it.
+SLOW_S, LEAST_STEP = 0.08, 0.25
+#: Points that graphics take in before one picture: a hundred thousand would stop the window.
+LARGEST_STEP = 40_000
 POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 6
 #: Pixels of a view that a cloud covers, about; points that are few are drawn larger, so that it is no veil.
 COVERED_PX = 200_000
@@ -35,17 +38,25 @@ class Cloud:
     def show(self, points: Points, colours: NDArray[np.uint8]) -> bool:
         """Show a cloud; True when it is another than before, and not only of other colours."""
         self._colours = colours
-        if points is self._points:
-            for name, index in self._parts.items():
-                self._meshes[name]["colours"] = colours[index]
+        if points is self._points and self._parts:
+            # Graphics take colours in as slowly as points: the rest grows anew.
+            first, *others = self._parts
+            self._drop(others)
+            self._meshes[first]["colours"] = colours[self._parts[first]]
+            self.be_coarse(self._is_coarse)
             return False
-        for name in self._parts:
-            self.plotter.remove_actor(self._actors.pop(name), reset_camera=False, render=False)
-        self._points, self._parts, self.shown = points, {}, 0
+        self._drop(list(self._parts))
+        self._points = points
         # A fixed random order, so that a part of the cloud is even and does not flicker.
         self._order = np.random.default_rng(0).permutation(len(points)).astype(np.int32)
         self._add(COARSE)
         return True
+
+    def _drop(self, names: list[str]) -> None:
+        for name in names:
+            self.plotter.remove_actor(self._actors.pop(name), reset_camera=False, render=False)
+            del self._meshes[name], self._parts[name]
+        self.shown = sum(map(len, self._parts.values()))
 
     def grow(self, frame_s: float) -> bool:
         """Add points, if a picture that took ``frame_s`` stays quick; False where there is nothing to add."""
@@ -53,7 +64,7 @@ class Cloud:
         room = int(self.shown * min(SLOW_S / max(frame_s, 1e-4) - 1, 1.0))
         if left == 0 or room < min(left, LEAST_STEP * self.shown):
             return False
-        self._add(min(room, left))
+        self._add(min(room, left, LARGEST_STEP))
         return True
 
     def _add(self, count: int) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -22,6 +23,8 @@ from app.panels.still_scene import StillScene
 SETTLE_MS = 250
 #: How long the window may do other things between two steps in which a cloud grows, ms.
 GROW_MS = 30
+#: Pictures between two steps: one prepares what is new, the next one tells how long a picture takes.
+PICTURES = 2
 
 
 class Scene(Protocol):
@@ -51,8 +54,9 @@ class Scene(Protocol):
         """Let go of the graphics context."""
 
 
+@cache
 def gl_works() -> bool:
-    """Whether Qt can draw by OpenGL here: tried, not guessed."""
+    """Whether Qt can draw by OpenGL here: tried, not guessed; the first time takes a while."""
     if QGuiApplication.platformName() in ("offscreen", "minimal"):
         return False
     surface, context = QOffscreenSurface(), QOpenGLContext()
@@ -104,7 +108,8 @@ class GlScene:
         self._watch = _Watch(mouse, self._resized, self.widget)
         self.widget.installEventFilter(self._watch)
         self.widget.setMouseTracking(True)
-        self._plotter.add_axes(interactive=False, color="#808080")
+        self._plotter.render_window.AddObserver("StartEvent", lambda *_: self._begin())
+        self._plotter.frameSwapped.connect(self._drawn)
         style = self._plotter.iren.interactor.GetInteractorStyle()
         style.AddObserver("StartInteractionEvent", lambda *_: self._touched())
         style.AddObserver("EndInteractionEvent", lambda *_: self._rest())
@@ -113,16 +118,23 @@ class GlScene:
         self._timer.setInterval(SETTLE_MS)
         self._timer.timeout.connect(self._rest)
         self._grower = QTimer(self.widget)
+        self._grower.setSingleShot(True)
         self._grower.setInterval(GROW_MS)
-        self._grower.timeout.connect(self._grow)
-        self._is_fresh = False
+        self._grower.timeout.connect(self._plotter.update)
+        #: Pictures wanted until the cloud grows, whether it ever will, when the picture at hand was begun.
+        self._wanted = 0
+        self._is_grown = False
+        self._begun: float | None = None
+        #: What to show after the first picture, which is slow enough when it is empty.
+        self._waiting: tuple[Points, NDArray[np.uint8]] | None = None
+        self._is_ready = False
 
     def _touched(self) -> None:
         self._is_untouched = False
         self._be_coarse()
 
     def _be_coarse(self) -> None:
-        self._grower.stop()
+        self._wanted = 0
         self._cloud.be_coarse(True)
 
     def _resized(self) -> None:
@@ -132,32 +144,46 @@ class GlScene:
 
     def _rest(self) -> None:
         self._cloud.be_coarse(False)
+        self._wanted = 0 if self._is_grown else PICTURES
         self._plotter.update()
-        self._is_fresh = True
-        self._grower.start()
         self._moved()
 
     def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
         """Show points with their colours, as many as this machine draws in time."""
+        if not self._is_ready:
+            self._waiting = points, colours
+            return
         if self._cloud.show(points, colours):
             self.reset()
-            self._rest()
+        self._is_grown = False
+        self._rest()
+
+    def _make_ready(self) -> None:
+        self._is_ready = True
+        self._plotter.add_axes(interactive=False, color="#808080")
+        if self._waiting is not None:
+            self.show_cloud(*self._waiting)
+            self._waiting = None
         self._plotter.update()
 
-    def _grow(self) -> None:
-        """Draw the cloud, and add to it if that was quick; a first picture prepares and does not count."""
-        if not self.widget.isVisible():
-            self._grower.stop()
+    def _begin(self) -> None:
+        self._begun = time.perf_counter()
+
+    def _drawn(self) -> None:
+        """A picture is on the screen: after the last one wanted, add to the cloud if that was quick."""
+        if self._begun is None:
             return
-        start = time.perf_counter()
-        self.widget.repaint()
-        seconds = time.perf_counter() - start
-        if self._is_fresh:
-            self._is_fresh = False
-        elif self._cloud.grow(seconds):
-            self._is_fresh = True
-        else:
-            self._grower.stop()
+        seconds, self._begun = time.perf_counter() - self._begun, None
+        if not self._is_ready:
+            self._make_ready()
+        if self._wanted == 0:
+            return
+        self._wanted -= 1
+        if self._wanted == 0:
+            self._is_grown = not self._cloud.grow(seconds)
+            self._wanted = 0 if self._is_grown else PICTURES
+        if self._wanted:
+            self._grower.start()
 
     def show_marker(self, point: Points | None, colour: str) -> None:
         """Mark a point; the cloud is coarse until it rests."""

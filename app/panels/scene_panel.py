@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.jobs.base import Job, JobRunner
 from app.panels.result_layers import Layers, rgb_of
-from app.panels.scene import Scene, make_scene, normalised, prepare_scene
+from app.panels.scene import Scene, gl_works, make_scene, normalised, prepare_scene
 from app.state.results import Pixel, ResultsState, Tool, View
 from app.theme import DARK, Theme
 from app.widgets.forms import label
@@ -81,11 +81,19 @@ class ScenePanel(QWidget):
         self._new_result()
 
     def _make(self, _: None) -> None:
-        self.scene = make_scene(self._view_moved, self._mouse)
-        self._box.insertWidget(0, self.scene.widget, 1)
-        self.scene.set_background(self._theme.base)
-        # The widget gets its size, and with it the view, when the event loop comes round.
-        QTimer.singleShot(0, self, self._new_result)
+        # Step by step, between which the event loop comes round: graphics are slow to begin.
+        gl_works()
+        QTimer.singleShot(0, self, lambda: self._insert(make_scene(self._view_moved, self._mouse)))
+
+    def _insert(self, scene: Scene) -> None:
+        def insert() -> None:
+            self._box.insertWidget(0, scene.widget, 1)
+            scene.set_background(self._theme.base)
+            self.scene = scene
+            # The widget gets its size, and with it the view, when the event loop comes round.
+            QTimer.singleShot(0, self, self._new_result)
+
+        QTimer.singleShot(0, self, insert)
 
     def _new_result(self) -> None:
         result = self._state.result.value
