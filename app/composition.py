@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -19,14 +18,13 @@ from app.session_desk import SessionDesk
 from app.settings import data_folder
 from app.state.rig import Link, RigChoice, RigState
 from app.widgets.page import PageWidget
-from dsl_core.errors import DslError
 
 if TYPE_CHECKING:
     from app.controllers.demo import DemoController
     from app.controllers.scan import ScanController
     from app.state.scan import ScanState
 
-_log = logging.getLogger(__name__)
+
 #: How long the window is on screen before the rig is asked for, ms.
 CONNECT_AFTER_MS = 200
 
@@ -38,6 +36,8 @@ class Wish:
     rig: RigChoice | None = None
     open: Path | None = None
     demo: bool = False
+    #: Whether accuracy against time is predicted unasked, a minute or two of computing for each new rig.
+    predicts: bool = False
     #: Whether a person sits before the window, who may be offered the tour at the first start.
     is_first_contact: bool = False
 
@@ -164,11 +164,16 @@ class Composition(QObject):
         return page
 
     def _scan_page(self, window: MainWindow) -> PageWidget:
+        from app.controllers.effects import EffectsController
+        from app.controllers.forecast import ForecastController
         from app.controllers.scan import ScanController
         from app.controllers.scan_words import fresh_target
+        from app.panels.effects_panel import EffectsPanel
+        from app.panels.forecast_panel import ForecastPanel
         from app.panels.scan_page import ScanPage
+        from app.state.effects import EffectsState
+        from app.state.forecast import ForecastState
         from app.state.scan import Phase, ScanState
-        from dsl_core.evaluation.operating_points import load_operating_points
         from dsl_core.model.plan import CapturePlan
 
         parts = window.parts
@@ -181,13 +186,27 @@ class Composition(QObject):
             state, self.rig(window), parts.runner, window.toasts, parts.undo
         )
         self.desk(window).serve(controller)
-        try:
-            points = load_operating_points()
-        except DslError as error:
-            _log.warning("%s", error)
-            points = None
         self.session(window).serve_scan(controller)
-        page = ScanPage(state, controller, points, window.open_path)
+        foreseen = ForecastState()
+        forecast = ForecastController(
+            foreseen,
+            state,
+            self.rig(window).state,
+            controller.plans,
+            parts.runner,
+            window.toasts,
+            data_folder() / "forecasts",
+            self._wish.predicts,
+        )
+        rendered = EffectsState()
+        effects = EffectsController(rendered, state, self.rig(window), parts.runner, window.toasts)
+        page = ScanPage(
+            state,
+            controller,
+            ForecastPanel(foreseen, forecast),
+            EffectsPanel(rendered, effects),
+            window.open_path,
+        )
         page.apply_theme(window.theme)
         return page
 

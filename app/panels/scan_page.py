@@ -7,9 +7,18 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QScrollArea,
+    QSplitter,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
-from app.panels.operating_curve import OperatingCurve
+from app.panels.effects_panel import EffectsPanel
+from app.panels.forecast_panel import ForecastPanel
 from app.panels.plan_editor import PlanEditor
 from app.panels.scan_commands import ScanCommands
 from app.panels.scan_run import CalibrationBox, RunBox, TargetBox
@@ -19,8 +28,6 @@ from app.theme import Theme
 from app.widgets.banner import Banner
 from app.widgets.help_window import set_help
 from app.widgets.page import PageWidget
-from dsl_core.evaluation.operating_points import OperatingPoints
-from dsl_core.model.presets import PRESETS, on_cycles
 
 #: How often news of the scan is fetched, ms: ten pictures a second look alive.
 FETCH_MS = 100
@@ -34,7 +41,8 @@ class ScanPage(PageWidget):
         self,
         state: ScanState,
         commands: ScanCommands,
-        points: OperatingPoints | None,
+        forecast: ForecastPanel,
+        effects: EffectsPanel,
         open_result: Callable[[Path], object],
     ) -> None:
         super().__init__()
@@ -46,8 +54,10 @@ class ScanPage(PageWidget):
         self.plan = PlanEditor()
         self.plan.setObjectName("scan-plan")
         set_help(self.plan, "scanning#the-plan")
-        self.curve = OperatingCurve(points)
-        set_help(self.curve, "scanning#accuracy-against-time")
+        self.forecast, self.curve = forecast, forecast.curve
+        set_help(self.forecast, "accuracy-against-time")
+        self.effects = effects
+        set_help(self.effects, "effects-of-the-twin")
         self.picture, self.graph = FramePicture(), GraphPlot()
         set_help(self.picture, "scanning#while-it-runs")
         set_help(self.graph, "reading-an-intensity-graph")
@@ -65,12 +75,22 @@ class ScanPage(PageWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        self.middle = QSplitter(Qt.Orientation.Vertical)
-        self.middle.setChildrenCollapsible(False)
-        for widget, stretch in ((self.curve, 4), (self.picture, 5), (self.graph, 4)):
+        self.view = QSplitter(Qt.Orientation.Vertical)
+        self.view.setChildrenCollapsible(False)
+        for widget, stretch in ((self.picture, 5), (self.graph, 4)):
             widget.setMinimumHeight(120)
-            self.middle.addWidget(widget)
-            self.middle.setStretchFactor(self.middle.count() - 1, stretch)
+            self.view.addWidget(widget)
+            self.view.setStretchFactor(self.view.count() - 1, stretch)
+        self.middle = QTabWidget()
+        self.middle.setDocumentMode(True)
+        self.middle.tabBar().setDrawBase(False)
+        self.middle.tabBar().setAccessibleName("What is shown of the scan")
+        for tab, title, tip in (
+            (self.forecast, "&Accuracy against time", "What plans are expected to reach, and what they take"),
+            (self.view, "&Frames", "What the scan sees while it runs"),
+            (self.effects, "&Effects", "What the simulated rig renders of all that light does"),
+        ):
+            self.middle.setTabToolTip(self.middle.addTab(tab, title), tip)
         row = QHBoxLayout()
         row.addWidget(_side(LEFT_PX, self.plan))
         row.addWidget(self.middle, 1)
@@ -84,7 +104,6 @@ class ScanPage(PageWidget):
         self.banner.action.clicked.connect(commands.start)
         self.plan.preset_chosen.connect(commands.plans.choose_preset)
         self.plan.plan_changed.connect(self._change_plan)
-        self.curve.chosen.connect(commands.plans.choose_preset)
         self.picture.pointed.connect(commands.point_at)
         self._stops = [
             *self.calibration.stops,
@@ -92,7 +111,6 @@ class ScanPage(PageWidget):
             *self.run.stops,
             state.plan.follow(lambda _: self._show_plan()),
             state.period_ms.follow(lambda _: self._show_plan()),
-            state.latency_ms.follow(lambda _: self._show_plan()),
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.phase.follow(self._show_phase),
             state.trouble.follow(self.banner.say),
@@ -100,6 +118,7 @@ class ScanPage(PageWidget):
             state.cursor.follow(self.picture.show_cursor),
             state.graph.follow(self.graph.show_graph),
             state.result.connect(self._show_result),
+            self.effects.offered.follow(self._offer_effects),
         ]
 
     def _change_plan(self, plan: object) -> None:
@@ -109,22 +128,24 @@ class ScanPage(PageWidget):
 
     def _show_plan(self) -> None:
         state = self._state
-        plan, period_ms, latency_ms = state.plan.value, state.period_ms.value, state.latency_ms.value
-        self.plan.set_plan(plan, period_ms)
-        preset = state.preset
-        seconds = {each.key: on_cycles(each.plan, period_ms).duration_s(latency_ms) for each in PRESETS}
-        self.curve.show_plans(seconds, "" if preset is None else preset.key, plan.duration_s(latency_ms))
+        self.plan.set_plan(state.plan.value, state.period_ms.value)
 
     def _show_phase(self, phase: Phase) -> None:
         fixed = phase.is_busy or self._state.interrupted.value is not None
         self.plan.setEnabled(not fixed)
         self.target.setEnabled(not fixed)
         self.calibration.setEnabled(not fixed)
-        self.curve.marker.movable = not fixed
+        self.forecast.fix(fixed)
+        if phase is Phase.STARTING:
+            self.middle.setCurrentWidget(self.view)
         if phase.is_busy:
             self._timer.start()
         else:
             self._timer.stop()
+
+    def _offer_effects(self, on: bool) -> None:
+        """Only a simulated rig can leave out what light does."""
+        self.middle.setTabVisible(self.middle.indexOf(self.effects), on)
 
     def _show_result(self, path: Path) -> None:
         # Who works elsewhere meanwhile is not torn away.
@@ -148,7 +169,7 @@ class ScanPage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        for part in (self.curve, self.picture, self.graph):
+        for part in (self.forecast, self.picture, self.graph, self.effects):
             part.apply_theme(theme)
 
     def release(self) -> None:
@@ -156,6 +177,8 @@ class ScanPage(PageWidget):
         self._timer.stop()
         for stop in self._stops:
             stop()
+        self.forecast.release()
+        self.effects.release()
         self._commands.close()
 
 

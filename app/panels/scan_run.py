@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
 )
 
+from app.panels.forecast_words import minutes, volume
 from app.panels.scan_commands import ScanCommands
 from app.state.scan import CalibrationChoice, Facts, Phase, ScanState
 from app.widgets.forms import ChoiceBox, label, set_role
@@ -117,8 +118,8 @@ class TargetBox(QGroupBox):
         plan = self._state.plan.value
         self._frames.setText(str(facts.frames))
         self._split.setText(f"{plan.code_count} code and {plan.spectral_count} line patterns")
-        self._time.setText(f"{_minutes(facts.seconds)} on the rig")
-        self._disk.setText(f"{_bytes(facts.needed_bytes)} of {_bytes(facts.free_bytes)} free")
+        self._time.setText(f"{minutes(facts.seconds)} on the rig")
+        self._disk.setText(f"{volume(facts.needed_bytes)} of {volume(facts.free_bytes)} free")
         set_role(self._disk, "bad" if facts.free_bytes < facts.needed_bytes else "")
 
 
@@ -209,11 +210,3 @@ class RunBox(QGroupBox):
         self._what.setText(f"{status.done} of {status.total} frames stored")
         spent, left = describe_seconds(status.elapsed_s), describe_seconds(status.remaining_s)
         self._time.setText(f"took {spent}" if status.state.is_final else f"{spent} so far, {left} left")
-
-
-def _minutes(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
-
-
-def _bytes(count: int) -> str:
-    return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{count / 1e6:.0f} MB"

@@ -28,6 +28,8 @@ ORDER = (
     "rig",
     "calibrating",
     "scanning",
+    "accuracy-against-time",
+    "effects-of-the-twin",
     "numbers",
     "reading-an-intensity-graph",
     "comparing",

@@ -5,20 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from app.controllers.forecast import ForecastController
 from app.controllers.rig import RigController
 from app.controllers.scan import ScanController
 from app.jobs.base import InlineRunner, JobRunner
+from app.state.forecast import ForecastState
 from app.state.rig import RigChoice, RigState
 from app.state.scan import ScanState
 from app.state.undo import UndoStack
 from app.views import RecordingNotifier
 from dsl_core.io.calibration_library import CalibrationLibrary
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CapturePlan, LineComb
 from dsl_core.model.presets import PRESETS
+from dsl_core.model.rig import Rig
+
+if TYPE_CHECKING:
+    from dsl_core.planning.prediction import Prediction
 
 TWIN = RigChoice("twin", (("scene", "color-checker"), ("size", "64x48")))
 SHORT = PRESETS[0].plan
+COMB = CapturePlan(name="comb 5x2x64", spectral=LineComb(period_px=64))
 
 
 @dataclass
@@ -47,3 +55,38 @@ def make_bench(folder: Path, runner: JobRunner | None = None) -> ScanBench:
     clock = lambda: datetime(2026, 3, 1, 10, 20)  # noqa: E731
     scans = ScanController(state, rig, runner, notifier, undo, library, clock)
     return ScanBench(state, rig, scans, notifier, undo, library)
+
+
+def make_forecast(
+    bench: ScanBench,
+    state: ForecastState,
+    folder: Path,
+    runner: JobRunner | None = None,
+    automatic: bool = False,
+) -> ForecastController:
+    """A controller that weighs the presets, the published plan and a comb."""
+    return ForecastController(
+        state,
+        bench.state,
+        bench.rig.state,
+        bench.scans.plans,
+        runner or InlineRunner(),
+        bench.notifier,
+        folder,
+        automatic,
+        lambda rig: (CapturePlan(name="published"), COMB),
+    )
+
+
+def foreseen(rig: Rig, plan: CapturePlan, latency_ms: float) -> Prediction:
+    """A prediction that takes no time: errors fall with time and grow with noise."""
+    from dsl_core.planning.prediction import Prediction
+
+    seconds = plan.duration_s(latency_ms)
+    error = (1 + rig.sensor.read_noise_dn) / seconds
+    return Prediction(
+        frames=plan.shot_count, spectral_frames=plan.spectral_count, seconds=seconds,
+        raw_bytes=plan.raw_bytes, computing_s=1.0, rmse=error / 3, pixel_rmse=error, angle_rad=error,
+        pixel_angle_rad=3 * error, delta_e=100 * error, fwhm_nm=9 + error, depth_std_mm=error,
+        coverage=0.9, decided=0.9,
+    )  # fmt: skip

@@ -9,18 +9,23 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from app.controllers.effects import EffectsController
+from app.controllers.forecast import ForecastController
 from app.jobs.qt_runner import QtRunner
+from app.panels.effects_panel import EffectsPanel
+from app.panels.forecast_panel import ForecastPanel
 from app.panels.scan_page import ScanPage
+from app.state.effects import EffectsState
+from app.state.forecast import ForecastState
 from app.state.scan import Phase
 from app.theme import LIGHT
 from dsl_core.errors import DeviceError
-from dsl_core.evaluation.operating_points import load_operating_points
 from dsl_core.io.session import SessionReader
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import TWIN, ScanBench, make_bench
+from tests.app.scan_bench import TWIN, ScanBench, foreseen, make_bench, make_forecast
 
 Bench = tuple[ScanPage, ScanBench, list[Path]]
 
@@ -30,13 +35,23 @@ def ready(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
     runner = QtRunner()
     bench = make_bench(tmp_path, runner)
     opened: list[Path] = []
-    page = ScanPage(bench.state, bench.scans, load_operating_points(), opened.append)
+    expected = ForecastState()
+    forecast = make_forecast(bench, expected, tmp_path / "forecasts", runner)
+    rendered = EffectsState()
+    effects = EffectsController(rendered, bench.state, bench.rig, runner, bench.notifier)
+    page = ScanPage(
+        bench.state,
+        bench.scans,
+        ForecastPanel(expected, forecast),
+        EffectsPanel(rendered, effects),
+        opened.append,
+    )
     qtbot.addWidget(page)
     page.apply_theme(LIGHT)
     page.resize(1200, 800)
     page.show()
     bench.rig.connect(TWIN)
-    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=60_000)
     bench.plan()
     qtbot.waitUntil(lambda: runner.active == ())
     yield page, bench, opened
@@ -66,10 +81,10 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path: Path) -> None:
     page, bench, _ = ready
     click(page.run.start)
-    qtbot.waitUntil(page.run.pause.isEnabled, timeout=20_000)
+    qtbot.waitUntil(page.run.pause.isEnabled, timeout=60_000)
     assert not page.plan.isEnabled()
     click(page.run.pause)
-    qtbot.waitUntil(in_phase(bench, Phase.PAUSED), timeout=20_000)
+    qtbot.waitUntil(in_phase(bench, Phase.PAUSED), timeout=60_000)
     assert page.run.pause.text() == "&Go on"
     click(page.run.pause)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
@@ -81,7 +96,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
 def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
     page, bench, _ = ready
     click(page.run.start)
-    qtbot.waitUntil(lambda: bench.state.status.value.done > 3, timeout=20_000)
+    qtbot.waitUntil(lambda: bench.state.status.value.done > 3, timeout=60_000)
     click(page.run.cancel)
     qtbot.waitUntil(in_phase(bench, Phase.STOPPED), timeout=2_000)
     assert page.run.start.text() == "&Resume scan"
@@ -93,6 +108,7 @@ def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, sl
 def test_a_second_scan_is_refused_in_a_sentence(qtbot: QtBot, ready: Bench, slow: None) -> None:
     page, bench, _ = ready
     click(page.run.start)
+    assert page.middle.currentWidget() is page.view
     assert not page.run.start.isEnabled()
     bench.scans.start()
     assert "A scan is running" in bench.notifier.told[-1][1]
@@ -110,7 +126,7 @@ def test_a_lost_camera_is_said_over_the_page(
     with monkeypatch.context() as lost:
         lost.setattr(SimCamera, "snap", silent)
         click(page.run.start)
-        qtbot.waitUntil(in_phase(bench, Phase.LOST), timeout=20_000)
+        qtbot.waitUntil(in_phase(bench, Phase.LOST), timeout=60_000)
     assert page.banner.isVisible()
     assert "Check its cable" in page.banner.text
     click(page.banner.action)
@@ -122,7 +138,7 @@ def test_closing_the_window_during_a_scan_loses_no_frame(qtbot: QtBot, tmp_path:
     runner = QtRunner()
     bench = make_bench(tmp_path, runner)
     bench.rig.connect(TWIN)
-    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=60_000)
     bench.plan()
     bench.scans.start()
     seen = 0
@@ -133,28 +149,11 @@ def test_closing_the_window_during_a_scan_loses_no_frame(qtbot: QtBot, tmp_path:
         seen = bench.state.status.value.done
         return seen > 2
 
-    qtbot.waitUntil(begun, timeout=20_000)
+    qtbot.waitUntil(begun, timeout=60_000)
     bench.scans.pause()
     runner.shut_down()
     reader = SessionReader(tmp_path / "first.dsl")
     assert len(list(reader.plan.shots())) - len(reader.missing()) >= seen
-
-
-def test_the_marker_snaps_to_the_nearest_plan(qtbot: QtBot, ready: Bench) -> None:
-    page, bench, _ = ready
-    spots = page.curve._spots()
-    at = spots["reference"]
-    page.curve.marker.setPos(at[0] + 0.02, at[1])
-    page.curve.marker.sigPositionChangeFinished.emit(page.curve.marker)
-    assert bench.state.preset is PRESETS[-1]
-    assert page.plan.preset.currentData() == "reference"
-    page.curve.marker.setPos(at[0] + 0.01, at[1])
-    page.curve.marker.sigPositionChangeFinished.emit(page.curve.marker)
-    assert page.curve.marker.pos() == QPointF(*at)
-
-
-def test_every_preset_has_a_measured_point() -> None:
-    assert set(load_operating_points().points) == {preset.key for preset in PRESETS}
 
 
 def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
@@ -165,7 +164,6 @@ def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
     assert (spectral.step_px, spectral.period_px) == (3, 105)
     assert page.plan.period.value() == 105
     assert page.plan.preset.currentText() == "Own plan"
-    assert not page.curve.marker.isVisible()
 
 
 def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
@@ -196,3 +194,105 @@ def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:
     QTest.keyClick(page.picture, Qt.Key.Key_Down)
     assert bench.state.cursor.value == (36, 28)
     assert "Intensity graph at 36, 28" in page.graph._title.text()
+
+
+@pytest.fixture
+def predicted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Predictions that take no time."""
+    from dsl_core.planning import prediction
+
+    monkeypatch.setattr(
+        prediction, "predict", lambda rig, plan, view, latency_ms: foreseen(rig, plan, latency_ms)
+    )
+
+
+def figures(page: ScanPage, column: int) -> dict[str, str]:
+    table = page.forecast.table
+    cells = [(table.item(row, 0), table.item(row, column)) for row in range(table.rowCount())]
+    return {name.text(): value.text() for name, value in cells if name is not None and value is not None}
+
+
+def begin(qtbot: QtBot, page: ScanPage) -> ForecastState:
+    control = page.forecast._commands
+    assert isinstance(control, ForecastController)
+    control.begin()
+    qtbot.waitUntil(lambda: control.state.progress.value == (0, 0), timeout=60_000)
+    return control.state
+
+
+def test_nothing_is_shown_before_it_is_predicted(ready: Bench) -> None:
+    page, _, _ = ready
+    assert set(figures(page, 1).values()) == {"–"}
+    assert "Connect a rig" in page.forecast._note.text()
+    assert not page.forecast.ask.isEnabled()
+
+
+def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
+    qtbot: QtBot, ready: Bench, predicted: None
+) -> None:
+    page, bench, _ = ready
+    state = begin(qtbot, page)
+    curve = page.curve
+    assert figures(page, 1)["Frames"] == "75"
+    assert figures(page, 2)["Frames"] == "716"
+    assert figures(page, 2)["Capture"] == "3.6 min"
+    published = state.published
+    assert published is not None
+    at = curve.spot(published)
+    assert at is not None
+    # A drag moves the marker many times before it is dropped.
+    curve.marker.moving = True
+    curve.marker.setPos(at[0] - 0.004, at[1])
+    curve.marker.sigPositionChanged.emit(curve.marker)
+    assert figures(page, 1)["Frames"] == "716"
+    assert bench.state.preset is PRESETS[0]
+    curve.marker.sigPositionChangeFinished.emit(curve.marker)
+    assert bench.state.preset is PRESETS[-1]
+    assert page.plan.preset.currentData() == "reference"
+    assert curve.marker.pos() == QPointF(*at)
+
+
+def test_arrow_keys_walk_along_the_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, bench, _ = ready
+    state = begin(qtbot, page)
+    page.curve.plot.setFocus()
+    QTest.keyClick(page.curve.plot, Qt.Key.Key_Right)
+    current = state.current.value
+    assert current is not None
+    assert current in page.curve.front()
+    assert current.expected.seconds > 16.25
+    QTest.keyClick(page.curve.plot, Qt.Key.Key_Left)
+    assert bench.state.preset is PRESETS[0]
+
+
+def test_a_wish_for_time_is_answered(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, bench, _ = ready
+    begin(qtbot, page)
+    page.forecast.budget.setValue(100)
+    click(page.forecast.ask)
+    assert bench.state.preset is not None
+    assert bench.state.preset.key == "coarse"
+    assert "Chosen: Coarse, 90 s" in page.forecast._answer.text()
+    page.forecast.wish.setCurrentIndex(1)
+    assert page.forecast.error.isVisible()
+    page.forecast.error.setValue(0.001)
+    click(page.forecast.ask)
+    assert "No plan is expected to reach" in page.forecast._answer.text()
+
+
+def test_every_figure_has_its_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, _, _ = ready
+    begin(qtbot, page)
+    for index in range(page.curve.figure.count()):
+        page.curve.figure.setCurrentIndex(index)
+        assert len(page.curve.front()) >= 1
+        assert page.curve.marker.isVisible()
+
+
+def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert figures(page, 3)["Frames"] == "75"
+    # The twin does not wait for exposures.
+    assert figures(page, 3)["Capture"] == "–"

@@ -1,8 +1,7 @@
 """What accuracy costs in time: the presets scanned with the twin and compared with its truth.
 
 Run ``python -m tests.benchmarks.bench_operating_points [--quick] [--json FILE]`` from the repository's root.
-The table that the application shows is made by ``--json resources/operating_points.json``. Each preset scans
-the Color Checker and the nine narrow-band filters at 445 x 290 pixels.
+Each preset scans the Color Checker and the nine narrow-band filters at 445 x 290 pixels.
 """
 
 from __future__ import annotations

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 
+from app.controllers.forecast import ForecastController
+from app.controllers.forecast_job import usual_candidates
 from app.controllers.scan import ScanController
 from app.panels.scan_page import ScanPage
+from app.state.forecast import Measured
 from app.state.rig import RigChoice
 from app.state.scan import Phase, ScanState
 from dsl_core.simulation.faults import FaultPlan, with_faults
@@ -91,8 +95,71 @@ def lost(stage: Stage) -> None:
     stage.shoot()
 
 
+def forecast(stage: Stage) -> None:
+    """What accuracy costs in time: before it is known, a part of the curve, and after a scan."""
+    stage.open()
+    scan = planned_scan(stage)
+    stage.shoot("not-yet")
+    control = scan.page.forecast._commands
+    assert isinstance(control, ForecastController)
+    # Every sixth plan shows what all of them would.
+    control._candidates = lambda rig: islice(usual_candidates(rig), 0, None, 6)
+    control.begin()
+    stage.wait(lambda: len(control.state.points.value) > 2)
+    stage.shoot("under-way")
+    stage.idle()
+    control.answer(budget_s=60)
+    stage.shoot()
+    scan.page.curve.figure.setCurrentIndex(4)
+    stage.shoot("width")
+    scan.controller.plans.choose_preset("quick")
+    scan.state.then_reconstruct.set(False)
+    stage.press("Start scan", scan.page)
+    stage.wait(lambda: scan.state.phase.value is Phase.DONE)
+    scan.controller.reconstruct(stage.folder / "scans" / f"{_only(control).name}.dsl")
+    stage.wait(lambda: _only(control).rmse is not None)
+    stage.window.open_page("scan")
+    scan.page.middle.setCurrentWidget(scan.page.forecast)
+    stage.shoot("afterwards")
+
+
+def _only(control: ForecastController) -> Measured:
+    found = control.state.measured.value
+    assert found is not None
+    return found
+
+
+def no_forecast(stage: Stage) -> None:
+    """Nothing can be predicted without a calibration."""
+    stage.open()
+    planned_scan(stage, replace(CHART_RIG, options=(*CHART_RIG.options, ("truth", "4"))))
+    stage.shoot()
+
+
+def effects(stage: Stage) -> None:
+    """What the twin renders, as usual, by what the scene calls for, and by name."""
+    stage.open()
+    scan = planned_scan(stage)
+    panel = scan.page.effects
+    scan.page.middle.setCurrentWidget(panel)
+    stage.wait(lambda: panel.table.rowCount() > 0)
+    stage.idle()
+    stage.shoot()
+    panel.choice.setCurrentIndex(panel.choice.findData("auto"))
+    stage.idle()
+    stage.shoot("auto")
+    stage.press("Apply", panel)
+    stage.idle()
+    panel.choice.setCurrentIndex(panel.choice.findData("chosen"))
+    stage.idle()
+    stage.shoot("chosen")
+
+
 SCENES: dict[str, Callable[[Stage], None]] = {
     "scan-planned": planned,
+    "scan-forecast": forecast,
+    "scan-uncalibrated": no_forecast,
+    "scan-effects": effects,
     "scan-running": running,
     "scan-done": done,
     "scan-lost": lost,

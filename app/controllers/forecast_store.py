@@ -1,0 +1,93 @@
+"""Predictions that were made once, kept in a file for each rig. No Qt."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core import __version__
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+
+if TYPE_CHECKING:
+    from dsl_core.planning.prediction import Prediction
+
+_log = logging.getLogger(__name__)
+#: Files of rigs that were used longest ago are removed beyond this number.
+MOST_RIGS = 20
+
+
+class ForecastStore:
+    """What is expected of plans on one rig with one latency; a file that cannot be read starts anew."""
+
+    def __init__(self, folder: Path, rig: Rig, latency_ms: float) -> None:
+        self._path = folder / f"{_stamp(rig, latency_ms)}.json"
+        self._known: dict[str, dict[str, object]] = {}
+        self._is_changed = False
+        try:
+            content = json.loads(self._path.read_bytes())
+            self._known = {str(key): dict(value) for key, value in content.items()}
+        except FileNotFoundError:
+            pass
+        except (OSError, ValueError, TypeError, AttributeError) as error:
+            _log.warning("The predictions %s cannot be read (%s); they are made anew.", self._path, error)
+
+    def find(self, plan: CapturePlan) -> Prediction | None:
+        """What was predicted of a plan, if anything."""
+        from pydantic import ValidationError
+
+        from dsl_core.planning.prediction import Prediction
+
+        try:
+            return Prediction.model_validate(self._known[_key(plan)])
+        except (KeyError, ValidationError):
+            return None
+
+    def keep(self, plan: CapturePlan, found: Prediction) -> None:
+        """Remember a prediction until `save`."""
+        self._known[_key(plan)] = found.model_dump()
+        self._is_changed = True
+
+    def save(self) -> None:
+        """Write what is new; a full disk costs only the time to predict again."""
+        if not self._is_changed:
+            return
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._path, json.dumps(self._known).encode())
+            old = sorted(self._path.parent.glob("*.json"), key=lambda path: path.stat().st_mtime)
+            for path in old[:-MOST_RIGS]:
+                path.unlink(missing_ok=True)
+        except (OSError, StoreError) as error:
+            _log.warning("The predictions could not be kept (%s).", error)
+        self._is_changed = False
+
+
+def _stamp(rig: Rig, latency_ms: float) -> str:
+    """Names everything that predictions depend on, the program that makes them among it."""
+    known = rig.model_dump_json(exclude={"name", "provenance", "calibrations"})
+    return _digest(f"{_method()} {latency_ms!r} {known}")
+
+
+def _key(plan: CapturePlan) -> str:
+    return _digest(plan.model_dump_json(exclude={"name", "schema_version"}))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def _method() -> str:
+    """The version of the program, and where its sources can be read, those that predict."""
+    import dsl_core.planning
+
+    hashed = hashlib.sha256(__version__.encode())
+    for folder in dsl_core.planning.__path__:
+        for path in sorted(Path(folder).glob("*.py")):
+            hashed.update(path.read_bytes())
+    return hashed.hexdigest()

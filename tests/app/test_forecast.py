@@ -1,0 +1,186 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.controllers.forecast import NO_CALIBRATION, ForecastController
+from app.controllers.forecast_job import ForecastJob, Rigging
+from app.controllers.forecast_store import ForecastStore
+from app.jobs.base import InlineRunner, Job
+from app.state.forecast import ForecastState, Foreseen, identity, plan_title
+from app.state.rig import RigChoice
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
+from dsl_core.model.presets import PRESETS
+from dsl_core.model.rig import Rig
+from dsl_core.planning import prediction
+from tests.app.scan_bench import COMB, TWIN, ScanBench, foreseen, make_bench, make_forecast
+
+
+def forecast(bench: ScanBench, folder: Path, automatic: bool = True) -> ForecastController:
+    return make_forecast(bench, ForecastState(), folder / "forecasts", automatic=automatic)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> ScanBench:
+    made = make_bench(tmp_path)
+    made.rig.connect(TWIN)
+    made.plan()
+    return made
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of plans that were predicted, by a prediction that takes no time."""
+    seen = list[str]()
+
+    def predict(rig: Rig, plan: CapturePlan, *_: object, latency_ms: float) -> prediction.Prediction:
+        seen.append(plan.name)
+        if isinstance(plan.spectral, NoSpectral):
+            raise PlanError(f"The plan {plan.name!r} has no spectral patterns.")
+        return foreseen(rig, plan, latency_ms)
+
+    monkeypatch.setattr(prediction, "predict", predict)
+    return seen
+
+
+def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    work = ForecastJob(Rigging(devices.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False)
+    found = work._of(COMB, ForecastStore(tmp_path, devices.calibration, 50.0), "")
+    assert isinstance(found, Foreseen)
+    assert found.expected.spectral_frames == 32
+    assert 0 < found.expected.rmse < found.expected.pixel_rmse < 0.2
+
+
+def test_presets_and_candidates_are_predicted_once_and_remembered(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    points = control.state.points.value
+    # The published candidate is the reference preset.
+    assert len(points) == len(PRESETS) + 1
+    assert control.state.published is not None
+    assert control.state.published.expected.frames == 716
+    assert control.state.current.value is not None
+    assert control.state.current.value.preset == "preview"
+    assert control.state.progress.value == (0, 0)
+    done = len(counted)
+    again = forecast(bench, tmp_path)
+    assert len(again.state.points.value) == len(points)
+    assert len(counted) == done
+    again.close()
+    control.close()
+
+
+def test_an_own_plan_is_predicted_when_it_is_made(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    bench.scans.plans.change_plan(COMB.model_copy(update={"spectral": LineComb(period_px=70), "name": "own"}))
+    assert counted[-1] == "own"
+    current = control.state.current.value
+    assert current is not None
+    assert current.expected.spectral_frames == 35
+
+
+def test_an_impossible_plan_says_why_until_it_is_left(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    bench.scans.plans.change_plan(COMB.model_copy(update={"spectral": NoSpectral()}))
+    assert control.state.current.value is None
+    assert "no spectral patterns" in control.state.refusal.value
+    bench.undo.undo()
+    assert [control.state.refusal.value] == [""]
+
+
+def test_wishes_choose_a_plan_or_say_what_could_be_had(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+    control.answer(budget_s=60)
+    assert "Nothing is predicted yet" in control.state.answer.value
+    control.begin()
+    control.answer(budget_s=20)
+    assert bench.state.preset is PRESETS[0]
+    assert "Preview" in control.state.answer.value
+    best = min(control.state.points.value, key=lambda each: each.expected.pixel_rmse)
+    control.answer(error=best.expected.pixel_rmse)
+    assert identity(bench.state.plan.value) == identity(best.plan)
+    control.answer(budget_s=1)
+    assert "No plan takes at most 1 s" in control.state.answer.value
+    control.answer(error=1e-6)
+    assert "the best" in control.state.answer.value
+
+
+def test_without_calibration_nothing_is_predicted_and_the_reason_said(
+    tmp_path: Path, counted: list[str]
+) -> None:
+    bench = make_bench(tmp_path)
+    control = forecast(bench, tmp_path)
+    assert control.state.trouble.value == ""
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("truth", "4"))))
+    assert control.state.trouble.value == NO_CALIBRATION
+    assert (control.state.points.value, counted) == ((), [])
+    bench.rig.connect(TWIN)
+    assert control.state.trouble.value == ""
+    assert control.state.points.value
+
+
+def test_another_rig_is_predicted_anew(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
+    control = forecast(bench, tmp_path)
+    first = control.state.published
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("sigma", "0.01"))))
+    second = control.state.published
+    assert first is not None
+    assert second is not None
+    assert second.expected.pixel_rmse > 1.2 * first.expected.pixel_rmse
+
+
+def test_other_work_goes_first(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+
+    class Busy(InlineRunner):
+        @property
+        def active(self) -> tuple[Job[object], ...]:
+            return (Job("Reconstruct", lambda progress: None),)
+
+    control._runner = Busy()
+    assert control._must_wait()
+
+
+def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+    bench.scans.plans.choose_preset("quick")
+    bench.state.then_reconstruct.set(True)
+    bench.scans.start()
+    found = control.state.measured.value
+    assert found is not None
+    assert (found.name, found.frames, found.seconds) == ("first", 150, None)
+    assert found.raw_bytes == bench.state.plan.value.raw_bytes
+    assert found.computing_s is not None
+    assert found.depth_rmse_mm is not None
+    assert found.coverage is not None
+    assert found.coverage > 0.5
+
+
+def test_a_damaged_store_is_made_anew(bench: ScanBench, tmp_path: Path) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    store = ForecastStore(tmp_path, devices.calibration, 50.0)
+    store._path.write_text("[1")
+    assert ForecastStore(tmp_path, devices.calibration, 50.0).find(COMB) is None
+    store._path.write_text('{"a": {"frames": 1}}')
+    assert ForecastStore(tmp_path, devices.calibration, 50.0).find(COMB) is None
+
+
+def test_titles_have_typographic_signs() -> None:
+    assert plan_title(COMB) == "comb 5×2×64"
+    assert plan_title(COMB.model_copy(update={"name": "max box"})) == "max box"
