@@ -99,7 +99,11 @@ class BandpassEvidence(Evidence):
         self.table.fill([_row(each, record.warnings) for each in record.filters])
         self.warnings.setText("\n".join(f"{_sentence(each)}." for each in record.warnings))
         self.warnings.setVisible(bool(record.warnings))
-        self._draw_efficiency(record)
+        self.efficiency.draw(lambda: self._draw_efficiency(record))
+        self.response.draw(lambda: self._draw_response(record))
+        self.seconds.setText(_second_orders(record))
+
+    def _draw_response(self, record: BandpassCalibration) -> None:
         self.response.begin()
         draw_curves(
             self.response,
@@ -108,7 +112,6 @@ class BandpassEvidence(Evidence):
                 for name, colour, curve in zip(CHANNELS, RGB_COLOURS, record.response, strict=True)
             ],
         )
-        self.seconds.setText(_second_orders(record))
 
     def _draw_efficiency(self, record: BandpassCalibration) -> None:
         self.efficiency.begin()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -230,23 +231,26 @@ class ColorCheckerEvidence(Evidence):
         if self._record is None or self._before is None:
             return
         self._draw_patches()
-        self._draw_residuals(self._record)
+        self.residuals.draw(partial(self._draw_residuals, self._record))
         for box, after, before in (
             (self.response, self._record.response, self._before[0]),
             (self.emission, self._record.emission, self._before[1]),
         ):
-            box.begin()
-            old = [
-                Named(f"{name} before", colour, curve.model_copy(update={"std": None}), dashed=True)
-                for name, colour, curve in zip(CHANNELS, RGB_COLOURS, before, strict=True)
-            ]
-            new = [
-                Named(name, colour, curve)
-                for name, colour, curve in zip(CHANNELS, RGB_COLOURS, after, strict=True)
-            ]
-            draw_curves(box, [*old, *new])
-            keys = [(name, colour, DOT) for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)]
-            box.name_curves([*keys, ("after", self._theme.text, "━"), ("before", self._theme.text, "┅")])
+            box.draw(partial(self._draw_pair, box, after, before))
+
+    def _draw_pair(self, box: ChartBox, after: Rgb, before: Rgb) -> None:
+        box.begin()
+        old = [
+            Named(f"{name} before", colour, curve.model_copy(update={"std": None}), dashed=True)
+            for name, colour, curve in zip(CHANNELS, RGB_COLOURS, before, strict=True)
+        ]
+        new = [
+            Named(name, colour, curve)
+            for name, colour, curve in zip(CHANNELS, RGB_COLOURS, after, strict=True)
+        ]
+        draw_curves(box, [*old, *new])
+        keys = [(name, colour, DOT) for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)]
+        box.name_curves([*keys, ("after", self._theme.text, "━"), ("before", self._theme.text, "┅")])
 
     def _draw_patches(self) -> None:
         record, view = self._record, self._view

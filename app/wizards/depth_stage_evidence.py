@@ -138,7 +138,7 @@ class DepthStageEvidence(Evidence):
 
     def _take(self, curves: tuple[StageCurve, ...] | Exception) -> None:
         self._curves = curves
-        self._draw_curves()
+        self._draw_later()
 
     def _draw(self) -> None:
         record = self._record
@@ -146,12 +146,12 @@ class DepthStageEvidence(Evidence):
             return
         self.warnings.setText(" ".join(f"{warning}." for warning in record.warnings))
         self.warnings.setVisible(bool(record.warnings))
-        self._draw_planes(record)
-        self._draw_steps(record)
+        self.planes.draw(lambda: self._draw_planes(record))
+        self.steps.draw(lambda: self._draw_steps(record))
         self.film.fill(_film_rows(record, self._before))
-        self._draw_held_out(record)
-        self._draw_shifts(record)
-        self._draw_curves()
+        self.held_out.draw(lambda: self._draw_held_out(record))
+        self.shifts.draw(lambda: self._draw_shifts(record))
+        self._draw_later()
 
     # Planes and film -------------------------------------------------------------------------------
 
@@ -220,6 +220,11 @@ class DepthStageEvidence(Evidence):
         box.name_curves(keys)
 
     # Columns over depth ----------------------------------------------------------------------------
+
+    def _draw_later(self) -> None:
+        """The two boxes stand side by side and are drawn together, with the first of them."""
+        self.curve.draw(self._draw_curves)
+        self.difference.draw(lambda: self.curve.plot)
 
     def _draw_curves(self) -> None:
         record, curves = self._record, self._curves

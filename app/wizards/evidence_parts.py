@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
-from PySide6.QtGui import QColor, QFont
+from PySide6.QtCore import QObject, Qt, QThreadPool, QTimer, Signal
+from PySide6.QtGui import QColor, QFont, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -34,16 +35,18 @@ LINE, DOT, BAR = "━", "●", "■"
 
 
 class ChartBox(QWidget):
-    """A plot under its title and legend; a sentence in its place while there is nothing to draw."""
+    """A plot under its title and legend; a sentence in its place while there is nothing to draw.
+
+    Plots are slow to make: this one is made and drawn when it is first seen.
+    """
 
     def __init__(self, title: str, tip: str, left: str, bottom: str, left_width: int = 52) -> None:
         super().__init__()
         self._theme = DARK
+        self._make = partial(calm_plot, title, tip, left, bottom, left_width)
+        self._plot: Any = None
+        self._draw: Callable[[], object] | None = None
         self.title = label(title, "heading")
-        self.plot = calm_plot(title, tip, left, bottom, left_width)
-        self.plot.setMouseEnabled(False, False)
-        self.plot.setMinimumHeight(90)
-        self.item = self.plot.getPlotItem()
         self.legend = QLabel()
         self.legend.setWordWrap(True)
         self.legend.setTextFormat(Qt.TextFormat.RichText)
@@ -52,7 +55,6 @@ class ChartBox(QWidget):
         self.sentence.setWordWrap(True)
         self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._stack = QStackedLayout()
-        self._stack.addWidget(self.plot)
         self._stack.addWidget(self.sentence)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -65,6 +67,39 @@ class ChartBox(QWidget):
         """Boxes side by side and below each other share the room alike, however long their legends are."""
         return False
 
+    @property
+    def plot(self) -> Any:
+        """The plot with all that is to be seen on it."""
+        if self._plot is None:
+            self._plot = self._make()
+            self._plot.setMouseEnabled(False, False)
+            self._plot.setMinimumHeight(90)
+            theme_plots((self._plot,), self._theme)
+            self._stack.addWidget(self._plot)
+        self._draw_now()
+        return self._plot
+
+    @property
+    def item(self) -> Any:
+        """What curves are added to."""
+        return self.plot.getPlotItem()
+
+    def draw(self, draw: Callable[[], object]) -> None:
+        """Call what draws on this box as soon as the box is seen; only the latest is called."""
+        self._draw = draw
+        if self.isVisible():
+            QTimer.singleShot(0, self, self._draw_now)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Draw what waited for it, one box after the other."""
+        super().showEvent(event)
+        QTimer.singleShot(0, self, self._draw_now)
+
+    def _draw_now(self) -> None:
+        draw, self._draw = self._draw, None
+        if draw is not None:
+            draw()
+
     def begin(self) -> None:
         """Forget what was drawn and show the plot."""
         self.item.clear()
@@ -73,8 +108,12 @@ class ChartBox(QWidget):
         self._stack.setCurrentWidget(self.plot)
 
     def say(self, sentence: str) -> None:
-        """Show a sentence in place of the plot."""
-        self.begin()
+        """Show a sentence in place of the plot, and of what was to be drawn."""
+        self._draw = None
+        if self._plot is not None:
+            self._plot.getPlotItem().clear()
+        self.legend.clear()
+        self.legend.hide()
         self.sentence.setText(sentence)
         self._stack.setCurrentWidget(self.sentence)
 
@@ -86,7 +125,8 @@ class ChartBox(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme; what is drawn keeps its own."""
         self._theme = theme
-        theme_plots((self.plot,), theme)
+        if self._plot is not None:
+            theme_plots((self._plot,), theme)
 
 
 def _legend(name: str, colour: str, sign: str) -> str:

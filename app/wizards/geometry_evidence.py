@@ -177,9 +177,10 @@ class GeometryEvidence(Evidence):
     # Charts ----------------------------------------------------------------------------------------
 
     def _draw(self) -> None:
-        if self._record is not None:
-            self._draw_coverage()
-            self._draw_errors(self._record)
+        record = self._record
+        if record is not None:
+            self.coverage.draw(self._draw_coverage)
+            self.errors.draw(lambda: self._draw_errors(record))
 
     def _draw_coverage(self) -> None:
         record = self._record

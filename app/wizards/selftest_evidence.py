@@ -103,15 +103,15 @@ class SelfTestEvidence(Evidence):
         record, curves = self._record, self._curves
         if record is None:
             return
-        self._draw_beat(record.cycle)
+        self.beat.draw(lambda: self._draw_beat(record.cycle))
         if curves is None or isinstance(curves, Exception):
             words = READING if curves is None else str(curves)
             for box in (self.linearity, self.gamma, self.latency):
                 box.say(words)
             return
-        self._draw_linearity(record, curves)
-        self._draw_gamma(record, curves)
-        self._draw_latency(record, curves)
+        self.linearity.draw(lambda: self._draw_linearity(record, curves))
+        self.gamma.draw(lambda: self._draw_gamma(record, curves))
+        self.latency.draw(lambda: self._draw_latency(record, curves))
 
     def _draw_linearity(self, record: SelfTest, curves: SelfTestCurves) -> None:
         box, percent = self.linearity, 100 / curves.full_scale_dn

@@ -106,6 +106,12 @@ class SpectralonEvidence(Evidence):
         record = self._record
         if record is None:
             return
+        self.emission.draw(lambda: self._draw_emission(record))
+        self.field.draw(lambda: self._draw_field(record))
+        self.table.fill(_rows(record))
+        self.words.setText(_words(record))
+
+    def _draw_emission(self, record: SpectralonCalibration) -> None:
         self.emission.begin()
         draw_curves(
             self.emission,
@@ -114,9 +120,6 @@ class SpectralonEvidence(Evidence):
                 for name, colour, curve in zip(NAMES, RGB_COLOURS, record.emission.curves, strict=True)
             ],
         )
-        self._draw_field(record)
-        self.table.fill(_rows(record))
-        self.words.setText(_words(record))
 
     def _draw_field(self, record: SpectralonCalibration) -> None:
         flat = record.flat_field

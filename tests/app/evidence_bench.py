@@ -34,7 +34,7 @@ def shown(
     session: CalibrationSession | None = None,
     theme: Theme = LIGHT,
 ) -> Any:
-    """The evidence of a recipe with a record in it, on screen."""
+    """The evidence of a recipe with a record in it, on screen, drawn on all of its tabs."""
     widget: Evidence = make_evidence(name)
     qtbot.addWidget(widget)
     widget.resize(700, 500)
@@ -42,6 +42,8 @@ def shown(
     fitted = AcceptedCalibration(name=name, title=name.capitalize(), record=record.model_dump(mode="json"))
     widget.show_fit(fitted, record, session_of({}) if session is None else session)
     widget.show()
+    for box in widget.findChildren(ChartBox):
+        assert box.plot is not None
     return widget
 
 

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from app.state.wizard import WizardState
 from app.wizards.evidence import PlainEvidence, make_evidence
-from app.wizards.evidence_parts import Aside, NumberTable, with_spread
+from app.wizards.evidence_parts import Aside, ChartBox, NumberTable, with_spread
 from app.wizards.fit_page import FitPage
 from dsl_core.campaign.recipes import recipe_names
 from dsl_core.campaign.session import CalibrationSession
@@ -105,3 +105,19 @@ def test_numbers_are_written_as_people_do(qtbot: QtBot) -> None:
     qtbot.addWidget(table)
     table.fill([["a-b", "-1.5"]])
     assert table.row_texts(0) == ["a-b", "−1.5"]
+
+
+def test_what_nobody_sees_is_not_drawn(qtbot: QtBot) -> None:
+    box, drawn = ChartBox("A chart", "Tip", "Left", "Bottom"), list[str]()
+    qtbot.addWidget(box)
+    box.draw(lambda: drawn.append("first"))
+    box.draw(lambda: drawn.append("latest"))
+    assert drawn == []
+    box.show()
+    qtbot.waitUntil(lambda: drawn == ["latest"])
+    box.draw(lambda: drawn.append("while it is seen"))
+    qtbot.waitUntil(lambda: drawn[1:] == ["while it is seen"])
+    box.draw(lambda: drawn.append("never"))
+    box.say("There is nothing to draw.")
+    assert box.plot is not None
+    assert "never" not in drawn

@@ -65,4 +65,4 @@ def test_an_even_camera_is_said_in_words(qtbot: QtBot) -> None:
     assert widget.field.sentence.isVisible()
     assert "sees evenly" in widget.field.sentence.text()
     widget.show_fit(None, calibration(), None)
-    assert not widget.field.sentence.isVisible()
+    qtbot.waitUntil(lambda: not widget.field.sentence.isVisible())
