@@ -25,6 +25,7 @@ from dsl_core.model.color_checker import ColorCheckerCalibration, PatchResult
 from dsl_core.model.rig import Rig
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.shading import Plane
+from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]
 
@@ -81,7 +82,12 @@ def measure_patches(
 
 
 def refine_on_chart(
-    rig: Rig, seen: Sequence[PatchSignals], pose: ChartPose, plane: Plane, chart: str
+    rig: Rig,
+    seen: Sequence[PatchSignals],
+    pose: ChartPose,
+    plane: Plane,
+    chart: str,
+    progress: Progress | None = None,
 ) -> ColorCheckerCalibration:
     """Refine the rig's response and emission; ``seen`` are signals of the patches for each of `LIGHTS`.
 
@@ -92,8 +98,9 @@ def refine_on_chart(
     signal = np.stack([light.mean for light in seen], 2)
     std = np.stack([light.std for light in seen], 2)
     data = _with_white(rig, _surfaces(chart, signal, std))
-    found = refine(rig, data, weight=None)
-    held_out = _held_out(rig, data, found.weight, found.reflectance_error)
+    progress = progress or NoProgress()
+    found = refine(rig, data, weight=None, progress=progress)
+    held_out = _held_out(rig, data, found.weight, found.reflectance_error, progress)
     before = _patch_rms(residuals(rig, data, _unchanged(found)))
     if _rms(held_out) > _rms(before):
         found, held_out = _unchanged(found), before
@@ -112,7 +119,7 @@ def refine_on_chart(
         )
         for p, name in enumerate(names)
     )
-    published = _held_out(rig, data, PUBLISHED_WEIGHT, None)
+    published = _held_out(rig, data, PUBLISHED_WEIGHT, None, progress)
     a, b, c, d = ((float(x), float(y)) for x, y in pose.corners_px)
     return ColorCheckerCalibration(
         chart=chart,
@@ -168,11 +175,14 @@ def _with_white(rig: Rig, data: SurfaceSignals) -> SurfaceSignals:
     )
 
 
-def _held_out(rig: Rig, data: SurfaceSignals, weight: float, error: float | None) -> Floats:
+def _held_out(
+    rig: Rig, data: SurfaceSignals, weight: float, error: float | None, progress: Progress
+) -> Floats:
     """Residual of each patch with curves fitted to the patches of the other folds, (24,)."""
     patch = np.arange(len(data.own_level))
     out = np.empty(int(data.own_level.sum()))
     for fold in range(FOLDS):
+        progress.report("hold patches out", fold, FOLDS)
         left_out = data.own_level & (patch % FOLDS == fold)
         found = refine(rig, data.only(~left_out), weight, error)
         out[left_out[data.own_level]] = _patch_rms(residuals(rig, data.only(left_out), found))

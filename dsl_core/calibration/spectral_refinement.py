@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.determinant import log_determinant
 
 Floats = NDArray[np.float64]
@@ -122,12 +123,22 @@ class SpectralModel:
 
 
 def refine(
-    rig: Rig, data: SurfaceSignals, weight: float | None = PUBLISHED_WEIGHT, error: float | None = None
+    rig: Rig,
+    data: SurfaceSignals,
+    weight: float | None = PUBLISHED_WEIGHT,
+    error: float | None = None,
+    progress: Progress | None = None,
 ) -> Refinement:
     """The most likely deviations; ``weight`` or reflectance ``error`` None are chosen by the evidence."""
     weights = WEIGHTS if weight is None else (weight,)
     errors = REFLECTANCE_ERRORS if error is None else (error,)
-    tried = [_solve(rig, data, w, e) for w in weights for e in errors]
+    pairs = [(w, e) for w in weights for e in errors]
+    progress = progress or NoProgress()
+    tried = []
+    for done, (w, e) in enumerate(pairs):
+        progress.report("refine", done, len(pairs))
+        tried.append(_solve(rig, data, w, e))
+    progress.report("refine", len(pairs), len(pairs))
     return max(tried, key=lambda refinement: refinement.evidence)
 
 

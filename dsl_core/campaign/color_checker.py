@@ -148,10 +148,7 @@ class ColorCheckerRecipe:
         pictures = ChartPictures(target.radiance, target.saturated, light)
         seen = measure_patches(pictures, rig, samples, self.chart)
         assert len(seen) == len(LIGHTS)
-        progress.report("refine", 0, 1)
-        record = refine_on_chart(rig, seen, pose, plane, self.chart)
-        progress.report("refine", 1, 1)
-        return record
+        return refine_on_chart(rig, seen, pose, plane, self.chart, progress)
 
     def _pose(self, white: np.ndarray, rig: Rig, name: str) -> ChartPose:
         expected = expected_colours(rig, self.chart)

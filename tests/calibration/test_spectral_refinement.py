@@ -9,6 +9,7 @@ from dsl_core.calibration.color_checker import LIGHTS
 from dsl_core.calibration.spectral_refinement import (
     FINE_NM,
     PUBLISHED_WEIGHT,
+    WEIGHTS,
     SpectralModel,
     SurfaceSignals,
     refine,
@@ -16,10 +17,12 @@ from dsl_core.calibration.spectral_refinement import (
     residuals,
 )
 from dsl_core.calibration.white_match import match_whites
+from dsl_core.errors import Cancelled
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.model.spectralon import WhiteSignals
 from dsl_core.optics.charts import chart_reflectance
+from dsl_core.progress import CallbackProgress, CancelToken
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 
@@ -141,3 +144,17 @@ def test_whites_are_matched_exactly_and_once() -> None:
     np.testing.assert_allclose(again.response[1].values, once.response[1].values, rtol=1e-9)
     errors = [np.sqrt((response_error(rig.response, true) ** 2).mean()) for rig in (start, once)]
     assert errors[1] < 0.7 * errors[0]
+
+
+def test_a_refinement_that_is_cancelled_ends_at_its_next_trial() -> None:
+    rig, told = published_rig(), list[int]()
+    token = CancelToken()
+
+    def hear(stage: str, done: int, total: int) -> None:
+        told.append(total)
+        if done == 2:
+            token.cancel()
+
+    with pytest.raises(Cancelled, match=f"after 3 of {len(WEIGHTS)} steps"):
+        refine(rig, surfaces(rig, 3e-4), None, 0.01, CallbackProgress(hear, token))
+    assert len(told) == 3
