@@ -150,6 +150,8 @@ class CampaignBox(QFrame):
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""
         dialog = NewCampaignDialog(self._home, self._rig.choice.value.words, self)
+        # Else it would stay as long as the page.
+        dialog.finished.connect(dialog.deleteLater)
         before = self._state.campaign.value
         if dialog.exec() != QDialog.DialogCode.Accepted:
             return False
