@@ -47,7 +47,7 @@ def share_heaps() -> None:
 
 
 def return_memory() -> None:
-    """Give the system what was freed but is kept in heaps, after work that took much."""
+    """Give the system what was freed but is kept in heaps; quick where that is little."""
     trim = _c_function("malloc_trim")
     if trim is not None:
         trim(0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -16,8 +15,6 @@ from dsl_core.errors import DeviceError
 #: How often listeners hear of progress, ms: often enough to look alive, seldom enough to cost nothing.
 TICK_MS = 100
 WORKERS = 3
-#: Jobs that took so long, s, have left freed memory behind that is worth returning.
-LONG_S = 0.5
 
 
 class QtRunner(QObject):
@@ -68,10 +65,8 @@ class QtRunner(QObject):
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def _work(self, job: Job[Any]) -> None:
-        start_s = time.monotonic()
         finish = job.run()
-        if time.monotonic() - start_s > LONG_S:
-            return_memory()
+        return_memory()
         self._ended.emit(job, finish)
 
     def _finish(self, job: Job[Any], finish: Callable[[], None]) -> None:
