@@ -46,8 +46,8 @@ class ForecastController:
         self.state, self._scan, self._rig, self._plans = state, scan, rig, plans
         self._runner, self._notifier, self._folder = runner, notifier, folder
         self._automatic, self._candidates = automatic, candidates
-        self._known: dict[object, Foreseen] = {}
-        self._refused: dict[object, str] = {}
+        self._known: dict[int, Foreseen] = {}
+        self._refused: dict[int, str] = {}
         self._work: ForecastJob | None = None
         self._job: Job[None] | None = None
         self._of: Rigging | None = None
@@ -135,7 +135,7 @@ class ForecastController:
         news = self._work.take_news()
         for each in news:
             if isinstance(each, Foreseen):
-                self._known[identity(each.plan)] = each
+                self._known[each.key] = each
             else:
                 self._refused[identity(each.plan)] = each.reason
         if news:

@@ -92,7 +92,7 @@ class ForecastJob:
         rig = self.rigging.rig
         store = ForecastStore(self._folder, rig, self.rigging.latency_ms)
         presets = {identity(p): key for key, p in self._presets()}
-        seen: dict[object, CapturePlan] = {}
+        seen: dict[int, CapturePlan] = {}
         for plan in (*(p for _, p in self._presets()), *self._candidates(rig)):
             seen.setdefault(identity(plan), plan)
         todo = deque(seen.values())

@@ -14,8 +14,8 @@ RESULT_NAME = "zarr.json"
 REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
 _MARKS = ".marks.json"
 _OPENS = (
-    "It opens scans (folders NAME.dsl), results (folders NAME.zarr), campaigns and rigs of calibrations, and"
-    " text files of reference spectra (.csv, .txt)."
+    "It opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
+    " campaigns and rigs of calibrations, and text files of reference spectra (.csv, .txt)."
 )
 
 
@@ -27,6 +27,7 @@ class Kind(Enum):
     CAMPAIGN = "campaign"
     CALIBRATION = "calibration"
     PLAN = "plan"
+    PATTERNS = "pattern set"
     REFERENCE = "reference spectrum"
     MISSING = "missing"
     UNKNOWN = "unknown"
@@ -57,6 +58,8 @@ def _kind_of_json(path: Path) -> Kind:
     keys = set(content) if isinstance(content, dict) else set()
     if "camera_size_px" in keys or "spectral" in keys:
         return Kind.PLAN
+    if {"levels", "frames"} <= keys:
+        return Kind.PATTERNS
     return Kind.CALIBRATION if keys & {"film", "response", "rig"} else Kind.UNKNOWN
 
 
@@ -79,10 +82,8 @@ def refusal(path: Path) -> str:
                 f"{path.name} may hold a reference spectrum, which is compared with a result. Open a result"
                 " first, then this file again."
             )
-        case Kind.PLAN:
-            return (
-                f"{path.name} is the plan of a scan. Use it with 'dsl-scan scan NAME.dsl --plan {path.name}'."
-            )
+        case Kind.PLAN | Kind.PATTERNS:
+            return f"{path.name} says what to scan. Open it on the Scan page, by 'Open plan'."
         case Kind.CALIBRATION:
             return (
                 f"{path.name} is a calibration. Import it into the library, by the Calibrate page or"

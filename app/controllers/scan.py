@@ -6,6 +6,7 @@ from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 
+from app.controllers.known_files import Kind, kind_of
 from app.controllers.rig import RIG, RigController
 from app.controllers.scan_facts import sentence_of
 from app.controllers.scan_job import Order, ScanJob
@@ -203,9 +204,12 @@ class ScanController:
     # Sessions --------------------------------------------------------------------------------------
 
     def open(self, path: Path) -> bool:
-        """Offer to go on with an interrupted scan; False for anything else, complete scans among it."""
+        """Plan what a file says, or offer to go on with an interrupted scan; False for anything else."""
         from dsl_core.io.session_manifest import MANIFEST_NAME
 
+        if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
+            self.plans.open_plan(path)
+            return True
         if not (path / MANIFEST_NAME).is_file():
             return False
         if self.state.phase.value.is_busy:
@@ -254,7 +258,12 @@ class ScanController:
             return f"dsl-scan resume {state.interrupted.value.folder}"
         rig = self._rig.state.choice.value.command
         return scan_command(
-            state.target.value, rig, state.plan.value, state.calibration.value.key, state.override.value
+            state.target.value,
+            rig,
+            state.plan.value,
+            state.calibration.value.key,
+            state.override.value,
+            state.plan_file.value,
         )
 
     def close(self) -> None:

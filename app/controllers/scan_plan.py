@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from app.controllers.known_files import Kind, kind_of
+from app.controllers.plan_files import read_plan
 from app.controllers.scan_facts import find_facts, sentence_of
 from app.jobs.base import Job, JobRunner
 from app.state.rig import RigState
@@ -14,6 +16,7 @@ from app.views import Notifier
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DslError
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.plan_file import save_plan
 from dsl_core.io.session import SUFFIX
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS, on_cycles
@@ -55,8 +58,43 @@ class ScanPlanController:
 
     def _set_plan(self, plan: CapturePlan) -> None:
         if not self._is_locked():
+            if plan != self.state.plan.value:
+                self.state.plan_file.set(None)
             self.state.plan.set(plan)
             self.refresh()
+
+    def open_plan(self, path: Path) -> None:
+        """Plan what a file says, a plan or a pattern set; undo brings back what was planned."""
+        if self._is_locked():
+            self._notifier.tell("info", f"The scan at hand keeps its plan. Open {path.name} when it is over.")
+            return
+        now = self.state.plan.value
+
+        def done(plan: CapturePlan) -> None:
+            self.change_plan(plan)
+            # A file is as good as the plan where it is one, and nothing had to be fitted to the rig.
+            is_same = kind_of(path) is Kind.PLAN and self.state.plan.value == plan
+            self.state.plan_file.set(path if is_same else None)
+
+        def work(progress: Progress) -> CapturePlan:
+            return read_plan(path, now)
+
+        self._runner.submit(Job(f"Open {path.name}", work, done, self._tell, is_minor=True))
+
+    def save_plan(self, path: Path) -> None:
+        """Write the plan into a file; who chose its name was asked about one that exists."""
+        target = path if path.suffix else path.with_suffix(".json")
+        plan = self.state.plan.value
+
+        def done(written: Path) -> None:
+            if self.state.plan.value == plan:
+                self.state.plan_file.set(written)
+            self._notifier.tell("info", f"The plan lies in {written}.")
+
+        def work(progress: Progress) -> Path:
+            return save_plan(plan, target, overwrite=True)
+
+        self._runner.submit(Job(f"Save {target.name}", work, done, self._tell, is_minor=True))
 
     def _is_locked(self) -> bool:
         """A plan that was begun stays as it is."""

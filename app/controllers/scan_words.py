@@ -28,14 +28,26 @@ def plan_words(plan: CapturePlan) -> list[str]:
     return words
 
 
-def scan_command(target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool) -> str:
-    """The command that takes this scan; ``rig`` as `RigChoice.command` says it."""
-    words = ["dsl-scan scan", shlex.quote(str(target)), rig, *plan_words(plan)]
+def needs_file(plan: CapturePlan) -> bool:
+    """Whether the options of the command line cannot say a plan."""
+    is_line_set = isinstance(plan.spectral, ScanLines) and not plan.spectral.sparse
+    is_comb = isinstance(plan.spectral, LineComb) and not any(plan.spectral.shifts_px)
+    return not (is_line_set or is_comb) or plan.code_settings != tuple(range(len(plan.settings)))
+
+
+def scan_command(
+    target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool, file: Path | None = None
+) -> str:
+    """The command that takes this scan; ``rig`` as `RigChoice.command` says it, ``file`` holds the plan."""
+    words, first = ["dsl-scan scan", shlex.quote(str(target)), rig], ""
+    if file is None and needs_file(plan):
+        file, first = Path("plan.json"), "# First save the plan as plan.json, by 'Save plan' on this page.\n"
+    words += plan_words(plan) if file is None else [f"--plan {shlex.quote(str(file))}"]
     if calibration:
         words.append(f"--calibration {shlex.quote(calibration)}")
     if override:
         words.append("--override-calibration")
-    return " ".join(words)
+    return first + " ".join(words)
 
 
 def rig_words(notes: Mapping[str, object]) -> str:

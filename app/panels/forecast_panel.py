@@ -155,7 +155,7 @@ class ForecastPanel(QWidget):
     def _tell_scan(self, shown: Foreseen | None) -> None:
         """Say of which plan and scan the columns are."""
         scan = self._state.measured.value
-        same = scan is not None and shown is not None and identity(scan.plan) == identity(shown.plan)
+        same = scan is not None and shown is not None and identity(scan.plan) == shown.key
         told = {
             1: "Predicted" if shown is None else f"Predicted for {shown.title}",
             2: "Predicted for the published plan, on this rig",

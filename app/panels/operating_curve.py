@@ -13,7 +13,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.panels.curve_marks import ticks, time_ticks
-from app.state.forecast import Foreseen, identity
+from app.state.forecast import Foreseen
 from app.theme import DARK, Theme
 from app.widgets.forms import ChoiceBox
 from app.widgets.plots import calm_plot, theme_plots
@@ -57,7 +57,7 @@ class OperatingCurve(QWidget):
         self._points: tuple[Foreseen, ...] = ()
         self._current: Foreseen | None = None
         self._theme = DARK
-        self._labels: dict[object, Any] = {}
+        self._labels: dict[int, Any] = {}
         self._is_fixed = False
         self.figure = ChoiceBox("Figure of accuracy", "The figure that the curve shows")
         for figure in FIGURES:
@@ -201,9 +201,9 @@ class OperatingCurve(QWidget):
 
     def _name(self, point: Foreseen) -> None:
         at = self.spot(point)
-        if at is None or identity(point.plan) in self._labels:
+        if at is None or point.key in self._labels:
             return
-        is_current = self._current is not None and identity(point.plan) == identity(self._current.plan)
+        is_current = self._current is not None and point.key == self._current.key
         (left, right), _ = self.plot.getViewBox().viewRange()
         # A name near an edge must not leave the plot.
         share = (at[0] - left) / (right - left)
@@ -212,7 +212,7 @@ class OperatingCurve(QWidget):
         )
         text.setPos(*at)
         self.plot.addItem(text, ignoreBounds=True)
-        self._labels[identity(point.plan)] = text
+        self._labels[point.key] = text
 
     def _place_marker(self, at: tuple[float, float]) -> None:
         self.marker.blockSignals(True)
@@ -224,8 +224,8 @@ class OperatingCurve(QWidget):
     def _nearest(self) -> Foreseen | None:
         """The point of the curve, or the preset, nearest to the marker on the screen."""
         (width, height), at = self.plot.getViewBox().viewPixelSize(), self.marker.pos()
-        worth = {identity(point.plan) for point in self.front()}
-        near = [each for each in self._seen() if each[0].preset or identity(each[0].plan) in worth]
+        worth = {point.key for point in self.front()}
+        near = [each for each in self._seen() if each[0].preset or each[0].key in worth]
         if not near:
             return None
         return min(

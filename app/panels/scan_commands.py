@@ -18,6 +18,12 @@ class PlanCommands(Protocol):
     def change_plan(self, plan: CapturePlan) -> None:
         """Take a plan of any kind."""
 
+    def open_plan(self, path: Path) -> None:
+        """Plan what a file says."""
+
+    def save_plan(self, path: Path) -> None:
+        """Write the plan into a file."""
+
     def set_target(self, target: Path) -> None:
         """Store the scan there."""
 

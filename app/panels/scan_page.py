@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
+    QFileDialog,
     QFrame,
     QHBoxLayout,
     QScrollArea,
@@ -32,6 +33,7 @@ from app.widgets.page import PageWidget
 #: How often news of the scan is fetched, ms: ten pictures a second look alive.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX = 276, 292
+PLANS = "Plans and pattern sets (*.json)"
 
 
 class ScanPage(PageWidget):
@@ -104,6 +106,8 @@ class ScanPage(PageWidget):
         self.banner.action.clicked.connect(commands.start)
         self.plan.preset_chosen.connect(commands.plans.choose_preset)
         self.plan.plan_changed.connect(self._change_plan)
+        self.plan.open_wanted.connect(self._open_plan)
+        self.plan.save_wanted.connect(self._save_plan)
         self.picture.pointed.connect(commands.point_at)
         self._stops = [
             *self.calibration.stops,
@@ -125,6 +129,18 @@ class ScanPage(PageWidget):
         self._commands.plans.change_plan(plan)  # type: ignore[arg-type]
         # What was refused or rounded is shown as it is.
         self._show_plan()
+
+    def _open_plan(self) -> None:
+        folder = str(self._state.target.value.parent)
+        name, _ = QFileDialog.getOpenFileName(self, "Open a plan or a pattern set", folder, PLANS)
+        if name:
+            self._commands.plans.open_plan(Path(name))
+
+    def _save_plan(self) -> None:
+        proposed = str(self._state.target.value.parent / "plan.json")
+        name, _ = QFileDialog.getSaveFileName(self, "Save the plan", proposed, PLANS)
+        if name:
+            self._commands.plans.save_plan(Path(name))
 
     def _show_plan(self) -> None:
         state = self._state
@@ -160,7 +176,7 @@ class ScanPage(PageWidget):
             self._commands.plans.load_library()
 
     def open_path(self, path: Path) -> bool:
-        """Take an interrupted scan."""
+        """Take an interrupted scan, a plan or a pattern set."""
         return self._commands.open(path)
 
     def command_line(self) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from app.state.evented import Value
@@ -27,6 +27,11 @@ class Foreseen:
     plan: CapturePlan
     expected: Prediction
     preset: str = ""
+
+    @cached_property
+    def key(self) -> int:
+        """The `identity` of its plan."""
+        return identity(self.plan)
 
     @property
     def title(self) -> str:
@@ -85,10 +90,13 @@ class ForecastState:
         return next((each for each in self.points.value if each.is_published), None)
 
 
-def identity(plan: CapturePlan) -> Hashable:
-    """What makes two plans the same but for name, image sizes and the rounding of whole cycles."""
+def identity(plan: CapturePlan) -> int:
+    """What makes two plans the same but for name, image sizes and the rounding of whole cycles.
+
+    A number, as patterns of one's own are too long to be compared while a marker is dragged.
+    """
     settings = tuple((round(setting.exposure_ms, 6), setting.level) for setting in plan.settings)
-    return plan.code, plan.spectral, settings, plan.code_settings
+    return hash((plan.code, plan.spectral, settings, plan.code_settings))
 
 
 def plan_title(plan: CapturePlan) -> str:

@@ -90,11 +90,13 @@ class ScanState:
     """Values that the scan's controller sets and the page follows.
 
     ``trouble`` is a sentence on what interrupted the scan (empty: nothing), ``note`` one on what became of
-    it. ``period_ms`` is the LED cycle of the rig's projector. ``result`` fires with each new result.
+    it. ``plan_file`` holds the plan at hand, where it was saved or opened and is still the same.
+    ``period_ms`` is the LED cycle of the rig's projector. ``result`` fires with each new result.
     """
 
     def __init__(self, plan: CapturePlan, target: Path) -> None:
         self.plan = Value(plan)
+        self.plan_file: Value[Path | None] = Value(None)
         self.target = Value(target)
         self.calibrations: Value[tuple[CalibrationChoice, ...]] = Value((OWN_CALIBRATION,))
         self.calibration = Value(OWN_CALIBRATION)

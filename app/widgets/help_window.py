@@ -29,6 +29,7 @@ ORDER = (
     "calibrating",
     "scanning",
     "accuracy-against-time",
+    "designed-patterns",
     "effects-of-the-twin",
     "numbers",
     "reading-an-intensity-graph",

@@ -13,6 +13,9 @@ from pytestqt.qtbot import QtBot
 from app.application import make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
+from app.panels.scan_page import ScanPage
+from dsl_core.io.plan_file import save_plan
+from dsl_core.model.plan import CapturePlan, LineComb
 from tests.app.small_result import RED, write_reference, write_small_result
 
 
@@ -81,4 +84,15 @@ def test_the_menu_lists_what_was_opened_and_marks_what_is_gone(window: MainWindo
     assert "not there any more" in window.toasts.shown[-1].text
     window.recent_menu.fill()
     assert not window.recent_menu.actions()[0].isEnabled()
+    window.close()
+
+
+def test_a_plan_is_planned(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> None:
+    path = save_plan(CapturePlan(name="mine", spectral=LineComb(period_px=64)), tmp_path / "mine.json")
+    assert drop(window, path)
+    qtbot.waitUntil(lambda: window.page == "scan", timeout=30_000)
+    page = window.page_of("scan")
+    assert isinstance(page, ScanPage)
+    qtbot.waitUntil(lambda: page.plan.period.value() == 64, timeout=30_000)
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=30_000)
     window.close()

@@ -31,6 +31,7 @@ def test_folders_are_known_by_a_file_which_may_be_meant_instead(
     [
         (json.dumps({"film": {}, "name": "lab"}), Kind.CALIBRATION),
         (json.dumps({"spectral": {}}), Kind.PLAN),
+        (json.dumps({"levels": "", "frames": 32}), Kind.PATTERNS),
         (json.dumps([1, 2]), Kind.UNKNOWN),
         ("{ cut off", Kind.UNKNOWN),
     ],

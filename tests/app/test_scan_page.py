@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.controllers.effects import EffectsController
@@ -296,3 +297,18 @@ def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> No
     assert figures(page, 3)["Frames"] == "75"
     # The twin does not wait for exposures.
     assert figures(page, 3)["Capture"] == "–"
+
+
+def test_a_plan_is_saved_and_opened_by_the_buttons(
+    qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    page, bench, _ = ready
+    path = str(tmp_path / "mine.json")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (path, ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (path, ""))
+    click(page.plan.save)
+    qtbot.waitUntil((tmp_path / "mine.json").is_file)
+    bench.scans.plans.choose_preset("quick")
+    click(page.plan.open)
+    qtbot.waitUntil(lambda: bench.state.preset is PRESETS[0])
+    assert page.plan.preset.currentData() == "preview"
