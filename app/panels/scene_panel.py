@@ -97,13 +97,15 @@ class ScenePanel(QWidget):
 
     def _new_result(self) -> None:
         result = self._state.result.value
+        if self._layers is not None and self._layers.result is not result:
+            # Whether or not it is seen: a result that was closed must not stay in memory.
+            self._layers, self._points = None, np.empty((0, 3), np.float32)
         if self.scene is None or not self.isVisible():
             return
         if result is None or "points_mm" not in result.arrays:
-            self._layers, self._points = None, np.empty((0, 3), np.float32)
             self._hint.setText("This result holds no points.")
             return
-        if self._layers is None or self._layers.result is not result:
+        if self._layers is None:
             self._layers = Layers(result)
             self._flat = np.flatnonzero(np.isfinite(result["points_mm"][2]))
             self._points = np.ascontiguousarray(result["points_mm"].reshape(3, -1)[:, self._flat].T)

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import gc
 import itertools
+import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -374,6 +376,18 @@ def test_a_still_picture_shows_near_points_before_far_ones() -> None:
     assert picture.shape == (480, 640, 3)
     assert (picture == (0, 255, 0)).all(2).any()
     assert still_picture(points[:0], colours[:0], "#000000") is None
+
+
+def test_a_result_that_is_closed_leaves_no_copy_behind(bench: Bench, qtbot: QtBot) -> None:
+    bench.control.show(View.CLOUD)
+    qtbot.waitUntil(lambda: bench.page.scene.scene is not None)
+    QTest.qWait(50)
+    bench.control.show(View.COLOUR)
+    result = weakref.ref(bench.state.result.value)
+    assert result() is not None
+    bench.state.result.set(None)
+    gc.collect()
+    assert result() is None
 
 
 @pytest.mark.gl
