@@ -17,7 +17,7 @@ from app.jobs.base import Job, JobRunner
 from app.state.calibrate import ABOUT, CalibrateState, CampaignFacts
 from app.state.evented import Event
 from app.state.wizard import WizardState
-from app.views import Notifier
+from app.views import Offerer
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.errors import DslError
@@ -36,7 +36,7 @@ class CalibrateController:
         state: CalibrateState,
         rig: RigController,
         runner: JobRunner,
-        notifier: Notifier,
+        notifier: Offerer,
         library: CalibrationLibrary | None = None,
         kinds: Kinds | None = None,
     ) -> None:

@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.controllers.rig import RIG, RigController
 from app.controllers.scan_facts import NO_RIG, sentence_of
 from app.jobs.base import Job, JobRunner
 from app.state.calibrate import CalibrateState, DriftVerdict
-from app.views import Notifier
+from app.views import Offerer
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
-from dsl_core.model.figure import Figure, failures
+from dsl_core.model.figure import failures
 from dsl_core.progress import Progress
 
 #: A file without this is neither a rig nor an entry of the library.
 _MARK = b'"white_scale"'
+
+
+@dataclass(frozen=True)
+class _Differs:
+    """Settings that keep a calibration from being checked, as clauses."""
+
+    clauses: tuple[str, ...]
 
 
 class LibraryController:
@@ -28,7 +35,7 @@ class LibraryController:
         state: CalibrateState,
         rig: RigController,
         runner: JobRunner,
-        notifier: Notifier,
+        notifier: Offerer,
         library: CalibrationLibrary,
     ) -> None:
         self._state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
@@ -114,29 +121,43 @@ class LibraryController:
         devices = self._rig.state.devices.value
         return devices is not None and devices.place is None
 
-    def check(self, key: str, spectralon: bool = True) -> None:
-        """Take one quick shot of a flat target and compare it with a calibration."""
+    def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
+        """Take one quick shot of a flat target and compare it with a calibration.
+
+        Where camera or projector are set otherwise than in the calibration, checking all the same is offered.
+        """
         devices = self._rig.state.devices.value
         if devices is None:
             self._notifier.tell("warning", NO_RIG)
             return
 
-        def work(progress: Progress) -> tuple[Figure, ...]:
+        def work(progress: Progress) -> DriftVerdict | _Differs:
             from dsl_core.campaign.drift import PLACEMENT, measure_drift
-            from dsl_core.devices.conditions import use_calibration
+            from dsl_core.devices.conditions import check_conditions, use_calibration
 
             known, own = self._library.find(key).rig, replace(devices)
-            use_calibration(own, known)
+            found = check_conditions(known, own)
+            if found and not override:
+                return _Differs(found)
+            use_calibration(own, known, override)
             if own.place is not None:
                 own.place(PLACEMENT)
             with tempfile.TemporaryDirectory(prefix="dsl-scan-check-") as spare:
-                return measure_drift(own, known, Path(spare) / "check.dsl", spectralon, progress)
+                figures = measure_drift(own, known, Path(spare) / "check.dsl", spectralon, progress)
+            return DriftVerdict(key, figures, spectralon, found)
 
-        def done(figures: tuple[Figure, ...]) -> None:
-            wrong = failures(figures)
+        def done(said: DriftVerdict | _Differs) -> None:
+            if isinstance(said, _Differs):
+                self._notifier.offer(
+                    f"{key} is not for these settings: {'; '.join(said.clauses)}. Set them back or calibrate"
+                    " again. A check all the same shows what the change does.",
+                    {"Check all the same": lambda: self.check(key, spectralon, override=True)},
+                )
+                return
+            wrong = failures(said.figures)
             text = f"The rig is not as {key} says." if wrong else f"The rig is as {key} says."
             self._state.note.set(text)
-            self._state.drift.set(DriftVerdict(key, figures))
+            self._state.drift.set(said)
 
         self._rig.run(Job(f"Check {key} for drift", work, done, self._tell, exclusive=RIG))
 

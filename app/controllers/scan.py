@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -73,6 +74,7 @@ class ScanController:
             self.plans.calibration,
             state.override.value,
             is_resumed=session is not None,
+            check_drift=state.check_drift.value,
         )
         self._scan = scan = ScanJob(order)
         for text in (state.trouble, state.note):
@@ -144,6 +146,7 @@ class ScanController:
     def _finished(self, status: Status) -> None:
         folder = self._end(Phase.DONE)
         self.state.interrupted.set(None)
+        self.state.check_drift.set(True)
         self.state.note.set(f"All {status.total} frames are stored in {folder}.")
         self.state.target.set(fresh_target(folder.parent, self._clock()))
         self.plans.refresh()
@@ -245,6 +248,7 @@ class ScanController:
         if self.state.phase.value.is_busy:
             return
         self.state.interrupted.set(None)
+        self.state.check_drift.set(True)
         self.state.phase.set(Phase.PLANNING)
         self.state.trouble.set("")
         self.state.note.set("")
@@ -255,7 +259,8 @@ class ScanController:
         """The command that takes this scan, or goes on with it."""
         state = self.state
         if state.interrupted.value is not None:
-            return f"dsl-scan resume {state.interrupted.value.folder}"
+            skip = "" if state.check_drift.value else " --no-drift-check"
+            return f"dsl-scan resume {shlex.quote(str(state.interrupted.value.folder))}{skip}"
         rig = self._rig.state.choice.value.command
         return scan_command(
             state.target.value,

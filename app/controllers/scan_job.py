@@ -32,6 +32,7 @@ class Order:
     calibration: Rig | None
     override: bool
     is_resumed: bool
+    check_drift: bool = True
 
 
 class ScanJob:
@@ -57,7 +58,7 @@ class ScanJob:
         devices = replace(order.devices)
         if order.is_resumed:
             progress.report("compare with before", 0, 0)
-            plan, notes = pipeline.prepare_resume(devices, order.folder), {}
+            plan, notes = pipeline.prepare_resume(devices, order.folder, order.check_drift), {}
         else:
             plan, notes = order.plan, {**order.notes, **self._calibrate(devices)}
         graphs = IntensityGraphs(plan, devices.camera.info.bayer)

@@ -31,8 +31,8 @@ class LibraryCommands(Protocol):
     def report(self, key: str) -> None:
         """Show the report."""
 
-    def check(self, key: str, spectralon: bool = True) -> None:
-        """Compare the rig with it by one quick shot."""
+    def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
+        """Compare the rig with it by one quick shot, although settings differ where that is overridden."""
 
 
 class CalibrateCommands(Protocol):

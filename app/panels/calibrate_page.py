@@ -9,8 +9,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer, QUrl
 from PySide6.QtGui import QDesktopServices, QShowEvent
 from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
     QFrame,
     QScrollArea,
     QSplitter,
@@ -21,15 +19,13 @@ from PySide6.QtWidgets import (
 from app.panels.calibrate_commands import CalibrateCommands
 from app.panels.calibration_row import CalibrationRow
 from app.panels.campaign_box import CampaignBox
+from app.panels.drift_window import DriftWindow
 from app.panels.library_panel import LibraryPanel
 from app.state.calibrate import CalibrateState, DriftVerdict, Row
 from app.state.rig import RigState
 from app.theme import DARK, Theme
 from app.widgets.banner import Banner
-from app.widgets.figures_table import FiguresTable
-from app.widgets.forms import label
 from app.widgets.page import PageWidget
-from dsl_core.model.figure import failures
 
 #: How often news of a calibration of everything is fetched, ms.
 FETCH_MS = 200
@@ -123,7 +119,14 @@ class CalibratePage(PageWidget):
 
     def _show_drift(self, verdict: DriftVerdict | None) -> None:
         if verdict is not None:
-            DriftWindow(verdict, self._theme, self).open()
+            window = DriftWindow(verdict, self._theme, self)
+            window.again_wanted.connect(
+                lambda: self._commands.library.check(
+                    verdict.name, verdict.spectralon, bool(verdict.overridden)
+                )
+            )
+            window.use_wanted.connect(lambda: self._commands.library.use(verdict.name))
+            window.open()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Folders and libraries change while nobody looks."""
@@ -160,25 +163,3 @@ class CalibratePage(PageWidget):
         for stop in self._stops:
             stop()
         self._commands.close()
-
-
-class DriftWindow(QDialog):
-    """What a quick shot said of a calibration."""
-
-    def __init__(self, verdict: DriftVerdict, theme: Theme, parent: QWidget) -> None:
-        super().__init__(parent)
-        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setWindowTitle(f"Drift check of {verdict.name}")
-        self.resize(860, 420)
-        wrong = failures(verdict.figures)
-        text = f"The rig is {'not ' if wrong else ''}as {verdict.name} says."
-        said = label(text, "bad" if wrong else "good")
-        self.table = FiguresTable("Figures of the drift check")
-        self.table.apply_theme(theme)
-        self.table.show_figures(verdict.figures)
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(self.reject)
-        column = QVBoxLayout(self)
-        column.addWidget(said)
-        column.addWidget(self.table, 1)
-        column.addWidget(buttons)

@@ -138,6 +138,11 @@ class RunBox(QGroupBox):
         self.cancel.setToolTip("End after the frame at hand; what is stored can be resumed")
         self.renew = QPushButton("Plan a &new scan")
         self.renew.setToolTip("Leave the interrupted scan as it is on disk")
+        self.drift = QCheckBox("Compare old frames first")
+        self.drift.setToolTip(
+            "Take two old frames again before going on. Without it the scan goes on although scene or light"
+            " changed; half of it then shows something else"
+        )
         self.then = QCheckBox("Reconstruct at the end")
         self.then.setToolTip("Make and open the result as soon as all frames are stored")
         self._phase, self._what, self._time = label(""), label("", "muted"), label("", "muted")
@@ -151,8 +156,10 @@ class RunBox(QGroupBox):
         self.cancel.clicked.connect(commands.cancel)
         self.renew.clicked.connect(commands.leave_session)
         self.then.toggled.connect(state.then_reconstruct.set)
+        self.drift.toggled.connect(state.check_drift.set)
         self.stops = [
             state.then_reconstruct.follow(self.then.setChecked),
+            state.check_drift.follow(self.drift.setChecked),
             state.phase.follow(lambda _: self._show()),
             state.interrupted.follow(lambda _: self._show()),
             state.facts.follow(lambda _: self._show()),
@@ -166,6 +173,7 @@ class RunBox(QGroupBox):
             buttons.addWidget(button)
         column = QVBoxLayout(self)
         column.addWidget(self.then)
+        column.addWidget(self.drift)
         column.addWidget(self.start)
         column.addLayout(buttons)
         column.addWidget(self.renew)
@@ -188,7 +196,8 @@ class RunBox(QGroupBox):
         self.pause.setText("&Go on" if phase is Phase.PAUSED else "&Pause")
         self.pause.setEnabled(phase in (Phase.RUNNING, Phase.PAUSED))
         self.cancel.setEnabled(phase.is_busy and phase is not Phase.STOPPING)
-        self.renew.setVisible(session is not None and not phase.is_busy)
+        for widget in (self.renew, self.drift):
+            widget.setVisible(session is not None and not phase.is_busy)
         ready = phase is not Phase.PLANNING or not obstacles
         self._phase.setText(f"● {phase.value}" if ready else "● not ready")
         set_role(self._phase, _PHASE_ROLES.get(phase, "muted"))

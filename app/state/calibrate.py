@@ -80,10 +80,15 @@ class CampaignFacts:
 
 @dataclass(frozen=True)
 class DriftVerdict:
-    """What a quick shot said of a calibration of the library."""
+    """What a quick shot said of a calibration of the library.
+
+    ``spectralon`` says that the target was one, ``overridden`` which settings differed and were let be.
+    """
 
     name: str
     figures: tuple[Figure, ...]
+    spectralon: bool = True
+    overridden: tuple[str, ...] = ()
 
 
 def empty_rows() -> tuple[Row, ...]:

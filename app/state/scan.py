@@ -91,7 +91,8 @@ class ScanState:
 
     ``trouble`` is a sentence on what interrupted the scan (empty: nothing), ``note`` one on what became of
     it. ``plan_file`` holds the plan at hand, where it was saved or opened and is still the same.
-    ``period_ms`` is the LED cycle of the rig's projector. ``result`` fires with each new result.
+    ``check_drift`` compares two old frames before an interrupted scan goes on. ``period_ms`` is the LED cycle
+    of the rig's projector. ``result`` fires with each new result.
     """
 
     def __init__(self, plan: CapturePlan, target: Path) -> None:
@@ -101,6 +102,7 @@ class ScanState:
         self.calibrations: Value[tuple[CalibrationChoice, ...]] = Value((OWN_CALIBRATION,))
         self.calibration = Value(OWN_CALIBRATION)
         self.override = Value(False)
+        self.check_drift = Value(True)
         self.then_reconstruct = Value(True)
         self.interrupted: Value[Interrupted | None] = Value(None)
         self.facts: Value[Facts | None] = Value(None)

@@ -486,6 +486,7 @@ def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) 
     bench.control.library.check("other")
     assert "the projector's mode was 6500 K and is not named" in bench.told
     assert bench.state.drift.value is None
+    assert set(bench.notifier.offers) == {"Check all the same"}
     bench.rig.disconnect()
     bench.control.library.check("other")
     assert "No rig is connected" in bench.told
@@ -504,3 +505,24 @@ def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(tmp_path: Path) -
     assert verdict is not None, bench.told
     assert {figure.name for figure in verdict.figures} >= {"row drift"}
     assert "The rig is as own says." in bench.state.note.value
+
+
+def test_a_check_in_spite_of_other_settings_says_which(tmp_path: Path) -> None:
+    choice = RigChoice("twin", (("scene", "plane"), ("size", "112x72")))
+    bench = make_bench(tmp_path, choice=choice)
+    bench.rig.connect(choice)
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    conditions = current_conditions(devices)
+    gain = conditions.camera.model_copy(update={"gain_db": 6.0})
+    other = devices.calibration.model_copy(
+        update={"conditions": conditions.model_copy(update={"camera": gain})}
+    )
+    bench.library.store("own", other)
+    bench.control.library.check("own")
+    assert "the camera's gain (dB) was 6 and is 0" in bench.told
+    bench.notifier.offers["Check all the same"]()
+    verdict = bench.state.drift.value
+    assert verdict is not None, bench.told
+    assert verdict.overridden == ("the camera's gain (dB) was 6 and is 0",)

@@ -6,14 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractSpinBox,
+    QApplication,
     QComboBox,
     QFileDialog,
+    QLabel,
     QLineEdit,
     QMessageBox,
     QTableWidget,
@@ -22,8 +24,9 @@ from PySide6.QtWidgets import (
 from pytestqt.qtbot import QtBot
 
 from app.jobs.qt_runner import QtRunner
-from app.panels.calibrate_page import CalibratePage, DriftWindow
+from app.panels.calibrate_page import CalibratePage
 from app.panels.campaign_box import NewCampaignDialog
+from app.panels.drift_window import DriftWindow
 from app.state.calibrate import ABOUT, DriftVerdict, RowState
 from app.state.wizard import Doing
 from app.theme import DARK, LIGHT
@@ -373,6 +376,38 @@ def test_a_drift_check_shows_its_figures(stage: Stage) -> None:
     assert isinstance(window, DriftWindow)
     assert cell(window.table, 0, 2) == "0.80 ± 0.10 px"
     assert cell(window.table, 0, 4) == "Hold it still."
+    window.close()
+
+
+def test_a_missed_drift_check_offers_to_check_again_and_to_go_on(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checks: list[tuple[object, ...]] = []
+    library = type(stage.bench.control.library)
+    monkeypatch.setattr(library, "check", lambda self, *asked: checks.append(asked))
+    verdict = DriftVerdict("room 12", (LIMITED,), spectralon=False, overridden=("the gain was 6 and is 0",))
+
+    def shown() -> DriftWindow:
+        stage.bench.state.drift.set(replace(verdict))
+        window = stage.page.findChild(DriftWindow)
+        assert isinstance(window, DriftWindow)
+        assert any("the gain was 6" in each.text() for each in window.findChildren(QLabel))
+        return window
+
+    window = shown()
+    click(window.again)
+    assert checks == [("room 12", False, True)]
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    click(shown().use)
+    assert stage.bench.state.in_use.value == "room 12"
+
+
+def test_a_passed_drift_check_has_nothing_to_offer(stage: Stage) -> None:
+    stage.bench.state.drift.set(DriftVerdict("room 12", (LIMITED.model_copy(update={"high": 2.0}),)))
+    window = stage.page.findChild(DriftWindow)
+    assert isinstance(window, DriftWindow)
+    assert not window.again.isVisible()
+    assert not window.use.isVisible()
     window.close()
 
 

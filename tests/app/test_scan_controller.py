@@ -129,6 +129,13 @@ def test_a_scene_that_moved_meanwhile_is_refused(
     bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "changed since the scan stopped" in bench.state.trouble.value
+    assert "--no-drift-check" not in bench.scans.command_line()
+    # Who knows better goes on all the same.
+    bench.state.check_drift.set(False)
+    assert bench.scans.command_line().endswith("first.dsl --no-drift-check")
+    bench.scans.start()
+    assert [phase(bench)] == [Phase.DONE]
+    assert bench.state.check_drift.value
 
 
 def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(

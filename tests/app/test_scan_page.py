@@ -102,8 +102,13 @@ def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, sl
     qtbot.waitUntil(in_phase(bench, Phase.STOPPED), timeout=2_000)
     assert page.run.start.text() == "&Resume scan"
     assert page.run.renew.isVisible()
+    assert page.run.drift.isVisible()
+    page.run.drift.setChecked(False)
+    assert not bench.state.check_drift.value
     click(page.run.start)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert not page.run.drift.isVisible()
+    assert page.run.drift.isChecked()
 
 
 def test_a_second_scan_is_refused_in_a_sentence(qtbot: QtBot, ready: Bench, slow: None) -> None:

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from app.panels.calibrate_page import CalibratePage, DriftWindow
+from app.panels.calibrate_page import CalibratePage
+from app.panels.drift_window import DriftWindow
 from app.state.rig import RigChoice
 from dsl_core.io.campaign_folder import CampaignFolder
 from tests.screens.stage import CHART_RIG, Stage
