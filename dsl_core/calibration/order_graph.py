@@ -69,6 +69,11 @@ class Graph:
     pixels: PlanePixels
     frame_px: int
 
+    def holds(self, centre: Floats, half_px: float) -> NDArray[np.bool_]:
+        """Pixels (P,) whose light at ``centre`` (P,) px from the zero order comes from inside the frame."""
+        column = self.pixels.column_px + centre
+        return np.asarray((column > half_px) & (column < self.frame_px - 1 - half_px))
+
 
 def line_graph(
     lines: ScanLines,

@@ -123,8 +123,7 @@ def _light(graph: Graph, order: int, place: OrderPlace | None, half_px: float) -
     if place is None:
         return OrderLight(order, ratio, spread, np.nan, np.inf, 0.0, np.nan, 0)
     centre = place.at(graph.pixels.place)
-    column = graph.pixels.column_px + centre
-    use = (column > half_px) & (column < graph.frame_px - 1 - half_px)
+    use = graph.holds(centre, half_px)
     use &= graph.pixels.whole.get(order, np.ones(len(use), bool))
     window = np.abs(graph.distance - centre) < half_px
     light, variance = (graph.signal * window).sum(0), (graph.variance * window).sum(0)

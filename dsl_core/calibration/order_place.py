@@ -26,9 +26,12 @@ BIN_PX, SMOOTH_BINS = 2.0, 9
 MIN_SIGMAS, MIN_SHARE = 8.0, 2e-4
 #: Cells whose peak lies farther from the others' than this are not used, px; terms of the quadratic.
 OUTLIER_PX, TERMS = 12.0, 6
-REFINEMENTS = 2
-#: A cell's peak is never better known than this, px.
-CELL_PX = 0.3
+REFINEMENTS = 3
+#: A cell's peak is never better known than this, px; what the quadratic's terms change by in a refinement.
+CELL_PX, TERM_PX = 0.3, 13.0
+#: How far inside the frame a cell's light must come from to be refined with, px: at the edge a part of the
+#: order is missing, which pulls its centre inwards, and where the order lies is known roughly only.
+INSIDE_PX = 30.0
 
 
 @dataclass(frozen=True)
@@ -87,8 +90,9 @@ def _fit(
 ) -> OrderPlace | None:
     """Peaks of all cells around a centre (P,), and the quadratic through them."""
     distance = sign * (graph.distance - centre)
+    use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX)
     peaks, places, widths, shares = [], [], [], []
-    for which in by_cell(graph.pixels, np.ones(len(graph.amplitude), bool)):
+    for which in by_cell(graph.pixels, use):
         peak, share, width = _peak(graph, which, distance, reach_px, ORDER_HALF_PX)
         if np.isfinite(peak):
             peaks.append(sign * peak + (float(centre[which].mean()) if before is None else 0.0))
@@ -98,14 +102,12 @@ def _fit(
     if not peaks:
         return None
     value, place = np.array(peaks), np.array(places).T
-    use = np.abs(value - np.median(value)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
-    terms = _terms(place[:, use])
+    near = np.abs(value - np.median(value)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
+    terms = _terms(place[:, near])
     # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is.
-    damping = (
-        np.diag([1e-9] + [0.02] * (TERMS - 1)) if use.sum() > TERMS else np.diag([1e-9] + [1e3] * (TERMS - 1))
-    )
-    change = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[use])
-    left = value[use] - terms @ change
+    damping = np.diag([1e-9] + [(CELL_PX / TERM_PX) ** 2 if near.sum() > TERMS else 1e3] * (TERMS - 1))
+    change = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[near])
+    left = value[near] - terms @ change
     coefficients = change if before is None else before.coefficients + change
     share = float(np.median(shares)) if before is None else before.share
     # Where few cells see the order, the middle of the image is far from them.
@@ -148,8 +150,9 @@ def _peak(
         if not total > 0:
             return nothing
         centre = float((density * at)[window].sum()) / total
-    if not reach_px[0] <= centre <= reach_px[1]:
-        return nothing
     window = np.abs(at - centre) < half_px
-    width = float(np.sqrt(max((density * (at - centre) ** 2)[window].sum() / density[window].sum(), 0.0)))
-    return centre, float(density[window].sum() / density.sum()), width
+    total = float(density[window].sum())
+    if not (total > 0 and reach_px[0] <= centre <= reach_px[1]):
+        return nothing
+    width = float(np.sqrt(max((density * (at - centre) ** 2)[window].sum() / total, 0.0)))
+    return centre, total / float(density.sum()), width
