@@ -22,6 +22,7 @@ from app.panels.export_dialog import ExportDialog
 from app.panels.intensity_window import IntensityWindow
 from app.panels.marks_panel import MarksPanel
 from app.panels.readout import Readout
+from app.panels.rendered_words import rendered_words
 from app.panels.result_image import ResultImage
 from app.panels.results_commands import ResultCommands
 from app.panels.scene_panel import ScenePanel
@@ -63,6 +64,7 @@ class ResultsPage(PageWidget):
         set_help(self.image, "numbers#under-the-picture")
         self.scene = ScenePanel(state, runner)
         self.readout = Readout(state)
+        set_help(self.readout, "hard-cases")
         self.spectra = SpectrumPanel(state)
         self.spectra.setObjectName("spectra")
         set_help(self.spectra, "numbers#spectra")
@@ -194,10 +196,11 @@ class ResultsPage(PageWidget):
         height, width = result.shape
         bands = f" · {len(result.wavelengths_nm)} bands" if result.has_spectra else " · depth only"
         captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
+        effects, details = rendered_words(result.attributes)
         self.title.setText(result.path.stem)
-        self.about.setText(
-            " · ".join(part for part in (f"{width} × {height} px{bands}", captured, str(result.path)) if part)
-        )
+        parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
+        self.about.setText(" · ".join(part for part in parts if part))
+        self.about.setToolTip("\n\n".join(part for part in (str(result.path), details) if part))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

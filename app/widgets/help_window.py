@@ -32,6 +32,7 @@ ORDER = (
     "designed-patterns",
     "effects-of-the-twin",
     "numbers",
+    "hard-cases",
     "reading-an-intensity-graph",
     "comparing",
     "exporting",
