@@ -36,7 +36,9 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
         half = torch.linalg.solve_triangular(factor, right[..., None], upper=False)[..., 0]
         volume = torch.logdet(weights.double()).to(right)
         evidence.append(volume - 2 * _log_diagonal(factor) + (half * half).sum(1))
-    tau = parabola_peak(torch.stack(evidence), torch.as_tensor(prior.taus).to(right).log()).exp()
+    tau = parabola_peak(
+        torch.stack(evidence), torch.tensor(prior.taus, dtype=torch.float64).log().to(right)
+    ).exp()
     matrix = data + shape * tau[:, None, None] ** -2 + ridge
     factor = torch.linalg.cholesky(matrix)
     mean = torch.cholesky_solve(right[..., None], factor)[..., 0]

@@ -17,6 +17,7 @@ from dsl_core.reconstruction.spectral_solver import (
     gradient,
     roughness,
     solve_spectra,
+    within_band,
 )
 from dsl_core.solve import banded
 
@@ -148,3 +149,13 @@ def test_band_mean_keeps_straight_lines_and_area() -> None:
     spike = torch.zeros((9, 1), dtype=torch.float64)
     spike[4] = 1
     assert band_mean(spike)[3:6, 0].tolist() == pytest.approx([1 / 6, 2 / 3, 1 / 6])
+
+
+def test_a_line_under_one_band_makes_it_and_its_neighbours_less_certain() -> None:
+    nodes = torch.zeros((11, 2), dtype=torch.float64)
+    nodes[5, 0] = 1
+    nodes[:, 1] = torch.linspace(0, 1, 11, dtype=torch.float64)
+    spread = within_band(nodes)
+    # The shares of 1, 4, 6, 4, 1 that a spike's fourth difference has, not those of its second.
+    assert (36 * spread[3:8, 0]).tolist() == pytest.approx([1, 4, 6, 4, 1])
+    assert spread[:, 1].max() < 1e-12
