@@ -16,6 +16,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig
+from dsl_core.optics.sensor import raw_variance
 from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
@@ -58,7 +59,7 @@ class LineStack:
     """Merged line frames (frames, rows, columns): radiance (DN per ms), deviation (infinite: saturated)."""
 
     radiance: NDArray[np.float32]
-    std: NDArray[np.float16]
+    std: NDArray[np.floating]
 
 
 def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
@@ -85,10 +86,10 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
 
 
 def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack:
-    """Read and merge every spectral frame."""
+    """Read and merge every spectral frame; deviations take half precision wherever it holds them."""
     plan = scan.plan
     shape = (plan.spectral_count, plan.camera_size_px[1], plan.camera_size_px[0])
-    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, np.float16))
+    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, _deviation_type(scan)))
 
     def load(k: int) -> None:
         buffer = MergedFrame(stack.radiance[k], np.empty(shape[1:], np.float32), np.empty(shape[1:], bool))
@@ -98,6 +99,15 @@ def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack
 
     _each(load, shape[0], "line frames", progress)
     return stack
+
+
+def _deviation_type(scan: MergedScan) -> type[np.floating]:
+    """Half precision unless some deviation of the merge would overflow it or lose digits; else single."""
+    sensor, gains = scan.rig.sensor, scan.gains_ms
+    dark, full = raw_variance(sensor, np.array([0.0, sensor.full_scale_dn]))
+    half = np.finfo(np.float16)
+    least, most = np.sqrt(dark) / gains.sum(), np.sqrt(full) / gains.min()
+    return np.float16 if least > half.smallest_normal and most < half.max else np.float32
 
 
 def check_source(source: FrameSource, rig: Rig) -> CapturePlan:

@@ -81,7 +81,7 @@ class PublishedReconstruction:
         grid: WavelengthGrid,
         model: Correspondence,
         radiance: NDArray[np.float32],
-        std: NDArray[np.float16],
+        std: NDArray[np.floating],
         pixels: Pixels,
         *,
         options: AdamOptions | None = None,

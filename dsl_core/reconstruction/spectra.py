@@ -100,7 +100,7 @@ class SpectralReconstruction:
         grid: WavelengthGrid,
         model: Correspondence,
         radiance: NDArray[np.float32],
-        std: NDArray[np.float16],
+        std: NDArray[np.floating],
         pixels: Pixels,
         *,
         prior: Prior | None = None,

@@ -41,7 +41,8 @@ def factorise(matrix: Tensor, overwrite: bool = False) -> Factor:
         torch.div(column, work[0, j], out=lower[:reach, j])
         for a in range(1, reach + 1):
             work[: reach - a + 1, j + a].addcmul_(lower[a - 1, j], work[a : reach + 1, j], value=-1)
-    if not bool((work[0] > 0).all()):
+    # What is no number fails both comparisons; infinity would leave zeros behind instead of an answer.
+    if not bool(((work[0] > 0) & (work[0] < torch.inf)).all()):
         raise ValueError("a banded system is not positive definite; its weights or prior are not positive")
     return Factor(lower, work[0])
 

@@ -59,8 +59,9 @@ def test_log_determinant_is_the_dense_one(matrix: Tensor) -> None:
     assert banded.factorise(matrix).log_determinant.numpy() == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_system_that_is_not_positive_is_refused() -> None:
+@pytest.mark.parametrize("value", [-1.0, 0.0, np.nan, np.inf])
+def test_a_system_that_is_not_positive_is_refused(value: float) -> None:
     matrix = positive(2, 6)
-    matrix[0, 3, 1] = -1.0
+    matrix[0, 3, 1] = value
     with pytest.raises(ValueError, match="not positive definite"):
         banded.factorise(matrix)
