@@ -31,7 +31,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from app.state.rig import RigChoice
 
     application = make_application(sys.argv[:1])
-    keep_house(application)
     rig = None if wanted.rig is None else RigChoice(wanted.rig, _options(wanted.option))
     path = None if wanted.path is None else wanted.path.absolute()
     composition = Composition(Wish(rig, path, wanted.demo, predicts=True, is_first_contact=True))
@@ -41,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands=composition.commands,
         page_waits=True,
     )
+    keep_house(window)
     hook = ExceptionHook(window.toasts)
     hook.install()
     window.show()

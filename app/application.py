@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
-from app.jobs.housekeeping import COLLECT_MS, collect, share_heaps, take_over_collection
+from app.jobs.housekeeping import LOOK_MS, Housekeeper, share_heaps
 from app.jobs.qt_runner import QtRunner
 from app.main_window import Command, MainWindow, PageMaker, Parts
 from app.panels.log import LogRecords
@@ -52,13 +52,15 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     return application
 
 
-def keep_house(application: QApplication) -> None:
+def keep_house(window: MainWindow) -> Housekeeper:
     """Look for garbage in the window's thread alone from now on."""
-    take_over_collection()
-    timer = QTimer(application)
-    timer.setInterval(COLLECT_MS)
-    timer.timeout.connect(collect)
+    keeper = Housekeeper(lambda: bool(window.parts.runner.active))
+    keeper.take_charge()
+    timer = QTimer(window)
+    timer.setInterval(LOOK_MS)
+    timer.timeout.connect(keeper.look)
     timer.start()
+    return keeper
 
 
 def _import_plainly() -> None:

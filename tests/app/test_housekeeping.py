@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import psutil
 import pytest
 
-from app.jobs import housekeeping
+from app.jobs.housekeeping import ALL_S, Housekeeper, return_memory
 
 
 class Knot:
@@ -19,40 +19,64 @@ class Knot:
         self.itself = self
 
 
+class Day:
+    """Whether jobs run, and what time it is."""
+
+    def __init__(self) -> None:
+        self.is_busy, self.time_s = False, 0.0
+        self.keeper = Housekeeper(lambda: self.is_busy, lambda: self.time_s)
+
+
 @pytest.fixture
-def taken_over() -> Iterator[None]:
-    housekeeping.take_over_collection()
-    yield
-    housekeeping.give_back_collection()
+def day() -> Iterator[Day]:
+    made = Day()
+    gc.collect()
+    made.keeper.take_charge()
+    yield made
+    made.keeper.leave()
     assert gc.isenabled()
 
 
-def allocate() -> None:
+def allocate() -> list[list[int]]:
     """Make more objects than Python lets pass without a look for garbage."""
-    kept = [[i] for i in range(3 * gc.get_threshold()[0])]
-    assert kept
+    return [[i] for i in range(3 * gc.get_threshold()[0])]
 
 
-@pytest.mark.usefixtures("taken_over")
-def test_a_thread_takes_nothing_apart_that_belongs_to_the_window() -> None:
+def test_a_thread_takes_nothing_apart_that_belongs_to_the_window(day: Day) -> None:
     knot = weakref.ref(Knot())
     thread = threading.Thread(target=allocate)
     thread.start()
     thread.join()
     assert knot() is not None
-    allocate()
-    kept = [[i] for i in range(2 * gc.get_threshold()[0])]
-    housekeeping.collect()
+    kept = allocate()
+    day.keeper.look()
     assert kept
     assert knot() is None
 
 
-@pytest.mark.usefixtures("taken_over")
-def test_little_garbage_may_wait() -> None:
-    gc.collect()
+def test_little_garbage_may_wait_until_a_job_ends(day: Day) -> None:
+    day.is_busy = True
     knot = weakref.ref(Knot())
-    housekeeping.collect()
+    day.keeper.look()
     assert knot() is not None
+    day.is_busy = False
+    day.keeper.look()
+    assert knot() is None
+
+
+def test_what_grew_old_is_found_in_time_but_not_while_a_job_runs(day: Day) -> None:
+    held = Knot()
+    knot = weakref.ref(held)
+    gc.collect()
+    del held
+    day.is_busy, day.time_s = True, 10 * ALL_S
+    kept = allocate()
+    day.keeper.look()
+    assert kept
+    assert knot() is not None
+    day.is_busy = False
+    day.keeper.look()
+    assert knot() is None
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have other heaps")
@@ -62,6 +86,6 @@ def test_freed_memory_goes_back_to_the_system() -> None:
     last = bytearray(20_000)
     full = process.memory_info().rss
     del blocks
-    housekeeping.return_memory()
+    return_memory()
     assert len(last) == 20_000
     assert full - process.memory_info().rss > 60e6

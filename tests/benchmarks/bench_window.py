@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _measure(material: Path, only: list[str], trace: Path | None, quick: bool) -> dict[str, Any]:
-    from app.application import keep_house, make_application
+    from app.application import make_application
     from tests.benchmarks.window_figures import memory_of, result_figures, start_figures, turn_cloud
     from tests.benchmarks.window_jobs import WindowJobs
     from tests.screens.look import Look
@@ -51,7 +51,7 @@ def _measure(material: Path, only: list[str], trace: Path | None, quick: bool) -
 
     made = make_material(material)
     full = _full_result(made.folder)
-    keep_house(make_application([]))
+    make_application([])
     with tempfile.TemporaryDirectory(prefix="dsl-scan-") as home, open(trace or os.devnull, "w") as told:
         os.environ["HOME"] = home
         stage = Stage("bench", Path(home), Path(home), made, Look(1280, 800, "dark"))

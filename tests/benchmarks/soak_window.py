@@ -57,11 +57,11 @@ def _soak(minutes: float, seed: int, theme: str) -> int:
     from tests.benchmarks.random_person import RandomPerson
 
     application = make_application([])
-    keep_house(application)
     with tempfile.TemporaryDirectory(prefix="dsl-scan-") as home:
         os.environ["HOME"] = os.environ["DSL_SCAN_HOME"] = home
         errors = _Errors()
         person = RandomPerson(Path(home), theme, random.Random(seed))
+        keep_house(person.window)
         rounds: list[tuple[float, ...]] = []
         limit = time.monotonic() + 60 * minutes
         head = ["round", "widgets", "objects", "threads", "files", "MB", "actions", "load"]

@@ -6,15 +6,16 @@ the thread computed, and what the other threads of the program computed while it
 
 from __future__ import annotations
 
+import faulthandler
 import os
-import sys
+import re
+import tempfile
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from types import FrameType
 from typing import IO
 
 from PySide6.QtCore import QTimer
@@ -69,56 +70,49 @@ class StallWatch:
         self._stalls.clock.append(clock)
         self._stalls.own.append(own)
         self._stalls.quiet.append(quiet)
-        if self._trace is not None and self._samples is not None:
-            self._samples.let_go()
-            if quiet > TELL_MS:
-                self._trace.write(f"\n----- {clock:.0f} ms, {quiet:.0f} quiet, {own:.0f} own\n")
-                self._trace.write("\n".join(self._samples.between(self._before[0], now[0])) + "\n")
-                self._trace.flush()
+        if self._trace is not None and self._samples is not None and quiet > TELL_MS:
+            self._trace.write(f"\n----- {clock:.0f} ms, {quiet:.0f} quiet, {own:.0f} own\n")
+            self._trace.write("\n".join(self._samples.between(self._before[0], now[0])) + "\n")
+            self._trace.flush()
         self._before = now
 
 
 class Samples:
-    """What all threads did, looked at every few milliseconds by a thread that needs Python's lock as well."""
+    """What all threads did, looked at every few milliseconds by a thread that needs Python's lock as well.
+
+    It reads what faulthandler writes: frames in hand would keep the variables of the window's thread alive,
+    painters among them, or end them in this one.
+    """
 
     PERIOD_S, DEPTH = 0.01, 9
 
     def __init__(self) -> None:
         self._kept: deque[tuple[float, str]] = deque(maxlen=3000)
-        #: Frames that were looked at, and with them their variables. The window's must end in its thread.
-        self._frames: deque[list[FrameType]] = deque()
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - open as long as the thread runs
         threading.Thread(target=self._look, name="samples", daemon=True).start()
 
     def between(self, start: float, end: float) -> list[str]:
-        """What was seen from a time to another, and just after it."""
-        return [text for at, text in list(self._kept) if start <= at <= end + 2 * self.PERIOD_S]
-
-    def let_go(self) -> None:
-        """Forget the frames that were looked at; called in the window's thread."""
-        self._frames.clear()
+        """What was seen from a time to another, and just after it: innermost frames first."""
+        names = {thread.ident: thread.name for thread in threading.enumerate()}
+        seen = [text for at, text in list(self._kept) if start <= at <= end + 2 * self.PERIOD_S]
+        return [line for text in seen for line in ("", *self._threads(text, names))]
 
     def _look(self) -> None:
         while True:
             time.sleep(self.PERIOD_S)
-            self._frames.append(self._look_once())
+            self._file.seek(0)
+            self._file.truncate()
+            faulthandler.dump_traceback(self._file)
+            self._file.seek(0)
+            self._kept.append((time.perf_counter(), self._file.read().decode()))
 
-    def _look_once(self) -> list[FrameType]:
-        names = {thread.ident: thread.name for thread in threading.enumerate()}
-        stacks = {names.get(ident, "?"): [frame] for ident, frame in sys._current_frames().items()}
-        seen = []
-        for name, stack in stacks.items():
-            while stack[-1].f_back is not None and len(stack) < self.DEPTH:
-                stack.append(stack[-1].f_back)
+    def _threads(self, text: str, names: Mapping[int | None, str]) -> Iterator[str]:
+        for part in re.split(r"^(?=Thread|Current thread)", text, flags=re.MULTILINE):
+            ident = re.match(r".*(0x[0-9a-f]+)", part)
+            name = names.get(int(ident[1], 16), "?") if ident else "samples"
+            places = re.findall(r'File "(?:[^"]*/)?((?:[^"/]+/)?[^"/]+)", line (\d+) in (.*)', part)
             if name != "samples":
-                seen.append(f"  {name}: {' < '.join(map(_place, stack))}")
-        self._kept.append((time.perf_counter(), "\n".join(["", *seen])))
-        return [frame for stack in stacks.values() for frame in stack]
-
-
-def _place(frame: FrameType) -> str:
-    """A frame as ``file:line function``."""
-    code = frame.f_code
-    return f"{'/'.join(code.co_filename.split('/')[-2:])}:{frame.f_lineno} {code.co_name}"
+                yield f"  {name}: " + " < ".join(f"{f}:{n} {what}" for f, n, what in places[: self.DEPTH])
 
 
 def _now() -> tuple[float, float, float, float]:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+from app.application import keep_house
 from app.jobs.warm_up import WarmUp
 from app.panels.compare_page import ComparePage
 from app.panels.results_page import ResultsPage
@@ -80,6 +81,7 @@ class WindowJobs:
         campaign = self.stage.copied(self.stage.material.complete)
         with self._job("start and connect"):
             self.stage.open(library=True, campaign=campaign)
+            keep_house(self.stage.window)
             self.stage.composition.start(self.stage.window)
             self._warm_up.start()
             rig = self.stage.composition.rig(self.stage.window)
