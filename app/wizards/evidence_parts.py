@@ -31,6 +31,8 @@ from app.widgets.plots import calm_plot, theme_plots
 Floats = NDArray[np.floating[Any]]
 #: A name of the legend with its colour (``#rrggbb``) and the sign that stands for it.
 Key = tuple[str, str, str]
+#: Between two boxes that are drawn, ms: the window comes round meanwhile.
+TURN_MS = 30
 LINE, DOT, BAR = "━", "●", "■"
 
 
@@ -88,12 +90,16 @@ class ChartBox(QWidget):
         """Call what draws on this box as soon as the box is seen; only the latest is called."""
         self._draw = draw
         if self.isVisible():
-            QTimer.singleShot(0, self, self._draw_now)
+            self._draw_soon()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Draw what waited for it, one box after the other."""
         super().showEvent(event)
-        QTimer.singleShot(0, self, self._draw_now)
+        self._draw_soon()
+
+    def _draw_soon(self) -> None:
+        seen = [box for box in self.window().findChildren(ChartBox) if box.isVisible()]
+        QTimer.singleShot(TURN_MS * (seen.index(self) if self in seen else 0), self, self._draw_now)
 
     def _draw_now(self) -> None:
         draw, self._draw = self._draw, None
