@@ -14,8 +14,7 @@ from dsl_core.model.figure import failures
 
 WHAT_TO_DO = (
     "What to do stands beside each figure that misses its limit. Put it right and check again, or calibrate"
-    " again what is named. Scans with this calibration stay possible; what they miss is about as much as the"
-    " figures do."
+    " again what is named. Scans with this calibration stay possible, but share its error."
 )
 
 

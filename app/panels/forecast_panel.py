@@ -29,7 +29,7 @@ FETCH_MS = 200
 BUDGET, ERROR = "budget", "error"
 #: Height of a row of the table.
 ROW_PX = 19
-NOTHING_YET = "Connect a rig with a calibration on the Rig page to see what accuracy costs in time on it."
+NOTHING_YET = "Nothing is predicted yet. It takes a connected rig with a calibration, and no scan under way."
 ORIGIN = "Expected from the calibration, on a Color Checker at 700 mm: F1 says how."
 
 

@@ -55,6 +55,8 @@ class ScanPage(PageWidget):
         )
         self.plan = PlanEditor()
         self.plan.setObjectName("scan-plan")
+        for box in (self.plan.preset, self.plan.code, self.plan.patterns):
+            box.be_narrow()
         set_help(self.plan, "scanning#the-plan")
         self.forecast, self.curve = forecast, forecast.curve
         set_help(self.forecast, "accuracy-against-time")

@@ -22,6 +22,7 @@ from app.state.scan import CalibrationChoice, Facts, Phase, ScanState
 from app.widgets.forms import ChoiceBox, label, set_role
 from app.widgets.job_strip import describe_seconds
 from dsl_core.capture.status import Status
+from dsl_core.model.plan import Columns
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 
@@ -117,7 +118,8 @@ class TargetBox(QGroupBox):
             return
         plan = self._state.plan.value
         self._frames.setText(str(facts.frames))
-        self._split.setText(f"{plan.code_count} code and {plan.spectral_count} line patterns")
+        kind = "designed" if isinstance(plan.spectral, Columns) else "line"
+        self._split.setText(f"{plan.code_count} code, {plan.spectral_count} {kind} patterns")
         self._time.setText(f"{minutes(facts.seconds)} on the rig")
         self._disk.setText(f"{volume(facts.needed_bytes)} of {volume(facts.free_bytes)} free")
         set_role(self._disk, "bad" if facts.free_bytes < facts.needed_bytes else "")

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QStyle, QWidget
+
+_SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
 if TYPE_CHECKING:
@@ -73,6 +75,11 @@ class ChoiceBox(CalmWheel, QComboBox):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(name)
         self.setToolTip(tip or name)
+
+    def be_narrow(self, least_px: int = 80) -> None:
+        """Let the box be narrower than its longest entry, which its list still shows whole."""
+        self.setMinimumWidth(least_px)
+        self.view().setMinimumWidth(self.view().sizeHintForColumn(0) + self.style().pixelMetric(_SCROLL))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Tell of an entry that was found by typing, which Qt does only for the arrow keys."""

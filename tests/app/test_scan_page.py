@@ -229,7 +229,7 @@ def begin(qtbot: QtBot, page: ScanPage) -> ForecastState:
 def test_nothing_is_shown_before_it_is_predicted(ready: Bench) -> None:
     page, _, _ = ready
     assert set(figures(page, 1).values()) == {"–"}
-    assert "Connect a rig" in page.forecast._note.text()
+    assert "Nothing is predicted yet" in page.forecast._note.text()
     assert not page.forecast.ask.isEnabled()
 
 

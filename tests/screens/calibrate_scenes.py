@@ -8,8 +8,10 @@ from pathlib import Path
 
 from app.panels.calibrate_page import CalibratePage
 from app.panels.drift_window import DriftWindow
+from app.state.calibrate import DriftVerdict
 from app.state.rig import RigChoice
 from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.figure import Figure
 from tests.screens.stage import CHART_RIG, Stage
 
 
@@ -65,6 +67,21 @@ def drift(stage: Stage) -> None:
     stage.shoot()
 
 
+def drift_missed(stage: Stage) -> None:
+    """A quick shot that says that something moved, taken although the gain was another."""
+    page = open_campaign(stage, stage.material.half)
+    moved = Figure(
+        name="row drift", value=0.83, std=0.02, unit="px", high=0.15,
+        advice="Camera or projector has turned: repeat the geometry calibration.",
+    )  # fmt: skip
+    bright = Figure(name="white signal, green", value=1.004, std=0.003, unit="", low=0.97, high=1.03)
+    page._state.drift.set(
+        DriftVerdict("room-12", (moved, bright), overridden=("the camera's gain (dB) was 6 and is 0",))
+    )
+    stage.dialog(DriftWindow)
+    stage.shoot()
+
+
 def foreign(stage: Stage) -> None:
     """A campaign of another rig than the one that is connected."""
     open_campaign(stage, stage.material.half)
@@ -78,5 +95,6 @@ SCENES: dict[str, Callable[[Stage], None]] = {
     "calibrate-half": half,
     "calibrate-complete": complete,
     "calibrate-drift": drift,
+    "calibrate-missed": drift_missed,
     "calibrate-foreign": foreign,
 }

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import islice
 
+import numpy as np
+
 from app.controllers.forecast import ForecastController
 from app.controllers.forecast_job import usual_candidates
 from app.controllers.scan import ScanController
@@ -13,6 +15,7 @@ from app.panels.scan_page import ScanPage
 from app.state.forecast import Measured
 from app.state.rig import RigChoice
 from app.state.scan import Phase, ScanState
+from dsl_core.planning.designed import DesignedSet, packed, save_design
 from dsl_core.simulation.faults import FaultPlan, with_faults
 from tests.screens.stage import CHART_RIG, Stage
 
@@ -129,6 +132,25 @@ def _only(control: ForecastController) -> Measured:
     return found
 
 
+def designed(stage: Stage) -> None:
+    """Patterns of a file, and a file that is no plan."""
+    stage.open()
+    scan = planned_scan(stage)
+    levels = np.zeros((16, 640, 3), np.uint8)
+    levels[np.arange(640) // 2 % 16, np.arange(640)] = 255
+    made = DesignedSet(
+        name="designed 16", rig="twin", command="", frames=16, width_px=640, loss_start=0.02, loss=0.01,
+        levels=packed(levels),
+    )  # fmt: skip
+    stage.window.open_path(save_design(made, stage.folder / "set.json"))
+    stage.wait(lambda: scan.state.plan.value.name == "designed 16")
+    wrong = stage.folder / "wrong.json"
+    wrong.write_text('{"spectral": {"kind": "lines", "width_px": 0}}')
+    stage.window.open_path(wrong)
+    stage.idle()
+    stage.shoot()
+
+
 def no_forecast(stage: Stage) -> None:
     """Nothing can be predicted without a calibration."""
     stage.open()
@@ -158,6 +180,7 @@ def effects(stage: Stage) -> None:
 SCENES: dict[str, Callable[[Stage], None]] = {
     "scan-planned": planned,
     "scan-forecast": forecast,
+    "scan-designed": designed,
     "scan-uncalibrated": no_forecast,
     "scan-effects": effects,
     "scan-running": running,
