@@ -10,14 +10,14 @@ from pathlib import Path
 from app.state.rig import RigChoice
 from dsl_core.io.origin import rig_of_notes
 from dsl_core.io.session import SUFFIX
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.code_choices import name_of
+from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
 
 
 def plan_words(plan: CapturePlan) -> list[str]:
     """Options of ``dsl-scan scan`` that make a plan."""
-    words = []
-    if isinstance(plan.code, GrayCode):
-        words.append(f"--code {'full' if plan.code.rows else 'columns'}")
+    code = name_of(plan.code)
+    words = [] if code is None else [f"--code {code}"]
     match plan.spectral:
         case ScanLines(width_px=width, step_px=step):
             words.append(f"--lines {width}x{step}")

@@ -9,7 +9,8 @@ from app.panels.setting_rows import SettingRows
 from app.state.scan import preset_of
 from app.widgets.forms import ChoiceBox, WholeBox, label
 from app.widgets.help_window import set_help
-from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, NoCode, ScanLines
+from dsl_core.model.code_choices import CODE_CHOICES, code_of, name_of
+from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines
 from dsl_core.model.presets import PRESETS
 
 OWN = "Own plan"
@@ -39,9 +40,9 @@ class PlanEditor(QGroupBox):
         self._purpose = label("", "muted")
         self._purpose.setWordWrap(True)
         self.code = ChoiceBox("Binary code", "Finds the projector column, and row, that lights each pixel")
-        self.code.addItem("Columns and rows", True)
-        self.code.addItem("Columns only", False)
-        self.code.addItem("None", None)
+        for choice in CODE_CHOICES:
+            self.code.addItem(choice.title, choice.name)
+        self.code.addItem("None", "")
         self.patterns = ChoiceBox("Patterns", "One line a frame, or several at once")
         self.patterns.addItem("Single lines", LINES)
         self.patterns.addItem("Comb of lines", COMB)
@@ -105,8 +106,7 @@ class PlanEditor(QGroupBox):
         preset = preset_of(plan, period_ms)
         self.preset.setCurrentIndex(self.preset.findData("" if preset is None else preset.key))
         self._purpose.setText(_purpose_of(plan) if preset is None else preset.purpose)
-        rows = None if isinstance(plan.code, NoCode) else plan.code.rows
-        self.code.setCurrentIndex((True, False, None).index(rows))
+        self.code.setCurrentIndex(self.code.findData(name_of(plan.code) or ""))
         lines = isinstance(plan.spectral, ScanLines | LineComb)
         self._offer_file(not lines)
         for widget in (self.line_width, self.step):
@@ -141,7 +141,6 @@ class PlanEditor(QGroupBox):
         self.period.setSingleStep(lines.step_px)
 
     def _edited(self) -> None:
-        rows = self.code.currentData()
         width, step = self.line_width.value(), self.step.value()
         kind, spectral = self.patterns.currentData(), self._plan.spectral
         if kind in (COMB, COLOURS):
@@ -152,7 +151,7 @@ class PlanEditor(QGroupBox):
             spectral = LineComb(width_px=width, step_px=step, period_px=period, shifts_px=shifts)
         elif kind == LINES:
             spectral = ScanLines(width_px=width, step_px=step)
-        self._tell(code=NoCode() if rows is None else GrayCode(rows=rows), spectral=spectral)
+        self._tell(code=code_of(self.code.currentData()) or NoCode(), spectral=spectral)
 
     def _tell(self, **changes: object) -> None:
         self.plan_changed.emit(self._plan.model_copy(update={**changes, "name": "own plan"}))

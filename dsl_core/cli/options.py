@@ -42,7 +42,13 @@ OverrideCalibration = Annotated[
 ]
 PlanFile = Annotated[Path | None, typer.Option("--plan", help="A plan written by 'dsl-scan plan'.")]
 Code = Annotated[
-    str | None, typer.Option("--code", help="Binary code: 'full' (columns and rows) or 'columns'.")
+    str | None,
+    typer.Option(
+        "--code",
+        help="Binary code: 'full' (columns and rows) or 'columns'; 'xor-04' and 'ensemble-04' for surfaces"
+        " that light each other, with stripes of 2 px as 'xor-02' and 'ensemble-02', with rows"
+        " as 'full-xor-04'.",
+    ),
 ]
 Lines = Annotated[
     str | None, typer.Option("--lines", help="One line a frame, as WIDTHxSTEP in projector px, like 5x2.")
@@ -85,13 +91,14 @@ class PlanChoice:
         return _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
 
     def _fields(self) -> dict[str, object]:
-        from dsl_core.model.plan import GrayCode
+        from dsl_core.model.code_choices import CODE_CHOICES, code_of
 
         fields: dict[str, object] = {}
         if self.code is not None:
-            if self.code not in ("full", "columns"):
-                raise PlanError(f"--code must be 'full' or 'columns', not {self.code!r}.")
-            fields["code"] = GrayCode(rows=self.code == "full")
+            fields["code"] = code_of(self.code)
+            if fields["code"] is None:
+                names = ", ".join(choice.name for choice in CODE_CHOICES)
+                raise PlanError(f"--code must be one of {names}, not {self.code!r}.")
         spectral = self._spectral()
         if spectral is not None:
             fields["spectral"] = spectral

@@ -167,9 +167,10 @@ def _calibrate(output: Output, devices: DeviceRig, name: str | None, override: b
 
 def _require_patterns(plan: CapturePlan) -> None:
     """Raise `PlanError` when the plan's patterns cannot be made, before anything is written."""
-    from dsl_core.patterns.images import spectral_profiles
+    from dsl_core.patterns.images import pattern_image, spectral_profiles
 
     spectral_profiles(plan)
+    pattern_image(plan, next(plan.shots()))
 
 
 def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) -> None:

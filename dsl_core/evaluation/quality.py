@@ -15,12 +15,14 @@ FLAG_COLOURS: dict[Flag, str] = dict(
         (
             "#332288", "#cc3311", "#aa4499", "#882255", "#ddcc77",
             "#999933", "#88ccee", "#44aa99", "#ee7733", "#555555",
+            "#117733",
         ),
         strict=True,
     )
 )  # fmt: skip
-#: From the gravest to the mildest: as declared, except for the last, which outranks all.
-GRAVITY = (Flag.NON_FINITE, *(flag for flag in Flag if flag is not Flag.NON_FINITE))
+#: From the gravest to the mildest: as declared, except for those that leave no depth and came later.
+_GRAVEST = (Flag.NON_FINITE, Flag.CODES_DISAGREE)
+GRAVITY = (*_GRAVEST, *(flag for flag in Flag if flag not in _GRAVEST))
 
 
 def gravest_flag(flags: NDArray[np.integer]) -> NDArray[np.uint8]:

@@ -22,6 +22,29 @@ class GrayCode(Record):
     rows: bool = True
 
 
+class XorCode(Record):
+    """A Gray code combined by exclusive or with its own fine stripes of ``base_px``: none is coarse.
+
+    As many frames as the Gray code, in its order. Light that surfaces send each other does not flip its bits,
+    but it needs lens, projector and surface to keep fine stripes apart.
+    """
+
+    kind: Literal["xor"] = "xor"
+    rows: bool = True
+    base_px: Literal[2, 4] = 4
+
+
+class EnsembleCode(Record):
+    """Gray code, then XOR code, each with inverses, then white, then black: two opinions on every pixel.
+
+    Where they agree the column is certain; where not, light arrives by another way than straight.
+    """
+
+    kind: Literal["ensemble"] = "ensemble"
+    rows: bool = True
+    base_px: Literal[2, 4] = 4
+
+
 class NoCode(Record):
     """No binary code and no white frame: captures that need no depth, such as lines through a filter."""
 
@@ -74,7 +97,8 @@ class Columns(Record):
     levels: tuple[tuple[tuple[float, float, float], ...], ...]
 
 
-CodeSet = Annotated[GrayCode | NoCode, Field(discriminator="kind")]
+BinaryCode = GrayCode | XorCode | EnsembleCode
+CodeSet = Annotated[GrayCode | XorCode | EnsembleCode | NoCode, Field(discriminator="kind")]
 SpectralSet = Annotated[ScanLines | LineComb | Columns | NoSpectral, Field(discriminator="kind")]
 
 
@@ -145,7 +169,8 @@ class CapturePlan(Record):
     @property
     def code_count(self) -> int:
         """Frames of the code without white and black."""
-        return 2 * sum(self.code_bits)
+        codes = 2 if isinstance(self.code, EnsembleCode) else 1
+        return 2 * codes * sum(self.code_bits)
 
     @property
     def spectral_count(self) -> int:
@@ -165,19 +190,23 @@ class CapturePlan(Record):
         """Every exposure, in the order it is taken."""
         index = 0
         for i, setting in enumerate(self.settings):
-            # Black is taken at every setting: it is what every other frame of that setting is measured from.
-            roles: list[tuple[Role, int]] = [("black", 1)]
-            if i in self.code_settings and not isinstance(self.code, NoCode):
-                roles = [("code", self.code_count), ("white", 1), ("black", 1)]
-            for role, count in [*roles, ("spectral", self.spectral_count)]:
+            for role, count in self._roles(i):
                 for pattern in range(count):
                     yield Shot(index, role, pattern, i, setting.exposure_ms, setting.level)
                     index += 1
 
+    def _roles(self, setting: int) -> list[tuple[Role, int]]:
+        """Roles of a setting in the order they are taken, and how many shots each has."""
+        lines: tuple[Role, int] = ("spectral", self.spectral_count)
+        # Black is taken at every setting: it is what every other frame of that setting is measured from.
+        if setting in self.code_settings and not isinstance(self.code, NoCode):
+            return [("code", self.code_count), ("white", 1), ("black", 1), lines]
+        return [("black", 1), lines]
+
     @property
     def shot_count(self) -> int:
         """Number of exposures."""
-        return sum(1 for _ in self.shots())
+        return sum(count for i in range(len(self.settings)) for _, count in self._roles(i))
 
     @property
     def raw_bytes(self) -> int:

@@ -27,6 +27,7 @@ class Flag(IntFlag):
     AT_BOUND = 128
     POOR_FIT = 256
     NON_FINITE = 512
+    CODES_DISAGREE = 1024
 
 
 REASONS: dict[Flag, str] = {
@@ -42,10 +43,11 @@ REASONS: dict[Flag, str] = {
         "the measured intensities do not fit any spectrum (mixed materials, interreflection, motion)"
     ),
     Flag.NON_FINITE: "the input or an intermediate value was not a finite number",
+    Flag.CODES_DISAGREE: "codes disagree: light arrives by another way (reflections between surfaces)",
 }
 
 #: Flags after which depth, respectively the spectrum, is not given at all (NaN).
-DEPTH_INVALID = Flag.NO_LIGHT | Flag.CODE_UNSURE | Flag.OUT_OF_RANGE | Flag.NON_FINITE
+DEPTH_INVALID = Flag.NO_LIGHT | Flag.CODE_UNSURE | Flag.OUT_OF_RANGE | Flag.NON_FINITE | Flag.CODES_DISAGREE
 SPECTRUM_INVALID = DEPTH_INVALID
 
 

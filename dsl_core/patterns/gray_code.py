@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.errors import DecodeError, PlanError
-from dsl_core.model.plan import GrayCode
+from dsl_core.model.plan import BinaryCode
 
 
-def bit_counts(spec: GrayCode, size_px: tuple[int, int]) -> tuple[int, int]:
+def bit_counts(spec: BinaryCode, size_px: tuple[int, int]) -> tuple[int, int]:
     """Column bits and row bits (0 when rows are not coded) for a projector of (width, height) px."""
     width, height = size_px
     if width < 2 or height < 1 or (spec.rows and height < 2):
@@ -33,7 +33,7 @@ def bit_counts(spec: GrayCode, size_px: tuple[int, int]) -> tuple[int, int]:
     return (width - 1).bit_length(), (height - 1).bit_length() if spec.rows else 0
 
 
-def frame_count(spec: GrayCode, size_px: tuple[int, int]) -> int:
+def frame_count(spec: BinaryCode, size_px: tuple[int, int]) -> int:
     """Frames of the code including white and black."""
     return 2 * sum(bit_counts(spec, size_px)) + 2
 
@@ -44,7 +44,7 @@ def gray_bit(count: int, bit: int) -> NDArray[np.uint8]:
     return ((index ^ (index >> 1)) >> bit & 1).astype(np.uint8)
 
 
-def code_image(spec: GrayCode, size_px: tuple[int, int], index: int) -> NDArray[np.uint8]:
+def code_image(spec: BinaryCode, size_px: tuple[int, int], index: int) -> NDArray[np.uint8]:
     """Frame ``index`` of the code, shape (height, width), 0 or 255.
 
     The last two indices are white and black. Raises `PlanError` for an index outside the code.
@@ -68,7 +68,7 @@ def code_image(spec: GrayCode, size_px: tuple[int, int], index: int) -> NDArray[
     return image
 
 
-def code_images(spec: GrayCode, size_px: tuple[int, int]) -> NDArray[np.uint8]:
+def code_images(spec: BinaryCode, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     """All frames of the code, shape (frames, height, width), 0 or 255; white and black are last."""
     return np.stack([code_image(spec, size_px, i) for i in range(frame_count(spec, size_px))])
 
@@ -81,6 +81,10 @@ class DecodedCode:
     not coded. ``likely_column`` is the better guess there too, within the projector. ``margin`` is the
     smallest ``|positive - inverse|`` over all bits, float32, in the unit of the input; ``margin_sigmas`` the
     smallest in standard deviations, None when none were given.
+
+    The rest only codes with fine stripes can say. ``straight``: the light comes straight from the projector.
+    ``rival_column``, int32: what the other code of an ensemble says where the two disagree, else -1.
+    ``at_edge``: two codes name neighbouring columns, ``likely_column`` and the next; the truth lies between.
     """
 
     column: NDArray[np.int32]
@@ -89,12 +93,15 @@ class DecodedCode:
     margin: NDArray[np.float32]
     margin_sigmas: NDArray[np.float32] | None
     undecided: NDArray[np.bool_]
+    straight: NDArray[np.bool_] | None = None
+    rival_column: NDArray[np.int32] | None = None
+    at_edge: NDArray[np.bool_] | None = None
 
 
 class GrayDecoder:
     """Decodes pair by pair, in the order of the code, so that a stack is never held in memory."""
 
-    def __init__(self, spec: GrayCode, size_px: tuple[int, int]) -> None:
+    def __init__(self, spec: BinaryCode, size_px: tuple[int, int]) -> None:
         """Expect the pairs of ``spec`` on a projector of ``size_px`` = (width, height)."""
         self._size_px = size_px
         self._bits = bit_counts(spec, size_px)
@@ -190,7 +197,7 @@ class GrayDecoder:
 def decode(
     positive: ArrayLike,
     inverse: ArrayLike,
-    spec: GrayCode,
+    spec: BinaryCode,
     size_px: tuple[int, int],
     min_margin: float = 0.0,
 ) -> DecodedCode:

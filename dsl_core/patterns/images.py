@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import CapturePlan, GrayCode, Shot
-from dsl_core.patterns.gray_code import code_image
+from dsl_core.model.plan import CapturePlan, NoCode, Shot
+from dsl_core.patterns.binary_code import binary_image
 from dsl_core.patterns.multiplexed import profile, profiles
 
 
@@ -20,12 +20,12 @@ def pattern_image(plan: CapturePlan, shot: Shot) -> NDArray[np.uint8]:
     image = np.empty((height, width, 3), np.uint8)
     match shot.role:
         case "code":
-            if not isinstance(plan.code, GrayCode):
+            if isinstance(plan.code, NoCode):
                 raise PlanError(
                     f"The plan {plan.name!r} has no binary code, so no code frame {shot.pattern}."
                 )
             drive = np.uint8(np.round(255 * shot.level))
-            image[:] = (code_image(plan.code, plan.projector_size_px, shot.pattern) & drive)[..., None]
+            image[:] = (binary_image(plan.code, plan.projector_size_px, shot.pattern) & drive)[..., None]
         case "white":
             image[:] = np.uint8(np.round(255 * shot.level))
         case "black":

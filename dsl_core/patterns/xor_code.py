@@ -9,24 +9,23 @@ Order and number of frames stay those of the Gray code. Gupta, Agrawal, Veerarag
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import GrayCode
+from dsl_core.model.plan import EnsembleCode, XorCode
 from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, code_image, frame_count
 
-BaseWidth = Literal[2, 4]
+#: Every bit of fine stripes stands this many deviations above its inverse where light comes straight.
+STRAIGHT_SIGMAS = 5.0
+Spec = XorCode | EnsembleCode
 
 
-def xor_image(
-    spec: GrayCode, size_px: tuple[int, int], index: int, base_px: BaseWidth = 4
-) -> NDArray[np.uint8]:
+def xor_image(spec: Spec, size_px: tuple[int, int], index: int) -> NDArray[np.uint8]:
     """Frame ``index`` of the code, shape (height, width), 0 or 255; raises `PlanError` outside the code."""
     columns, rows = bit_counts(spec, size_px)
-    base_bit = _base_bit(spec, size_px, base_px)
+    base_bit = _base_bit(spec, size_px)
     image = code_image(spec, size_px, index)
     pair = index // 2
     base_pair = (columns if pair < columns else columns + rows) - 1 - base_bit
@@ -35,19 +34,19 @@ def xor_image(
     return np.asarray(image ^ code_image(spec, size_px, 2 * base_pair))
 
 
-def xor_images(spec: GrayCode, size_px: tuple[int, int], base_px: BaseWidth = 4) -> NDArray[np.uint8]:
+def xor_images(spec: Spec, size_px: tuple[int, int]) -> NDArray[np.uint8]:
     """All frames of the code, shape (frames, height, width), 0 or 255; white and black are last."""
-    return np.stack([xor_image(spec, size_px, i, base_px) for i in range(frame_count(spec, size_px))])
+    return np.stack([xor_image(spec, size_px, i) for i in range(frame_count(spec, size_px))])
 
 
 class XorDecoder:
     """Decodes pair by pair; the counterpart of `GrayDecoder`."""
 
-    def __init__(self, spec: GrayCode, size_px: tuple[int, int], base_px: BaseWidth = 4) -> None:
+    def __init__(self, spec: Spec, size_px: tuple[int, int]) -> None:
         """Expect the pairs of the XOR code of ``spec`` on a projector of ``size_px`` = (width, height)."""
         self._size_px = size_px
         self._bits = bit_counts(spec, size_px)
-        self._base_bit = _base_bit(spec, size_px, base_px)
+        self._base_bit = _base_bit(spec, size_px)
         # As Gray codes the frames may name any number of these bits; the range is checked after conversion.
         self._decoder = GrayDecoder(spec, (2 ** self._bits[0], 2 ** max(self._bits[1], 1)))
 
@@ -59,6 +58,7 @@ class XorDecoder:
         """Columns and rows of all pixels; see `GrayDecoder.finish`."""
         found = self._decoder.finish(min_margin, min_sigmas)
         column = _converted(found.column, self._bits[0], self._base_bit)
+        likely = _converted(found.likely_column, self._bits[0], self._base_bit)
         undecided = found.undecided | (column >= self._size_px[0])
         row = None
         if found.row is not None:
@@ -66,14 +66,20 @@ class XorDecoder:
             undecided |= row >= self._size_px[1]
             row[undecided] = -1
         column[undecided] = -1
-        return replace(found, column=column, row=row, undecided=undecided)
+        straight = ~undecided
+        if found.margin_sigmas is not None:
+            straight &= found.margin_sigmas >= STRAIGHT_SIGMAS
+        likely = likely.clip(0, self._size_px[0] - 1)
+        return replace(
+            found, column=column, likely_column=likely, row=row, undecided=undecided, straight=straight
+        )
 
 
-def _base_bit(spec: GrayCode, size_px: tuple[int, int], base_px: BaseWidth) -> int:
-    base_bit = base_px.bit_length() - 2
+def _base_bit(spec: Spec, size_px: tuple[int, int]) -> int:
+    base_bit = spec.base_px.bit_length() - 2
     if min(bits for bits in bit_counts(spec, size_px) if bits) <= base_bit:
         raise PlanError(
-            f"An XOR-{base_px:02d} code needs more than {base_px} columns and rows, given"
+            f"An XOR-{spec.base_px:02d} code needs more than {spec.base_px} columns and rows, given"
             f" {size_px[0]} x {size_px[1]}. Use the Gray code."
         )
     return base_bit

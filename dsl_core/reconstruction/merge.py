@@ -17,7 +17,8 @@ from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import raw_variance
-from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder
+from dsl_core.patterns.binary_code import decoder_of
+from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
 
@@ -69,7 +70,7 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
         raise DecodeError(
             f"The scan {plan.name!r} holds no binary code, so that depth is unknown. Capture one with a code."
         )
-    decoder = GrayDecoder(plan.code, plan.projector_size_px)
+    decoder = decoder_of(plan.code, plan.projector_size_px)
 
     def add(pair: tuple[MergedFrame, MergedFrame]) -> None:
         positive, inverse = pair

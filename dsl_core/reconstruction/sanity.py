@@ -16,6 +16,7 @@ _ADVICE = {
     Flag.NO_LIGHT: "Check that the projector is on, the lens open, the scene in the beam; or expose longer.",
     Flag.OUT_OF_RANGE: "Check that the calibration belongs to this rig, and the distance of the scene.",
     Flag.CODE_UNSURE: "Check that projector and camera run in step and nothing moved; expose longer.",
+    Flag.CODES_DISAGREE: "Check focus and that nothing moved; part surfaces that light each other.",
     Flag.NON_FINITE: "Check the calibration for values that are not numbers.",
 }
 
