@@ -12,7 +12,6 @@ smoothness is the one that does best on the twin's ColorChecker.
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +31,7 @@ from dsl_core.optics.spectra import chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.spectra import Pixels, SpectralMaps
+from dsl_core.solve.many import Check, work_through
 
 ORDERS = (1, -1)
 #: Rows of frames that are demosaiced at once; even, to keep the Bayer phase.
@@ -108,8 +108,9 @@ class PublishedReconstruction:
         reached = reached & torch.isfinite(first).all(0)
         colour = demosaic(np.nan_to_num(self.pixels.amplitude), self.rig.sensor.bayer).reshape(3, -1)[:, flat]
 
-        def work(start: int) -> None:
+        def work(start: int, check: Check) -> None:
             part = slice(start, start + CHUNK)
+            check()
             measured = self._measured(
                 flat[part], order[part], columns[:, part], reached[:, part], kappa[part], first[..., part],
                 torch.as_tensor(colour[:, part], dtype=torch.float32),
@@ -120,9 +121,7 @@ class PublishedReconstruction:
         before = torch.get_num_threads()
         torch.set_num_threads(1)
         try:
-            with ThreadPoolExecutor(threads) as pool:
-                for done, _ in enumerate(pool.map(work, starts), 1):
-                    progress.report("spectra", done, len(starts))
+            work_through(work, starts, threads, "spectra", progress)
         finally:
             torch.set_num_threads(before)
         return out

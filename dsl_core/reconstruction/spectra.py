@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +29,7 @@ from dsl_core.reconstruction.spectral_system import (
     lit_by_zero_order,
 )
 from dsl_core.solve.banded import multiply
+from dsl_core.solve.many import Check, work_through
 
 #: Pixels of a tile; even numbers keep the Bayer phase.
 TILE = (64, 96)
@@ -125,9 +125,9 @@ class SpectralReconstruction:
         before = torch.get_num_threads()
         torch.set_num_threads(1)
         try:
-            with ThreadPoolExecutor(threads) as pool:
-                for done, _ in enumerate(pool.map(lambda tile: self._tile(tile[0], tile[1], out), tiles), 1):
-                    progress.report("spectra", done, len(tiles))
+            work_through(
+                lambda tile, check: self._tile(*tile, out, check), tiles, threads, "spectra", progress
+            )
         finally:
             torch.set_num_threads(before)
         return out
@@ -160,7 +160,7 @@ class SpectralReconstruction:
         return self.model.trace(index, depth, order, nm)
 
     @torch.inference_mode()
-    def _tile(self, rows: slice, columns: slice, out: SpectralMaps) -> None:
+    def _tile(self, rows: slice, columns: slice, out: SpectralMaps, check: Check) -> None:
         valid = self.pixels.valid[rows, columns]
         if not valid.any():
             return
@@ -170,7 +170,8 @@ class SpectralReconstruction:
         orders = ORDERS if self._is_banded else self.bands.orders
         traced = {order: self._footprint(order, flat, self.bands.centroids_nm[order]) for order in orders}
         window = _Window(self, rows, columns, inside_tile)
-        spectra, misfit = (self._banded if self._is_banded else self._dense)(flat, traced, window)
+        check()
+        spectra, misfit = (self._banded if self._is_banded else self._dense)(flat, traced, window, check)
         self._store(spectra, misfit, flat, traced, out)
 
     @property
@@ -178,7 +179,7 @@ class SpectralReconstruction:
         return self.lines is not None and self.lines.frames == self.lines.lines
 
     def _banded(
-        self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window
+        self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window, check: Check
     ) -> tuple[Spectra, Tensor]:
         assert self.lines is not None
         shading = self._map(self.pixels.shading, flat)
@@ -189,11 +190,13 @@ class SpectralReconstruction:
             inside = footprint.inside(*self.plan.projector_size_px, margin_px=EDGE_PX)
             frames = system.frames(footprint, inside)
             if frames:
+                check()
                 radiance, weight = window.colours(frames, self.lines)
                 system.add(order, footprint.columns, inside, radiance, weight, frames.start, blur)
         right = system.right * shading
         rows = self._colour_rows(flat, shading, window, right)
-        spectra = solve_spectra(system.positive_matrix() * shading**2, right, rows, self.prior)
+        check()
+        spectra = solve_spectra(system.positive_matrix() * shading**2, right, rows, self.prior, check)
         radiance = spectra.nodes * shading
         explained = (radiance * (2 * system.right - multiply(system.matrix, radiance))).sum(0)
         return spectra, (system.square - explained) / (system.samples - PARAMETERS).clip(min=1)
@@ -213,7 +216,7 @@ class SpectralReconstruction:
         return rows
 
     def _dense(
-        self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window
+        self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window, check: Check
     ) -> tuple[Spectra, Tensor]:
         from dsl_core.reconstruction.dense_solver import solve_dense
 
@@ -233,6 +236,7 @@ class SpectralReconstruction:
         matrix, right, square = dense_equations(
             response, self.bands, profiles, column, traced, inside, radiance, weight
         )
+        check()
         spectra = solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
         radiance = (spectra.nodes * shading).T
         explained = (radiance * (2 * right - (matrix @ radiance[..., None])[..., 0])).sum(1)

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from dsl_core.solve import banded
+from dsl_core.solve.many import Check, never
 
 #: Deviation between centre and mean of a band, relative to the differences of its spectrum.
 WITHIN_BAND = 1 / 36
@@ -147,12 +148,14 @@ def gradient(matrix: Tensor, rows: Tensor | None, x: Tensor, right: Tensor) -> T
     return g
 
 
-def solve_spectra(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior) -> Spectra:
+def solve_spectra(
+    data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check = never
+) -> Spectra:
     """Posterior of every pixel's spectrum.
 
     ``data`` (bandwidth + 1, bands, pixels) and ``right`` (bands, pixels) are the first orders' normal
     equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are
-    already in ``right``.
+    already in ``right``. ``check`` is called where this may stop.
     """
     if data.shape[0] < 3:
         data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))
@@ -160,11 +163,12 @@ def solve_spectra(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior
     ridge = torch.zeros_like(shape)
     ridge[0] = prior.level_std**-2
     right = right + prior.level * prior.level_std**-2
-    tau = _most_probable_tau(data, right, rows, shape, ridge, prior)
+    tau = _most_probable_tau(data, right, rows, shape, ridge, prior, check)
     weights = shape[..., None] * tau**-2 + ridge[..., None]
     posterior = Posterior(data, weights, rows)
     mean = posterior.solve(right)
-    mean, at_bound = _bounded(data, weights, rows, right, mean, prior.bounds)
+    mean, at_bound = _bounded(data, weights, rows, right, mean, prior.bounds, check)
+    check()
     std = torch.hypot(posterior.band_mean_variance().clip(min=1e-12).sqrt(), within_band(mean))
     return Spectra(mean, band_mean(mean), std, data_share(data), tau, at_bound)
 
@@ -211,7 +215,13 @@ def data_share(data: Tensor) -> Tensor:
 
 
 def _most_probable_tau(
-    data: Tensor, right: Tensor, rows: Tensor | None, shape: Tensor, ridge: Tensor, prior: Prior
+    data: Tensor,
+    right: Tensor,
+    rows: Tensor | None,
+    shape: Tensor,
+    ridge: Tensor,
+    prior: Prior,
+    check: Check,
 ) -> Tensor:
     """The second-difference deviation with the largest evidence in each pixel, (pixels,).
 
@@ -220,6 +230,7 @@ def _most_probable_tau(
     """
     evidence = []
     for tau in prior.taus:
+        check()
         weights = shape * tau**-2 + ridge
         posterior = Posterior(data, weights[..., None], rows)
         volume = banded.factorise(weights[..., None].double()).log_determinant.to(right)
@@ -247,6 +258,7 @@ def _bounded(
     right: Tensor,
     mean: Tensor,
     bounds: tuple[float, float],
+    check: Check,
 ) -> tuple[Tensor, Tensor]:
     """Minimum inside the bounds by an active-set iteration where it is needed, and the active bands."""
     low, high = bounds
@@ -254,6 +266,7 @@ def _bounded(
     slope = torch.zeros_like(mean)
     todo = torch.nonzero(((mean < low - TOLERANCE) | (mean > high + TOLERANCE)).any(0)).ravel()
     for _ in range(ACTIVE_SET_ROUNDS):
+        check()
         here, held = x[:, todo], pinned[:, todo]
         at = torch.where(here < 0.5 * (low + high), low, high)
         release = held & torch.where(at == low, slope[:, todo] < 0, slope[:, todo] > 0)
