@@ -166,6 +166,20 @@ class RandomPerson:
         for old in sorted((self._home / "scans").glob("*"), key=lambda path: path.stat().st_mtime)[:-4]:
             shutil.rmtree(old, ignore_errors=True)
 
+    def look_everywhere(self) -> None:
+        """Do every action once, so that windows made when they are first wanted are there."""
+        actions = self.window.actions_by_key
+        left = set(actions) - {*NEVER, "live_demo", "calibrate_everything"}
+        for page in PAGES:
+            for key in sorted(left):
+                self.window.open_page(page)
+                if actions[key].isEnabled() and actions[key].isVisible():
+                    left.remove(key)
+                    self.done.append(f"first {key}")
+                    actions[key].trigger()
+                    self._live(0.3)
+                    self.rest()
+
     def rest(self, cancel: bool = True) -> None:
         """Leave all dialogs and let everything come to its end."""
         for _ in range(20):
