@@ -18,9 +18,10 @@ from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.pattern_table import PatternTable
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.renderer import NM, Renderer
+from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.scenes import make_scene
 from dsl_core.simulation.sim_devices import SimCamera, SimSpectroradiometer, open_twin
+from dsl_core.simulation.spectral_tables import NM
 from dsl_core.simulation.world import World
 
 SIZE = (64, 42)
@@ -112,16 +113,27 @@ def test_white_plane_without_film_has_the_closed_form() -> None:
 
 
 def test_pattern_table_means_are_those_of_the_pattern() -> None:
-    rng = np.random.default_rng(0)
-    levels = rng.random((1, 40, 1)).repeat(6, 0)
-    table = PatternTable.of(levels, small_rig(halo_peak_per_px=0.0).projector_response, torch.device("cpu"))
+    levels = np.random.default_rng(0).random((1, 40, 1)).repeat(6, 0)
+    sharp = small_rig(halo_peak_per_px=0.0, blur_px=0.01).projector_response
+    table = PatternTable.of(levels, sharp, torch.device("cpu"))
     start, stop = torch.tensor([-0.5, 4.5, 9.75]), torch.tensor([39.5, 7.5, 10.25])
     mean = table.mean_between(0, start, stop, None).numpy()
-    assert mean == pytest.approx([levels[0].mean(), levels[0, 5:8].mean(), levels[0, 10, 0]], rel=1e-4)
+    assert mean == pytest.approx([levels[0].mean(), levels[0, 5:8].mean(), levels[0, 10, 0]], rel=1e-3)
     outside = table.mean_between(0, torch.tensor([-9.0]), torch.tensor([-5.0]), None)
     assert float(outside) == 0
     assert table.leds == 1
     assert not table.has_rows
+
+
+def test_first_orders_see_the_blurred_pattern() -> None:
+    response = small_rig(halo_peak_per_px=0.0).projector_response
+    line = np.zeros((1, 40, 1))
+    line[:, 18:22] = 1
+    table = PatternTable.of(line, response, torch.device("cpu"))
+    column = torch.linspace(14.0, 25.0, 23)
+    mean = table.mean_between(0, column - 0.1, column + 0.1, None)
+    assert mean.numpy() == pytest.approx(table.at(0, column, torch.zeros(23)).numpy(), abs=0.01)
+    assert 0.45 < float(table.mean_between(0, torch.tensor([17.4]), torch.tensor([17.6]), None)) < 0.55
 
 
 def test_expected_light_moves_with_the_pattern_of_each_led(chart: Renderer) -> None:

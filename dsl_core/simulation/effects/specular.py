@@ -14,7 +14,8 @@ from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
 from dsl_core.simulation.finish import Finish
-from dsl_core.simulation.renderer import NM, Renderer
+from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.spectral_tables import NM
 from dsl_core.simulation.surface_light import surface_shading
 from dsl_core.simulation.truth import Materials, Parts
 
