@@ -38,10 +38,10 @@ def changed_settings(rows: tuple[SettingRow, ...], values: Mapping[str, str]) ->
 
 
 def as_text(value: Any) -> str:
-    """A value as the command line's ``--set`` takes it.
+    """A value as the command line's ``--set`` takes it, in six digits: a default that stays is not rounded.
 
-    >>> as_text((430.0, 440.0)), as_text(True), as_text(""), as_text(None)
-    ('430,440', 'true', '', '')
+    >>> as_text((430.0, 440.0)), as_text(500 / 3), as_text(True), as_text(""), as_text(None)
+    ('430,440', '166.667', 'true', '', '')
     """
     match value:
         case None:
@@ -49,7 +49,7 @@ def as_text(value: Any) -> str:
         case bool():
             return json.dumps(value)
         case float():
-            return f"{value:.12g}"
+            return f"{value:.6g}"
         case BaseModel():
             return value.model_dump_json()
         case tuple() if all(isinstance(each, int | float | str) for each in value):
