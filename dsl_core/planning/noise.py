@@ -61,16 +61,35 @@ def demosaic_factors(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]
 
     A sample measured there counts once; bilinear means of two or four samples have a half or a quarter.
     """
-    width = rig.camera.width_px
+    return _by_neighbours(rig, pixels, own=1.0, cross=0.25, beside=0.5, below=0.5, diagonal=0.25)
+
+
+def sideways_shares(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Share of each colour at pixels that bilinear means take from the columns beside, (pixels, 3)."""
+    return _by_neighbours(rig, pixels, own=0.0, cross=0.5, beside=1.0, below=0.0, diagonal=1.0)
+
+
+def _by_neighbours(
+    rig: Rig,
+    pixels: NDArray[np.int64],
+    *,
+    own: float,
+    cross: float,
+    beside: float,
+    below: float,
+    diagonal: float,
+) -> NDArray[np.float64]:
+    """A value for each colour at pixels by where its nearest samples lie, (pixels, 3)."""
     tile = bayer_channels(rig.sensor.bayer, 2, 2)
-    y, x = np.divmod(pixels, width)
-    factors = np.empty((len(pixels), 3))
+    y, x = np.divmod(pixels, rig.camera.width_px)
+    found = np.empty((len(pixels), 3))
     for colour in range(3):
         here = tile[y % 2, x % 2] == colour
-        beside = tile[y % 2, (x + 1) % 2] == colour
-        below = tile[(y + 1) % 2, x % 2] == colour
-        factors[:, colour] = np.select([here, beside & below, beside | below], [1.0, 0.25, 0.5], 0.25)
-    return factors
+        across = tile[y % 2, (x + 1) % 2] == colour
+        down = tile[(y + 1) % 2, x % 2] == colour
+        cases = [here, across & down, across, down]
+        found[:, colour] = np.select(cases, [own, cross, beside, below], diagonal)
+    return found
 
 
 def own_channel(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -147,13 +147,16 @@ class _Errors:
 
     @classmethod
     def of(cls, found: Floats, outcome: Outcome, nm: Floats) -> _Errors:
-        shape = found.shape
-        errors = spectral_errors(found.reshape(shape[0], -1), outcome.truth.reshape(shape[0], -1), nm)
+        truth = outcome.truth.reshape(len(found), -1)
+        errors = spectral_errors(found.reshape(len(found), -1), truth, nm)
+        # Every spectrum counts alike, as every patch does, however many samples show it.
+        _, group, count = np.unique(truth, axis=1, return_inverse=True, return_counts=True)
+        share = 1 / (count[group.ravel()] * len(count))
         return cls(
-            float(errors.rmse.mean()),
-            float(np.sqrt((errors.rmse**2).mean())),
-            float(errors.angle_rad.mean()),
-            float(errors.delta_e.mean()),
+            float((share * errors.rmse).sum()),
+            float(np.sqrt((share * errors.rmse**2).sum())),
+            float((share * errors.angle_rad).sum()),
+            float((share * errors.delta_e).sum()),
         )
 
 

@@ -44,6 +44,11 @@ def peaks(centres_nm: tuple[float, ...] = (475.0, 525.0, 575.0, 625.0)) -> Refer
     return References(tuple(f"{centre:g} nm" for centre in centres_nm), np.stack(rows))
 
 
+def filters() -> References:
+    """The nine filters of the twin's scene of that name, 450 to 650 nm every 25."""
+    return peaks(tuple(float(nm) for nm in range(450, 651, 25)))
+
+
 def unseen() -> References:
     """Twenty-four spectra that no design and no prior was made with: steps, bumps, wiggles, greys.
 

@@ -28,6 +28,7 @@ METHOD = 4
 PALETTES: dict[str, Callable[[], references.References]] = {
     "chart": references.chart,
     "peaks": references.peaks,
+    "filters": references.filters,
     "unseen": references.unseen,
 }
 

@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 from dsl_core import pipeline
 from dsl_core.capture.runner import Runner
 from dsl_core.capture.sink import MemorySink
-from dsl_core.evaluation.summary import Evaluation, Truth
+from dsl_core.evaluation.summary import Evaluation, Truth, interior
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.patterns.images import pattern_image
-from dsl_core.planning.references import References
+from dsl_core.planning.references import FINE_NM, References
+from dsl_core.planning.views import View, pixels_view
 from dsl_core.reconstruction.surface import default_window_px
 from dsl_core.simulation import materials
 from dsl_core.simulation.options import ENDLESS
@@ -110,6 +111,35 @@ def chart_scene(rig: Rig, palette: Palette, depth_mm: float) -> Scene:
     named = dict(zip(palette.names, palette.spectra, strict=True))
     colours = Materials.of({**named, "rim": materials.flat(0.5)}, ("rim",))
     return Scene("chart", "a small chart", (tilted(centre, 0.0, 0.0, ENDLESS, paint),), colours)
+
+
+def trial_view(rig: Rig, palette: Palette, depth_mm: float = 700.0) -> View:
+    """Pixels that trials take their figures from, with the spectra of their patches.
+
+    Half of the inside of each patch, from all of its columns. Coarse patterns leave a few columns of the
+    picture badly off, and a figure hangs on what these show.
+    """
+    pixels, spectra = [], []
+    for place in PLACES:
+        piece = window_rig(rig, place)
+        truth = chart_scene(piece, palette, depth_mm).render(piece.camera, piece.pose.projector_centre_mm)
+        left, top = round(rig.camera.cx_px - piece.camera.cx_px), round(rig.camera.cy_px - piece.camera.cy_px)
+        inside = interior(truth.material) & (truth.material < len(palette.names))
+        for material in np.unique(truth.material[inside]):
+            for y, x in _two_a_column(np.argwhere(inside & (truth.material == material))):
+                pixels.append((top + y) * rig.camera.width_px + left + x)
+                spectra.append(palette.spectra[material])
+    view = pixels_view(rig, np.array(pixels, np.int64), depth_mm)
+    return replace(view, spectra=np.array(spectra), wavelengths_nm=FINE_NM)
+
+
+def _two_a_column(found: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Two of some pixels (row, column) from each column, in rows that take turns."""
+    chosen = []
+    for i, x in enumerate(np.unique(found[:, 1])):
+        rows = found[found[:, 1] == x, 0]
+        chosen += [(int(row), int(x)) for row in rows[i % 2 :: 2]]
+    return chosen
 
 
 def run_trial(

@@ -2,8 +2,9 @@
 
 At each sample of a view the linear model of `reconstruction.spectral_system` gives what every frame of a plan
 would read for each reference spectrum; the bracket's noise, the black frames' noise and the error of the
-refined column are drawn once (always the same), and the reconstruction's own estimators answer. What
-is left out: edges, shadows, second orders, and whatever the linear model itself gets wrong.
+refined column are drawn once (always the same), and the reconstruction's own estimators answer with the
+equations of the column they believe in: beside the edge of a line the zero order, many times the first, is
+then far from what they expect. What is left out: edges, shadows, and whatever the linear model gets wrong.
 """
 
 from __future__ import annotations
@@ -16,11 +17,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Footprint, correspondence, like, zero_order
 from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath
-from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel
+from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel, sideways_shares
 from dsl_core.planning.views import View
 from dsl_core.reconstruction.column import Column, refine
 from dsl_core.reconstruction.dense_solver import solve_dense
@@ -82,6 +83,7 @@ class VirtualPixels:
     ) -> None:
         self.rig, self.plan, self.grid, self.view = rig, plan, grid, view
         self.prior, self.seed = prior or Prior(), seed
+        self.shading = torch.as_tensor(view.shading, dtype=torch.float32)
         self.window_px = surface_window_px or default_window_px(rig)
         self.bands, self.bracket, self.lines = Bands.of(rig, grid), Bracket.of(rig, plan), LineSet.of(plan)
         self.single = self.lines is not None and self.lines.lines == self.lines.frames
@@ -91,6 +93,13 @@ class VirtualPixels:
         self.column, _ = zero_order(rig, self.pixels, self.depth)
         _, self.slope_mm = triangulate(rig, self.pixels, self.column)
         self.model = correspondence(rig)
+        self.pitch_px = self._pitch_px()
+        grey = bool((self.profiles == self.profiles[..., :1]).all())
+        light = self.profiles[..., :1] if grey else self.profiles
+        one = torch.zeros(1)
+        #: Zero order as one sample of the mosaic sees it, and as the reconstruction models it.
+        self.direct = BlurredProfiles(rig.projector_response, light, 0.0, one)
+        self.modelled = BlurredProfiles(self._blurred_response(), light, 0.0, one)
         self.inside: dict[int, Tensor] = {}
         self.matrices = self._matrices()
 
@@ -99,20 +108,25 @@ class VirtualPixels:
         ahead, _ = zero_order(self.rig, self.pixels, beyond)
         here = self._first(self.bands, self.depth, keep=True)
         step = (ahead - self.column)[:, None, None, None].to(here)
-        return Matrices(here, self._zero(self.bands), (self._first(self.bands, beyond) - here) / step)
+        zero = self.zero_at(self.column.float())
+        return Matrices(here, zero, (self._first(self.bands, beyond) - here) / step)
 
-    def _blurred_response(self) -> Tensor:
-        """Spread of columns that demosaicing averages, as a variance, px^2."""
+    def _pitch_px(self) -> Tensor:
+        """Columns of the projector from a pixel to the next, (samples,)."""
         neighbour, _ = zero_order(self.rig, (self.pixels + 1).clip(max=self._count - 1), self.depth)
-        return DEMOSAIC_SPREAD * (neighbour - self.column).abs().median() ** 2
+        return neighbour - self.column
+
+    def _blurred_response(self) -> ProjectorResponse:
+        """The projector blurred as the reconstruction has it, by the columns that demosaicing averages."""
+        spread = DEMOSAIC_SPREAD**0.5 * float(self.pitch_px.abs().median())
+        response = self.rig.projector_response
+        return response.model_copy(update={"blur_px": float(np.hypot(response.blur_px, spread))})
 
     @property
     def _count(self) -> int:
         return self.rig.camera.width_px * self.rig.camera.height_px
 
     def _first(self, bands: Bands, depth: Tensor, keep: bool = False) -> Tensor:
-        blur = float(np.hypot(self.rig.projector_response.blur_px, float(self._blurred_response()) ** 0.5))
-        response = self.rig.projector_response.model_copy(update={"blur_px": blur})
         width, height = self.plan.projector_size_px
         paths = []
         for order in bands.orders if not self.single else ORDERS:
@@ -123,25 +137,37 @@ class VirtualPixels:
                 self.inside[order] = footprint.inside(width, height)[bands.reported]
             half = band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
             paths.append(OrderPath(footprint.columns, inside, bands.moments[order], half))
+        response = self._blurred_response()
         return ImageFormation(response, self.profiles, paths, torch.ones(len(self.pixels))).matrix()
 
-    def _zero(self, bands: Bands) -> Tensor:
-        column = self.column.float()
-        light = BlurredProfiles(self.rig.projector_response, self.profiles, 0.0, column).at(column)
-        return torch.einsum("slf,clj->scfj", light, like(bands.moments[0], column))
+    def zero_moments(self, bands: Bands) -> Tensor:
+        """Response to the zero order, (3, LEDs, bands); grey patterns light all LEDs as one."""
+        moments = like(bands.moments[0], self.shading)
+        return moments if self.direct.table.shape[1] == 3 else moments.sum(1, keepdim=True)
+
+    def zero_at(self, columns_px: Tensor) -> Tensor:
+        """The reconstruction's zero-order operator of unit shading at columns, (n, 3, frames, bands)."""
+        return torch.einsum("nlf,clj->ncfj", self.modelled.at(columns_px), self.zero_moments(self.bands))
+
+    def _zero_signal(self, bands: Bands, spectra: Tensor) -> Tensor:
+        """Zero order as demosaicing gives it, each colour from its own neighbours, of unit shading."""
+        column, pitch = self.column.float(), self.pitch_px.float()
+        beside = 0.5 * (self.direct.at(column - pitch) + self.direct.at(column + pitch))
+        share = torch.as_tensor(sideways_shares(self.rig, self.view.pixels), dtype=torch.float32)
+        here = self.direct.at(column)
+        light = here[:, None] + share[..., None, None] * (beside - here)[:, None]
+        colour = torch.einsum("clj,srj->srcl", self.zero_moments(bands), spectra)
+        return torch.einsum("sclf,srcl->srcf", light, colour)
 
     def signals(self, spectra: Tensor, bands: Bands | None = None) -> tuple[Tensor, Tensor]:
         """First-order and zero-order radiance, each (samples, spectra, 3, frames), DN per ms.
 
         ``spectra`` (samples, spectra, bands) are node values of ``bands``, by default the internal ones.
         """
-        shading = torch.as_tensor(self.view.shading, dtype=torch.float32)[:, None, None, None]
-        if bands is None:
-            operators = (self.matrices.first, self.matrices.zero)
-        else:
-            operators = (self._first(bands, self.depth), self._zero(bands))
-        first, zero = (torch.einsum("scfj,srj->srcf", m, spectra) * shading for m in operators)
-        return first, zero
+        shading = self.shading[:, None, None, None]
+        operator = self.matrices.first if bands is None else self._first(bands, self.depth)
+        first = torch.einsum("scfj,srj->srcf", operator, spectra)
+        return first * shading, self._zero_signal(bands or self.bands, spectra) * shading
 
     def run(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Outcome:
         """Reconstruct virtual pixels of truth ``spectra`` (samples, spectra, bands inside) from signals."""
@@ -158,7 +184,7 @@ class _Run:
         rig, view = owner.rig, owner.view
         factors = torch.as_tensor(demosaic_factors(rig, view.pixels), dtype=torch.float32)
         self.factors = factors[:, None, :, None]
-        self.shading = torch.as_tensor(view.shading, dtype=torch.float32)[:, None]
+        self.shading = owner.shading[:, None]
         clean = first + zero
         spread = owner.bracket.variance(clean) * self.factors
         self.saturated = ~torch.isfinite(spread)
@@ -186,8 +212,8 @@ class _Run:
         offsets = torch.linspace(-OFFSET_PX, OFFSET_PX, count) if count > 1 else torch.zeros(1)
         true = (owner.column.float()[:, None] + offsets).reshape(-1)
         response = owner.rig.projector_response
-        light = BlurredProfiles(response, owner.profiles, 0.0, true).at(true)
-        moments = like(owner.bands.moments[0], true)[own]
+        light = owner.direct.at(true)
+        moments = owner.zero_moments(owner.bands)[own]
         leds = torch.einsum("slj,srj->srl", moments, self.nodes) * self.shading[..., None]
         zero = torch.einsum("nlf,nl->nf", light, leds.flatten(0, 1)).reshape(samples, count, frames)
         index = own[:, None, None, None].expand(-1, count, 1, frames)
@@ -207,23 +233,17 @@ class _Run:
         owner = self.owner
         column, error_px = self._columns()
         depth_error = error_px.double() * owner.slope_mm[:, None]
-        # The estimate traces all light from the column it believes in.
-        reflectance = self.nodes
-        moved = (
-            torch.einsum("scfj,srj->srcf", owner.matrices.change, reflectance) * self.shading[..., None, None]
-        )
-        miss = moved * error_px[:, :, None, None]
         # What the reconstruction grants its linear model as error is drawn as well.
-        base = self.noisy - miss + MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
+        base = self.noisy + MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
         clean = self.first + self.zero
         if owner.single:
             # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
             base, clean = base - self.zero - self._black_again(), clean - self.zero
-        weight = self._weights()
         amplitude = column.amplitude_std.reshape(error_px.shape)
-        found, calm = self._solve(weight, base, clean, amplitude)
+        found, calm = self._solve(self._weights(error_px), base, clean, error_px, amplitude)
         scale = 1 / (1 + self._shading_error(column, depth_error))
-        lit = self._lit()
+        true = column.column_px.reshape(error_px.shape) - error_px
+        lit = self._lit(true, column.refined.reshape(error_px.shape))
         shape = (-1, *error_px.shape)
 
         def of(values: Tensor) -> NDArray[np.float64]:
@@ -245,17 +265,14 @@ class _Run:
         finally:
             self.random = saved
 
-    def _weights(self) -> Tensor:
+    def _weights(self, error_px: Tensor) -> Tensor:
         """The reconstruction's weights, (samples, spectra, 3, frames)."""
+        owner = self.owner
         spread = self.variance * self.factors + (MODEL_ERROR * self.noisy) ** 2
-        if not self.owner.single:
-            near = [
-                BlurredProfiles(self.owner.rig.projector_response, self.owner.profiles, 0.0, self.first)
-                .at(self.owner.column.float() + shift)
-                .amax(1)
-                for shift in (-1.0, 0.0, 1.0)
-            ]
-            lit = torch.stack(near).amax(0)[:, None, None, :]
+        if not owner.single:
+            found = (owner.column.float()[:, None] + error_px).flatten()
+            near = [owner.modelled.at(found + shift).amax(1) for shift in (-1.0, 0.0, 1.0)]
+            lit = torch.stack(near).amax(0).reshape(*error_px.shape, 1, -1)
             spread = spread + (DIRECT_ERROR * self._colour()[..., None] * lit) ** 2
         return torch.where(self.saturated, 0.0, 1 / spread)
 
@@ -265,21 +282,32 @@ class _Run:
         reflectance = self.nodes
         return torch.einsum("cj,srj->src", moments, reflectance) * self.shading[..., None]
 
-    def _solve(self, weight: Tensor, noisy: Tensor, clean: Tensor, spread: Tensor) -> tuple[Spectra, Spectra]:
-        """Spectra of all virtual pixels with and without noise in the data."""
+    def _solve(
+        self, weight: Tensor, noisy: Tensor, clean: Tensor, error_px: Tensor, spread: Tensor
+    ) -> tuple[Spectra, Spectra]:
+        """Spectra of all virtual pixels with noise, and without noise and error of the column."""
         owner = self.owner
-        whole = owner.matrices.first if owner.single else owner.matrices.first + owner.matrices.zero
         matrices: list[Tensor] = []
         rights: list[Tensor] = []
         calm: list[Tensor] = []
-        for s, operator in enumerate(whole.flatten(1, 2)):
-            strength = operator.abs().amax(1)
+        for s, first in enumerate(owner.matrices.first):
+            # The estimate traces all light from the column it believes in; next to the edge of a line of a
+            # comb that moves the zero order by many times the first.
+            true = first if owner.single else first + owner.matrices.zero[s]
+            moved = owner.matrices.change[s] * error_px[s, :, None, None, None]
+            if not owner.single:
+                found = owner.column[s].float() + error_px[s]
+                moved = moved + owner.zero_at(found) - owner.matrices.zero[s]
+            strength = true.flatten(0, 1).abs().amax(1)
             used = strength > DARK * strength.max()
-            a, w = operator[used] * self.shading[s], weight[s].flatten(1)[:, used]
-            rows = a[None] * w[..., None]
-            matrices.append(rows.mT @ a)
-            for out, data in ((rights, noisy), (calm, clean)):
-                out.append((rows.mT @ data[s].flatten(1)[:, used, None])[..., 0])
+            change = moved.flatten(1, 2)[:, used] * self.shading[s]
+            operator = true.flatten(0, 1)[used] * self.shading[s] + change
+            rows = operator * weight[s].flatten(1)[:, used, None]
+            matrices.append(rows.mT @ operator)
+            shift = (change @ self.nodes[s, :, :, None])[..., 0]
+            for out, data in ((rights, noisy[s]), (calm, clean[s])):
+                y = data.flatten(1)[:, used] + (0 if out is rights else shift)
+                out.append((rows.mT @ y[..., None])[..., 0])
         matrix, right, quiet = (torch.cat(parts) for parts in (matrices, rights, calm))
         if owner.single:
             matrix, right, quiet = self._with_colour(matrix, right, quiet, spread)
@@ -317,13 +345,28 @@ class _Run:
         tilted: Tensor = self._normal(depth_error.shape) * spread[:, None]
         return tilted + 2 * depth_error / self.owner.depth[:, None]
 
-    def _lit(self) -> Tensor:
-        """Whether white stands clear of the noise, (samples, spectra)."""
+    def _lit(self, column_px: Tensor, refined: Tensor) -> Tensor:
+        """Whether a virtual pixel gets a depth, (samples, spectra).
+
+        White stands clear of the noise; and where the edge of a stripe lies so near that both a pattern of
+        the code and its inverse saturate every setting, the refinement must find the column.
+        """
         from dsl_core.reconstruction.geometry import LIT_SIGMAS
 
-        own = torch.as_tensor(own_channel(self.owner.rig, self.owner.view.pixels))
-        colour = self._colour()
-        white = colour.gather(2, own[:, None, None].expand(*colour.shape[:2], 1))[..., 0]
-        noise = self.owner.bracket.variance(white).sqrt()
-        lit: Tensor = (white > LIT_SIGMAS * noise) | ~torch.isfinite(noise)
+        owner = self.owner
+        own = torch.as_tensor(own_channel(owner.rig, owner.view.pixels))
+        direct, first = (
+            torch.einsum("sj,srj->sr", self._white_moments(orders)[own], self.nodes) * self.shading
+            for orders in ((0,), ORDERS)
+        )
+        noise = owner.bracket.variance(direct).sqrt()
+        to_edge = 0.5 - (column_px - column_px.round()).abs()
+        darker = torch.special.ndtr(-to_edge / owner.rig.projector_response.blur_px)
+        unsure = ~torch.isfinite(owner.bracket.variance(direct * darker + first / 2))
+        lit: Tensor = ((direct > LIT_SIGMAS * noise) | ~torch.isfinite(noise)) & (refined | ~unsure)
         return lit
+
+    def _white_moments(self, orders: tuple[int, ...]) -> Tensor:
+        """Response to white through some orders, (3, bands)."""
+        moments = sum(self.owner.bands.moments[order].sum(1) for order in orders)
+        return like(np.asarray(moments), self.nodes)

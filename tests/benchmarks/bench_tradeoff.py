@@ -2,7 +2,7 @@
 
 Run ``python -m tests.benchmarks.bench_tradeoff FOLDER [--quick] [--json FILE]`` from the repository's root.
 Points are kept in the folder, one file each: a run that was stopped goes on. Measured are the spectra of a
-Color Checker in three pieces of the picture; predicted are the same figures for samples in these pieces.
+Color Checker in two pieces of the picture; predicted are the same figures for pixels in these pieces.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting
-from dsl_core.model.rig import Rig
+from dsl_core.planning import references
 from dsl_core.planning.prediction import Prediction, predict
 from dsl_core.planning.sweep import Case, Point, run_sweep, write_csv
-from dsl_core.planning.trial import PIECE_PX, PLACES, RIM_PX, window_rig
-from dsl_core.planning.views import View, pixels_view
+from dsl_core.planning.trial import trial_view
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json
@@ -55,20 +54,6 @@ def cases(quick: bool) -> list[Case]:
     return found[:4] if quick else found
 
 
-def pieces_view(rig: Rig) -> View:
-    """Samples in the pieces that trials look at, in all phases of the mosaic."""
-    width, height = PIECE_PX
-    pixels = []
-    for place in PLACES:
-        lens = window_rig(rig, place).camera
-        left, top = round(rig.camera.cx_px - lens.cx_px), round(rig.camera.cy_px - lens.cy_px)
-        for i, (x, y) in enumerate(
-            product(np.linspace(RIM_PX, width - RIM_PX - 2, 4).astype(int), (8, height - 9))
-        ):
-            pixels.append((top + y + i // 2 % 2) * rig.camera.width_px + left + x + i % 2)
-    return pixels_view(rig, np.array(pixels, np.int64))
-
-
 def main() -> None:
     """Measure, predict, compare."""
     parser = options(__doc__)
@@ -76,7 +61,7 @@ def main() -> None:
     chosen = parser.parse_args()
     rig, todo = published_rig(), cases(chosen.quick)
     points = run_sweep(rig, todo, chosen.folder, LATENCY_MS, _Lines())
-    view = pieces_view(rig)
+    view = trial_view(rig, references.chart())
     predictions, seconds = [], []
     for case in todo:
         start = time.perf_counter()

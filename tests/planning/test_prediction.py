@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, NoCode, NoSpectral, ScanLines, Setting
 from dsl_core.planning import references
 from dsl_core.planning.prediction import Prediction, predict
-from dsl_core.planning.trial import PIECE_PX, PLACES, run_trial, window_rig
-from dsl_core.planning.views import pixels_view, plane_view
+from dsl_core.planning.trial import run_trial, trial_view
+from dsl_core.planning.views import plane_view
 from dsl_core.simulation.published_rig import published_rig
 
 BRIGHT = (Setting(exposure_ms=1000 / 6, level=0.2), Setting(exposure_ms=1000 / 3, level=0.8))
@@ -54,14 +53,11 @@ def test_a_plan_without_patterns_or_code_is_refused() -> None:
             predict(rig, CapturePlan().model_copy(update=update))
 
 
-@pytest.mark.parametrize("spectral", [ScanLines(step_px=4), LineComb(width_px=5, step_px=4, period_px=128)])
+@pytest.mark.parametrize("spectral", [ScanLines(step_px=4), LineComb(width_px=5, step_px=4, period_px=104)])
 def test_the_twin_agrees(spectral: ScanLines | LineComb) -> None:
-    rig, place = published_rig(), PLACES[0]
-    lens = window_rig(rig, place).camera
-    left, top = round(rig.camera.cx_px - lens.cx_px), round(rig.camera.cy_px - lens.cy_px)
-    x, y = np.meshgrid(left + np.arange(5, PIECE_PX[0] - 5, 7), top + np.arange(5, PIECE_PX[1] - 5, 13))
-    view = pixels_view(rig, (y * rig.camera.width_px + x).ravel())
-    found = predict(rig, plan(spectral), view, peaks=False)
-    measured = run_trial(rig, plan(spectral), references.chart(), places=(place,))
-    assert found.pixel_rmse == pytest.approx(measured.pixel_rmse, rel=0.25)
-    assert found.depth_std_mm == pytest.approx(measured.depth_rmse_mm, rel=0.6)
+    """The comb leaves columns unrefined, which puts the zero order where the model does not expect it."""
+    rig, chart = published_rig(), references.chart()
+    found = predict(rig, plan(spectral), trial_view(rig, chart), peaks=False)
+    measured = run_trial(rig, plan(spectral), chart)
+    assert found.pixel_rmse == pytest.approx(measured.pixel_rmse, rel=0.2)
+    assert found.depth_std_mm == pytest.approx(measured.depth_rmse_mm, rel=0.4)
