@@ -19,7 +19,7 @@ class PatternTable:
     """Samples ``OVERSAMPLE`` a pixel; rows are kept only when the pattern has any structure along them."""
 
     blurred: Tensor  # (LEDs, rows, samples), zero order: blur and halo
-    running: Tensor  # (LEDs, rows, samples + 1): integral of the pattern along columns, px
+    running: Tensor  # (LEDs, rows, samples + 1), first orders: integral of the blur along columns, px
     oversample: tuple[int, int]
 
     @classmethod
@@ -38,7 +38,8 @@ class PatternTable:
             down = _spread(radiance.shape[0], ky, response, False).to(device)
             blurred = down @ blurred
             source = source.repeat_interleave(ky, 1)
-        running = torch.nn.functional.pad(source.cumsum(2), (1, 0))
+        sharp = _spread(radiance.shape[1], kx, response, False).to(device)
+        running = torch.nn.functional.pad((source @ sharp.T / kx).cumsum(2), (1, 0))
         return cls(blurred.contiguous(), running.contiguous(), (kx, ky))
 
     @property
@@ -66,7 +67,8 @@ class PatternTable:
         """Mean of the pattern between two columns (px), zero outside the frame."""
         running = self.running[led]
         offset = self._offset(row, running)
-        above, below = (_lookup(running, column + 0.5, offset) for column in (stop, start))
+        across = self.oversample[0]
+        above, below = (_lookup(running, (column + 0.5) * across, offset) for column in (stop, start))
         return (above - below) / (stop - start)
 
     def _offset(self, row: Tensor | None, table: Tensor) -> Tensor | None:
