@@ -20,6 +20,7 @@ from dsl_core.model.bandpass import BandpassCalibration, FilterSample, OrderSamp
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, passed
+from dsl_core.progress import Progress
 
 Floats = NDArray[np.float64]
 
@@ -47,10 +48,12 @@ def profile_scan(scan: LineScan) -> LineScan:
     return scan.at(np.arange(0, len(scan.pixels), max(len(scan.pixels) // PROFILE_PIXELS, 1)))
 
 
-def plane_profile(rig: Rig, scan: LineScan) -> ZeroOrderFit:
+def plane_profile(rig: Rig, scan: LineScan, progress: Progress | None = None) -> ZeroOrderFit:
     """Blur and halo from the scan without filter; raises `CalibrationError`."""
     some = profile_scan(scan)
-    return fit_zero_order(some.lines, some.column_px, some.radiance, some.std, rig.projector_response)
+    return fit_zero_order(
+        some.lines, some.column_px, some.radiance, some.std, rig.projector_response, progress
+    )
 
 
 def plane_pixels(rig: Rig, scan: LineScan, filter_nm: float) -> PlanePixels:

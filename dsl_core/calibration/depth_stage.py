@@ -83,12 +83,13 @@ def calibrate_depth_stage(
     planes = refine_planes(rig, data.positions_mm, data.columns, covariance, data.stage_std_mm)
     film, samples = fit_first_orders(planes.rig, planes.planes, data, progress)
     fitted = planes.rig.model_copy(update={"film": film.film})
-    film = with_geometry(film, fitted, samples, planes.variants())
+    film = with_geometry(film, fitted, samples, planes.variants(), progress)
     residual, held_out = choose_residual(
         fitted,
         samples,
         [f"position {z:g} mm" for z in data.positions_mm],
         [f"filter {each.filter_nm:g} nm" for each in data.filters],
+        progress,
     )
     seen = _filters(fitted, data, samples)
     return DepthStageCalibration(

@@ -19,6 +19,7 @@ from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
+from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -162,7 +163,11 @@ def _common_offsets(rig: Rig, samples: OrderSamples) -> Floats:
 
 
 def with_geometry(
-    fit: FilmFit, rig: Rig, samples: OrderSamples, variants: Iterable[tuple[Rig, tuple[Plane, ...]]]
+    fit: FilmFit,
+    rig: Rig,
+    samples: OrderSamples,
+    variants: Iterable[tuple[Rig, tuple[Plane, ...]]],
+    progress: Progress | None = None,
 ) -> FilmFit:
     """The fit with a covariance that holds what the geometry leaves open.
 
@@ -171,12 +176,15 @@ def with_geometry(
     """
     here = grating_columns(_with(rig, _values(fit.film)), samples)
     covariance = fit.covariance.copy()
+    progress = progress or NoProgress()
     for other, planes in variants:
+        progress.report("what the geometry leaves open", 0, 1)
         rays = pixel_rays(other.camera).reshape(3, -1)[:, samples.pixel]
         inverse = np.stack([plane.inverse for plane in planes])[samples.position]
         there = replace(samples, depth_mm=1 / (inverse.T * rays).sum(0))
         moved = fit.gain @ (here - grating_columns(_with(other, _values(fit.film)), there))
         covariance += np.outer(moved, moved)
+    progress.report("what the geometry leaves open", 1, 1)
     return replace(fit, covariance=covariance)
 
 

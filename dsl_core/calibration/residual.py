@@ -20,6 +20,7 @@ from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.depth_stage import HeldOutError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.column_residual import chebyshev, residual_columns, scaled
+from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -34,17 +35,23 @@ WAVELENGTH_RANGE_NM = (430.0, 660.0)
 
 
 def choose_residual(
-    rig: Rig, samples: OrderSamples, positions: Sequence[str], filters: Sequence[str]
+    rig: Rig,
+    samples: OrderSamples,
+    positions: Sequence[str],
+    filters: Sequence[str],
+    progress: Progress | None = None,
 ) -> tuple[ColumnResidual, tuple[HeldOutError, ...]]:
     """The correction for the film of ``rig``, and the errors on what was left out.
 
     Film and correction are fitted again without each position, each filter, and a third of the samples;
     ``positions`` and ``filters`` are their names.
     """
+    progress = progress or NoProgress()
     folds = list(_folds(samples, positions, filters))
     errors = np.empty((MAX_DEGREE + 1, len(folds)))
     noise = np.empty(len(folds))
     for i, (_, out) in enumerate(folds):
+        progress.report("hold captures out", i, len(folds))
         film = fit_film(rig, samples.only(~out), rig.film, rounds=3).film
         again = rig.model_copy(update={"film": film})
         inside, outside = samples.only(~out), samples.only(out)

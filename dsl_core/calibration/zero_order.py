@@ -19,6 +19,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]
 
@@ -68,6 +69,7 @@ def fit_zero_order(
     radiance: NDArray[np.floating],
     std: NDArray[np.floating],
     start: ProjectorResponse,
+    progress: Progress | None = None,
 ) -> ZeroOrderFit:
     """Fit blur and halo with the columns of some pixels.
 
@@ -78,7 +80,9 @@ def fit_zero_order(
     common = np.array([start.blur_px, start.halo_peak_per_px, np.log(start.halo_decay_px or DECAY_PX)])
     column, amplitude, offset = coarse_px.copy(), data.y.max(0), np.zeros(len(coarse_px))
     use = np.ones(len(coarse_px), bool)
+    progress = progress or NoProgress()
     for round_ in range(ITERATIONS):
+        progress.report("blur and halo", round_, ITERATIONS)
         variance = data.variance + np.where(
             np.abs(column - data.centres) < NEAR_PX, (MODEL_ERROR * amplitude) ** 2, 0.0
         )

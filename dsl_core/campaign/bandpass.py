@@ -195,7 +195,7 @@ class BandpassRecipe:
         source = scan_of(bench.step_folder(step))
         with naming(step):
             scan = diffuser_lines(source, bench.rig, progress, self.pixels)
-            return scan, plane_profile(bench.rig, scan)
+            return scan, plane_profile(bench.rig, scan, progress)
 
     def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
         from dsl_core.reconstruction.merge import MergedScan, check_source
