@@ -103,7 +103,7 @@ def run_sweep(
     points = []
     for done, case in enumerate(cases):
         path = folder / f"{key_of(rig, case, latency_ms)}.json"
-        point = _stored(path)
+        point = _read(path)
         if point is None:
             point = measure(rig, case, latency_ms)
             folder.mkdir(parents=True, exist_ok=True)
@@ -120,8 +120,12 @@ def key_of(rig: Rig, case: Case, latency_ms: float) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]
 
 
-def _stored(path: Path) -> Point | None:
-    """A point measured before; None where there is none or it cannot be read."""
+def stored(rig: Rig, case: Case, folder: Path, latency_ms: float) -> Point | None:
+    """The point of a case that was measured before, if it can be read."""
+    return _read(folder / f"{key_of(rig, case, latency_ms)}.json")
+
+
+def _read(path: Path) -> Point | None:
     try:
         return Point.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):
