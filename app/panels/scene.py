@@ -148,6 +148,11 @@ class GlScene:
         self._plotter.update()
         self._moved()
 
+    @property
+    def shown(self) -> int:
+        """How many points are drawn at rest."""
+        return self._cloud.shown
+
     def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
         """Show points with their colours, as many as this machine draws in time."""
         if not self._is_ready:
@@ -159,6 +164,8 @@ class GlScene:
         self._rest()
 
     def _make_ready(self) -> None:
+        if self._is_ready:
+            return
         self._is_ready = True
         self._plotter.add_axes(interactive=False, color="#808080")
         if self._waiting is not None:
@@ -175,7 +182,8 @@ class GlScene:
             return
         seconds, self._begun = time.perf_counter() - self._begun, None
         if not self._is_ready:
-            self._make_ready()
+            QTimer.singleShot(GROW_MS, self.widget, self._make_ready)
+            return
         if self._wanted == 0:
             return
         self._wanted -= 1

@@ -21,6 +21,8 @@ from dsl_core.evaluation.regions import inside_outline
 
 #: Points among which the one under the moving mouse is looked for; a click looks at all.
 HOVER_POINTS = 60_000
+#: Between two steps in which a scene is made, ms.
+STEP_MS = 20
 
 
 class ScenePanel(QWidget):
@@ -81,19 +83,25 @@ class ScenePanel(QWidget):
         self._new_result()
 
     def _make(self, _: None) -> None:
-        # Step by step, between which the event loop comes round: graphics are slow to begin.
+        # Step by step, between which the window comes round: graphics are slow to begin.
         gl_works()
-        QTimer.singleShot(0, self, lambda: self._insert(make_scene(self._view_moved, self._mouse)))
+        QTimer.singleShot(STEP_MS, self, lambda: self._insert(make_scene(self._view_moved, self._mouse)))
 
     def _insert(self, scene: Scene) -> None:
         def insert() -> None:
+            # First the window changes to graphics; only then is there a first picture.
+            scene.widget.setUpdatesEnabled(False)
             self._box.insertWidget(0, scene.widget, 1)
+            QTimer.singleShot(STEP_MS, self, show)
+
+        def show() -> None:
+            scene.widget.setUpdatesEnabled(True)
             scene.set_background(self._theme.base)
             self.scene = scene
             # The widget gets its size, and with it the view, when the event loop comes round.
-            QTimer.singleShot(0, self, self._new_result)
+            QTimer.singleShot(STEP_MS, self, self._new_result)
 
-        QTimer.singleShot(0, self, insert)
+        QTimer.singleShot(STEP_MS, self, insert)
 
     def _new_result(self) -> None:
         result = self._state.result.value
