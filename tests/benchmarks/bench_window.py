@@ -97,8 +97,9 @@ def _print_stalls(name: str, stalls: Mapping[str, Stalls], seconds: Mapping[str,
 
     rows = []
     for job, each in stalls.items():
-        p99, worst = np.percentile(each.quiet, 99), max(each.quiet)
-        verdict = "" if p99 <= P99_MS and worst <= WORST_MS else "over"
+        # Of fewer than a hundred gaps the 99th percentile is the largest.
+        p99 = np.percentile(each.quiet, 99) if len(each.quiet) >= 100 else 0.0
+        verdict = "" if p99 <= P99_MS and max(each.quiet) <= WORST_MS else "over"
         row = [f"{seconds[job]:.1f}", *figures(each.clock), *figures(each.quiet), f"{max(each.own):.0f}"]
         rows.append([job, *row, verdict])
     head = [

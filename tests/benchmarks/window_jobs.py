@@ -28,6 +28,8 @@ SCAN_RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "222x145")))
 #: The camera at its full size.
 LIVE_RIG = RigChoice("twin", (("scene", "color-checker"),))
 LIVE_S = 8.0
+#: How long a cloud grows, a step after the other.
+GROW_S = 2.0
 #: How long any job may take on a machine that others keep busy, s.
 PATIENCE_S = 1800.0
 
@@ -48,6 +50,10 @@ class WindowJobs:
 
     def _wait(self, holds: Callable[[], object]) -> None:
         self.stage.wait(holds, PATIENCE_S)
+
+    def _live_for(self, seconds: float) -> None:
+        limit = time.monotonic() + seconds
+        self._wait(lambda: time.monotonic() > limit)
 
     @contextmanager
     def _job(self, name: str) -> Iterator[None]:
@@ -101,8 +107,7 @@ class WindowJobs:
         rig = self.stage.composition.rig(self.stage.window)
         with self._job("live view full size"):
             rig.start_live()
-            limit = time.monotonic() + LIVE_S
-            self._wait(lambda: time.monotonic() > limit)
+            self._live_for(LIVE_S)
         self._cancel("live view", rig.stop_live, lambda: not rig.state.live.value)
         self.stage.idle()
 
@@ -181,8 +186,7 @@ class WindowJobs:
             self._wait(lambda: state.doing.value is Doing.IDLE)
         assert not state.trouble.value, state.trouble.value
         control.fit()
-        limit = time.monotonic() + 0.5
-        self._wait(lambda: time.monotonic() > limit)
+        self._live_for(0.5)
         if state.doing.value is Doing.FITTING:
             self._cancel(f"{name}: fit", control.stop, lambda: state.doing.value is Doing.IDLE)
         wizard.reject()
@@ -207,14 +211,18 @@ class WindowJobs:
             self.stage.window.do("view_cloud")
             self.stage.idle()
             self._wait(lambda: page.scene.scene is not None)
+            self._live_for(GROW_S)
         with self._job("relight"):
             page._commands.relight("A", False)
             self.stage.idle()
+            self._live_for(GROW_S)
         with self._job("look for a spectrum"):
             page._commands.point_at((400, 300))
             page._commands.search(page.search.what.itemData(0))
             self.stage.idle()
+            self._live_for(GROW_S)
         page._commands.end_search()
+        self.stage.window.do("view_colour")
 
     def _export(self) -> None:
         page = self.stage.window.open_page("results")
