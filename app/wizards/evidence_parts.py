@@ -42,9 +42,18 @@ class ChartBox(QWidget):
     Plots are slow to make: this one is made and drawn when it is first seen.
     """
 
-    def __init__(self, title: str, tip: str, left: str, bottom: str, left_width: int = 52) -> None:
+    def __init__(
+        self,
+        title: str,
+        tip: str,
+        left: str,
+        bottom: str,
+        left_width: int = 52,
+        prepare: Callable[[Any], object] = lambda plot: None,
+    ) -> None:
+        """``prepare`` gets the plot when it is made."""
         super().__init__()
-        self._theme = DARK
+        self._theme, self._prepare = DARK, prepare
         self._make = partial(calm_plot, title, tip, left, bottom, left_width)
         self._plot: Any = None
         self._draw: Callable[[], object] | None = None
@@ -78,6 +87,7 @@ class ChartBox(QWidget):
             self._plot.setMinimumHeight(90)
             theme_plots((self._plot,), self._theme)
             self._stack.addWidget(self._plot)
+            self._prepare(self._plot)
         self._draw_now()
         return self._plot
 
@@ -133,6 +143,12 @@ class ChartBox(QWidget):
         self._theme = theme
         if self._plot is not None:
             theme_plots((self._plot,), theme)
+
+
+def like_a_picture(plot: Any) -> None:
+    """Square pixels, and rows that count downwards."""
+    plot.getViewBox().setAspectLocked(True)
+    plot.getViewBox().invertY(True)
 
 
 def _legend(name: str, colour: str, sign: str) -> str:

@@ -22,7 +22,7 @@ from app.theme import Theme
 from app.widgets.forms import label, set_role
 from app.wizards.curves import level_line
 from app.wizards.evidence import Evidence
-from app.wizards.evidence_parts import BAR, DOT, Cell, ChartBox, NumberTable
+from app.wizards.evidence_parts import BAR, DOT, Cell, ChartBox, NumberTable, like_a_picture
 from dsl_core.model.geometry_calibration import GeometryCalibration, PoseQuality
 
 if TYPE_CHECKING:
@@ -60,9 +60,8 @@ class GeometryEvidence(Evidence):
             "Each dot is a corner of the board; shaded cells hold one. The selected pose is marked.",
             "Row (px)",
             "Column (px)",
+            prepare=like_a_picture,
         )
-        self.coverage.plot.getViewBox().setAspectLocked(True)
-        self.coverage.plot.getViewBox().invertY(True)
         self.errors = ChartBox(
             "Error of each pose",
             f"Rms distance of corners from where the calibration expects them; below {LIMIT_PX} px is good.",

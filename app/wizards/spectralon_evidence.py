@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -14,7 +14,7 @@ from app.widgets.forms import label
 from app.widgets.plots import RGB_COLOURS
 from app.wizards.curves import Named, draw_curves
 from app.wizards.evidence import Evidence
-from app.wizards.evidence_parts import Cell, ChartBox, NumberTable, with_spread
+from app.wizards.evidence_parts import Cell, ChartBox, NumberTable, like_a_picture, with_spread
 from dsl_core.model.spectralon import SpectralonCalibration
 
 if TYPE_CHECKING:
@@ -53,16 +53,20 @@ class SpectralonEvidence(Evidence):
             "Relative gain of the camera over its image, without the light's own fall-off; one is the mean.",
             "Row (px)",
             "Column (px)",
+            prepare=self._prepare_field,
         )
-        self.field.plot.getViewBox().setAspectLocked(True)
-        self.field.plot.getViewBox().invertY(True)
         self.image = pg.ImageItem(axisOrder="row-major")
-        self.bar = pg.ColorBarItem(interactive=False, width=12, colorMap=pg.colormap.get("viridis"))
-        self.bar.setImageItem(self.image, insert_in=self.field.item)
+        self.bar: Any = None
         self.table = NumberTable("Signals of white", HEADS)
         self.words = label("", "muted")
         self.words.setWordWrap(True)
         self._lay_out()
+
+    def _prepare_field(self, plot: Any) -> None:
+        like_a_picture(plot)
+        self.bar = pg.ColorBarItem(interactive=False, width=12, colorMap=pg.colormap.get("viridis"))
+        self.bar.setImageItem(self.image, insert_in=plot.getPlotItem())
+        self._theme_bar()
 
     def _lay_out(self) -> None:
         charts = QWidget()
@@ -96,11 +100,14 @@ class SpectralonEvidence(Evidence):
         super().apply_theme(theme)
         for part in (self.table, self.emission, self.field):
             part.apply_theme(theme)
-        for side in ("left", "right"):
-            axis = self.bar.getAxis(side)
-            axis.setTextPen(theme.muted)
-            axis.setPen(theme.line)
+        self._theme_bar()
         self._draw()
+
+    def _theme_bar(self) -> None:
+        for side in ("left", "right") if self.bar is not None else ():
+            axis = self.bar.getAxis(side)
+            axis.setTextPen(self._theme.muted)
+            axis.setPen(self._theme.line)
 
     def _draw(self) -> None:
         record = self._record
