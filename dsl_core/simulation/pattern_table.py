@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -13,14 +14,36 @@ from torch import Tensor
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.light_path import zero_order_profile
 
+#: Samples a pixel along the way that a pattern varies, and both ways where it varies both.
+FINE, COARSE = 8, 4
+#: Single precision tells the ends of longer stretches apart, and blur is wider.
+SHORT_PX = 0.1
+
+
+class Edge(NamedTuple):
+    """An end of a stretch of a pattern: positions (px), the pattern's integral there, and that one's own."""
+
+    at: Tensor
+    first: Tensor
+    second: Tensor
+
 
 @dataclass(frozen=True)
 class PatternTable:
-    """Samples ``OVERSAMPLE`` a pixel; rows are kept only when the pattern has any structure along them."""
+    """A pattern of which samples are kept, ``oversample`` a pixel across and down.
 
-    blurred: Tensor  # (LEDs, rows, samples), zero order: blur and halo
-    running: Tensor  # (LEDs, rows, samples + 1), first orders: integral of the blur along columns, px
+    ``blurred`` (LEDs, rows, samples) is what the zero order brings, with blur and halo; its rows are kept
+    only when the pattern has any structure along them. First orders have no halo. ``integrals`` are the
+    integral (px) of what they bring, (LEDs, rows, samples + 1) along columns, or (LEDs, 1, samples + 1)
+    ``along_rows`` where the pattern varies along them only; and, where it varies along columns only, that
+    integral's own (px^2).
+    """
+
+    blurred: Tensor
+    integrals: tuple[Tensor, Tensor | None]
     oversample: tuple[int, int]
+    along_rows: bool
+    width_px: int
 
     @classmethod
     def of(
@@ -28,19 +51,29 @@ class PatternTable:
     ) -> PatternTable:
         """Make the table of a radiance image, shape (height, width, LEDs)."""
         flat = bool((radiance == radiance[:1]).all())
+        upright = not flat and bool((radiance == radiance[:, :1]).all())
+        height, width = radiance.shape[:2]
+        kx, ky = (FINE, 1) if flat else (COARSE, FINE if upright else COARSE)
         source = torch.as_tensor(
             np.moveaxis(radiance[:1] if flat else radiance, 2, 0), device=device, dtype=torch.float32
         )
-        kx, ky = (8, 1) if flat else (4, 4)
-        across = _spread(radiance.shape[1], kx, response, True).to(device)
-        blurred = source @ across.T
+        blurred = source @ _spread(width, kx, response, True).to(device).T
         if not flat:
-            down = _spread(radiance.shape[0], ky, response, False).to(device)
-            blurred = down @ blurred
-            source = source.repeat_interleave(ky, 1)
-        sharp = _spread(radiance.shape[1], kx, response, False).to(device)
-        running = torch.nn.functional.pad((source @ sharp.T / kx).cumsum(2), (1, 0))
-        return cls(blurred.contiguous(), running.contiguous(), (kx, ky))
+            blurred = _spread(height, ky, response, False).to(device) @ blurred
+        if upright:
+            sharp, fine = source[:, :, :1].mT, _spread(height, ky, response, False)
+        else:
+            sharp, fine = source, _spread(width, kx, response, False)
+        step = 1 / (ky if upright else kx)
+        first = torch.nn.functional.pad((sharp @ fine.to(device).T * step).cumsum(2), (1, 0))
+        second = None
+        if flat:
+            # By trapezoids, summed in double precision: stretches are short, the sums long.
+            middle = 0.5 * (first[..., 1:] + first[..., :-1]).double() * step
+            second = torch.nn.functional.pad(middle.cumsum(2), (1, 0)).float()
+        elif not upright:
+            first = first.repeat_interleave(ky, 1)
+        return cls(blurred.contiguous(), (first.contiguous(), second), (kx, ky), upright, width)
 
     @property
     def leds(self) -> int:
@@ -63,20 +96,49 @@ class PatternTable:
         upper = _lookup(blurred, across, offset)
         return torch.lerp(upper, _lookup(blurred, across, offset + blurred.shape[1]), down - above)
 
-    def mean_between(self, led: int, start: Tensor, stop: Tensor, row: Tensor | None) -> Tensor:
-        """Mean of the pattern between two columns (px), zero outside the frame."""
-        running = self.running[led]
-        offset = self._offset(row, running)
+    def edge(self, led: int, at: Tensor) -> Edge:
+        """The integrals at columns (px); for patterns that vary along columns only."""
+        first, second = self.integrals
+        assert second is not None
+        kept = self.oversample[0]
+        samples = (at + 0.5) * kept
+        reached = _lookup(first[led], samples, None)
+        # Beyond the frame there is no light: the integral stays, its own goes on with it.
+        beyond = (samples - (first.shape[2] - 1)).clip(min=0) / kept
+        return Edge(at, reached, _lookup(second[led], samples, None) + reached * beyond)
+
+    def mean_of_rows(self, led: int, start: Tensor, stop: Tensor) -> Tensor:
+        """Mean along rows (px), zero outside the frame; for patterns that vary along rows only."""
+        middle, half = 0.5 * (start + stop), (0.5 * (stop - start)).abs().clip(min=0.5 * SHORT_PX)
+        first, kept = self.integrals[0][led], self.oversample[1]
+        above, below = (_lookup(first, (at + 0.5) * kept, None) for at in (middle + half, middle - half))
+        return (above - below) / (2 * half)
+
+    def mean_between(self, led: int, start: Tensor, stop: Tensor, row: Tensor) -> Tensor:
+        """Mean along columns (px) at the nearest row, zero outside; for patterns that vary both ways."""
+        first = self.integrals[0][led]
+        offset = self._offset(row, first)
         across = self.oversample[0]
-        above, below = (_lookup(running, (column + 0.5) * across, offset) for column in (stop, start))
+        above, below = (_lookup(first, (column + 0.5) * across, offset) for column in (stop, start))
         return (above - below) / (stop - start)
 
-    def _offset(self, row: Tensor | None, table: Tensor) -> Tensor | None:
-        """Index of the first sample of the row nearest to positions (px); None for patterns without rows."""
-        if row is None or not self.has_rows:
-            return None
+    def inside(self, start: Tensor, stop: Tensor) -> Tensor:
+        """Share of stretches between columns (px) that lies inside the frame."""
+        above, below = ((column + 0.5).clip(0, self.width_px) for column in (stop, start))
+        return (above - below) / (stop - start)
+
+    def _offset(self, row: Tensor, table: Tensor) -> Tensor:
+        """Index of the first sample of the row nearest to positions (px)."""
         nearest = ((row + 0.5) * self.oversample[1]).clip(0, table.shape[0] - 1).int()
         return nearest.mul_(table.shape[1])
+
+
+def between(start: Edge, stop: Edge) -> tuple[Tensor, Tensor]:
+    """Mean of a pattern between two edges, and the mean of pattern times place, from -1 at the start to 1."""
+    length = stop.at - start.at
+    mean = (stop.first - start.first) / length
+    place = (stop.first + start.first) / length - 2 * (stop.second - start.second) / (length * length)
+    return mean, place
 
 
 def _lookup(table: Tensor, position: Tensor, offset: Tensor | None) -> Tensor:

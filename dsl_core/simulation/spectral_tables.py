@@ -17,7 +17,7 @@ NM = np.arange(400.0, 701.0)
 
 
 class Slicing(NamedTuple):
-    """Width of the spectral slices of patterns that are not lines, nm; wider where they also vary along rows.
+    """Width of the spectral slices of patterns that are not lines, nm; another where they vary both ways.
 
     Slices whose signal is below the share ``floor`` of the strongest are left out.
     """
@@ -32,15 +32,38 @@ BROAD, NARROW = Slicing(10, 25, 1e-3), Slicing(2, 5, 1e-5)
 
 
 @dataclass(frozen=True)
+class Slices:
+    """Light of every slice and LED, taken as linear in a slice, both (slices, LEDs, materials * 3).
+
+    ``mean`` times a pattern's mean, plus ``tilt`` times the mean of pattern and place, -1 to 1, is its light.
+    """
+
+    mean: Tensor
+    tilt: Tensor
+
+    @classmethod
+    def make(cls, density: NDArray[np.float64], step: int, device: torch.device) -> Slices:
+        """Slices of a width (nm) of densities (materials, 3, LEDs, len(NM))."""
+        weight = np.ones(step + 1)
+        weight[[0, -1]] = 0.5
+        windows = np.lib.stride_tricks.sliding_window_view(density, step + 1, axis=-1)[..., ::step, :]
+        place = np.linspace(-1, 1, step + 1)
+        # The line with the same light and the same first moment: the place's own mean square is about 1/3.
+        moments = (windows @ weight, windows @ (weight * place) * (step / (weight @ place**2)))
+        mean, tilt = (np.moveaxis(m, [3, 2], [0, 1]).reshape(m.shape[3], 3, -1) for m in moments)
+        return cls(_tensor(mean, device), _tensor(tilt, device))
+
+
+@dataclass(frozen=True)
 class SpectralTables:
     """Spectra of one order, by materials * 3 colours of the camera.
 
     ``cumulative`` (materials * 3 * len(NM), 2) is the signal of all LEDs up to each wavelength, blurred, and
-    its forward difference; ``slices``, by width, that between slice edges, (slices, LEDs, materials * 3).
+    its forward difference; ``slices``, by width (nm), that of pieces of the spectrum.
     """
 
     cumulative: Tensor
-    slices: dict[int, Tensor]
+    slices: dict[int, Slices]
 
     @classmethod
     def make(
@@ -54,7 +77,7 @@ class SpectralTables:
     ) -> SpectralTables:
         """Tables for reflectances (materials, len(NM)); ``sigma_nm`` blurs the lines' spectra."""
         density = chain_response(rig, order, NM)[None] * reflectance[:, None, None]
-        slices = {step: _tensor(_slices(density, step), device) for step in slicing[:2]}
+        slices = {step: Slices.make(density, step, device) for step in slicing[:2]}
         return cls(_tensor(_cumulative(density.sum(2), sigma_nm), device), slices)
 
 
@@ -74,14 +97,6 @@ def _cumulative(density: NDArray[np.float64], sigma_nm: float) -> NDArray[np.flo
     )
     difference = np.diff(total, axis=-1, append=total[..., -1:])
     return np.stack([total, difference], -1).reshape(-1, 2)
-
-
-def _slices(density: NDArray[np.float64], step: int) -> NDArray[np.float64]:
-    """Signal between slice edges for each LED, (slices, LEDs, materials * 3)."""
-    weight = np.ones(step + 1)
-    weight[[0, -1]] = 0.5
-    windows = np.lib.stride_tricks.sliding_window_view(density, step + 1, axis=-1)[..., ::step, :] @ weight
-    return np.moveaxis(windows, [3, 2], [0, 1]).reshape(windows.shape[3], 3, -1)
 
 
 def _tensor(array: NDArray[Any], device: torch.device) -> Tensor:
