@@ -1,8 +1,8 @@
 """How far slices of the spectrum are from slices of 1 nm, and what a frame costs, for patterns of any kind.
 
-Run ``python -m tests.benchmarks.bench_slices [--quick] [--json FILE]`` from the repository's root. Differences
-are in DN of an exposure of 1/3 s at drive level 0.8, of a Color Checker at 222 x 145 pixels; times are CPU
-milliseconds of a frame on one core, the fastest of three.
+Run ``python -m tests.benchmarks.bench_slices [--quick] [--json FILE]`` from the repository's root.
+Differences are in DN of an exposure of 1/3 s at drive level 0.8, of a Color Checker at 222 x 145 pixels;
+times are CPU milliseconds of a frame on one core, the fastest of three.
 """
 
 from __future__ import annotations
