@@ -51,6 +51,7 @@ class ForecastController:
         self._work: ForecastJob | None = None
         self._job: Job[None] | None = None
         self._of: Rigging | None = None
+        #: Whether nothing is left to predict but plans of one's own, as all is done or a person said stop.
         self._is_complete = False
         self._stops = [
             rig.devices.follow(lambda _: self._renew()),
@@ -66,7 +67,13 @@ class ForecastController:
         known = self._plans.calibration
         if known is None:
             return None
-        return Rigging(known, self._scan.latency_ms.value, self._scan.period_ms.value)
+        scan = self._scan
+        return Rigging(known, scan.latency_ms.value, scan.period_ms.value, self.state.look.value)
+
+    def look(self, result: Path | None) -> None:
+        """Predict for the scene that a result shows, or for a Color Checker."""
+        self.state.look.set(result)
+        self._renew()
 
     def _renew(self) -> None:
         """Forget what was predicted for another rig or calibration."""
@@ -89,7 +96,8 @@ class ForecastController:
         plan = self._scan.plan.value
         if self._is_complete and (identity(plan) in self._known or identity(plan) in self._refused):
             return
-        self._work = work = ForecastJob(self._of, self._folder, self._candidates, self._must_wait)
+        candidates = None if self._is_complete else self._candidates
+        self._work = work = ForecastJob(self._of, self._folder, candidates, self._must_wait)
         work.want(plan)
         self._job = job = Job(
             "Predict accuracy against time",
@@ -116,7 +124,7 @@ class ForecastController:
         if work is not self._work:
             return  # what it found was for another rig
         self.take_news()
-        self._is_complete = self._is_complete or complete
+        self._is_complete = True
         self._stop()
         if complete and self._automatic:
             # The plan may have changed when the job was about to end.
@@ -126,7 +134,7 @@ class ForecastController:
         if work is self._work:
             self._stop()
             self._is_complete = True
-            self.state.trouble.set(f"Nothing can be predicted for this rig: {sentence_of(error)}")
+            self.state.trouble.set(f"Nothing can be predicted: {sentence_of(error)}")
 
     def take_news(self) -> None:
         """Show what was predicted since last time; called by the window's clock."""
@@ -212,7 +220,8 @@ class ForecastController:
         return is_simulated and dict(self._rig.choice.value.options).get("realtime") != "on"
 
     def _measure(self, result: Path) -> None:
-        """Compare a new result with its truth, if any is known."""
+        """Compare a new result with its truth, if any is known; its scene may be planned for."""
+        self.state.last_look.set(result)
         scan = self.state.measured.value
         if scan is None or scan.name != result.stem:
             return

@@ -43,24 +43,39 @@ class Refused:
 
 @dataclass(frozen=True)
 class Rigging:
-    """For what is predicted: a calibration, and the projector's latency and frame period."""
+    """For what is predicted: a calibration, the projector's latency and frame period, and a scene.
+
+    ``look`` is a result that shows the scene; None for a Color Checker.
+    """
 
     rig: Rig
     latency_ms: float
     period_ms: float
+    look: Path | None = None
+
+    @property
+    def scene(self) -> str:
+        """What tells scenes apart, results of the same name among them."""
+        if self.look is None:
+            return ""
+        try:
+            return f"{self.look} {self.look.stat().st_mtime_ns}"
+        except OSError:  # whoever reads it will say so
+            return str(self.look)
 
 
 class ForecastJob:
     """Predicts presets, then candidates; `work` belongs to the job's thread, all else to the window's.
 
-    ``must_wait`` says whether other work should have the machine for itself.
+    Without candidates only what is wanted is predicted. ``must_wait`` says whether other work should have the
+    machine for itself.
     """
 
     def __init__(
         self,
         rigging: Rigging,
         folder: Path,
-        candidates: Callable[[Rig], Iterable[CapturePlan]],
+        candidates: Callable[[Rig], Iterable[CapturePlan]] | None,
         must_wait: Callable[[], bool],
     ) -> None:
         self.rigging = rigging
@@ -90,11 +105,12 @@ class ForecastJob:
         from dsl_core.planning import choice as _choice  # noqa: F401 - the window will want it at once
 
         rig = self.rigging.rig
-        store = ForecastStore(self._folder, rig, self.rigging.latency_ms)
+        store = ForecastStore(self._folder, rig, self.rigging.latency_ms, self.rigging.scene)
         presets = {identity(p): key for key, p in self._presets()}
         seen: dict[int, CapturePlan] = {}
-        for plan in (*(p for _, p in self._presets()), *self._candidates(rig)):
-            seen.setdefault(identity(plan), plan)
+        if self._candidates is not None:
+            for plan in (*(p for _, p in self._presets()), *self._candidates(rig)):
+                seen.setdefault(identity(plan), plan)
         todo = deque(seen.values())
         try:
             while (turn := self._next(todo)) is not None:
@@ -137,18 +153,30 @@ class ForecastJob:
         known = store.find(sized)
         if known is not None:
             return Foreseen(plan, known, preset)
+        view = self._look()
         try:
-            found = self._predict(sized)
+            found = self._predict(sized, view)
         except DslError as error:
             return Refused(plan, str(error))
         store.keep(sized, found)
         return Foreseen(plan, found, preset)
 
-    def _predict(self, plan: CapturePlan) -> Prediction:
-        from dsl_core.planning.prediction import predict
-        from dsl_core.planning.views import plane_view
+    def _look(self) -> View:
+        """Sample pixels of the scene; raises `DslError` where there are none."""
+        from dsl_core.planning.views import plane_view, scene_view
 
-        rig = self.rigging.rig
-        if self._view is None:
+        if self._view is not None:
+            return self._view
+        rig, look = self.rigging.rig, self.rigging.look
+        if look is None:
             self._view = plane_view(rig)
-        return predict(rig, plan, self._view, latency_ms=self.rigging.latency_ms)
+        else:
+            from dsl_core.io.result_file import load_result
+
+            self._view = scene_view(rig, load_result(look))
+        return self._view
+
+    def _predict(self, plan: CapturePlan, view: View) -> Prediction:
+        from dsl_core.planning.prediction import predict
+
+        return predict(self.rigging.rig, plan, view, latency_ms=self.rigging.latency_ms)

@@ -23,10 +23,13 @@ MOST_RIGS = 20
 
 
 class ForecastStore:
-    """What is expected of plans on one rig with one latency; a file that cannot be read starts anew."""
+    """What is expected of plans on one rig with one latency; a file that cannot be read starts anew.
 
-    def __init__(self, folder: Path, rig: Rig, latency_ms: float) -> None:
-        self._path = folder / f"{_stamp(rig, latency_ms)}.json"
+    ``scene`` tells scenes apart that were looked at.
+    """
+
+    def __init__(self, folder: Path, rig: Rig, latency_ms: float, scene: str = "") -> None:
+        self._path = folder / f"{_stamp(rig, latency_ms, scene)}.json"
         self._known: dict[str, dict[str, object]] = {}
         self._is_changed = False
         try:
@@ -68,10 +71,10 @@ class ForecastStore:
         self._is_changed = False
 
 
-def _stamp(rig: Rig, latency_ms: float) -> str:
+def _stamp(rig: Rig, latency_ms: float, scene: str) -> str:
     """Names everything that predictions depend on, the program that makes them among it."""
     known = rig.model_dump_json(exclude={"name", "provenance", "calibrations"})
-    return _digest(f"{_method()} {latency_ms!r} {known}")
+    return _digest(f"{_method()} {latency_ms!r} {scene!r} {known}")
 
 
 def _key(plan: CapturePlan) -> str:

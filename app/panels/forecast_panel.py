@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Protocol
 
 from PySide6.QtCore import Qt, QTimer
@@ -30,7 +31,7 @@ BUDGET, ERROR = "budget", "error"
 #: Height of a row of the table.
 ROW_PX = 19
 NOTHING_YET = "Nothing is predicted yet. It takes a connected rig with a calibration, and no scan under way."
-ORIGIN = "Expected from the calibration, on a Color Checker at 700 mm: F1 says how."
+CHART = "a Color Checker at 700 mm"
 
 
 class ForecastCommands(Protocol):
@@ -45,6 +46,9 @@ class ForecastCommands(Protocol):
     def answer(self, budget_s: float | None = None, error: float | None = None) -> None:
         """Plan what answers a wish."""
 
+    def look(self, result: Path | None) -> None:
+        """Predict for the scene of a result."""
+
     def close(self) -> None:
         """Follow nothing more."""
 
@@ -57,6 +61,9 @@ class ForecastPanel(QWidget):
         self._state, self._commands = state, commands
         self._pointed: Foreseen | None = None
         self.curve = OperatingCurve()
+        self.scene = ChoiceBox("Scene", "For what is predicted: a chart, or the scene of the last result")
+        self.scene.addItems(("for a chart", "for the last scan"))
+        self.scene.setEnabled(False)
         self.table = _table()
         self.wish = ChoiceBox("Wish", "What is given: the time at hand, or the error that is good enough")
         self.wish.addItem("Time at most", BUDGET)
@@ -78,6 +85,7 @@ class ForecastPanel(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
+        self.curve.head.addWidget(self.scene)
         wish = QHBoxLayout()
         for widget in (self.wish, self.budget, self.error, self.ask):
             wish.addWidget(widget)
@@ -95,6 +103,7 @@ class ForecastPanel(QWidget):
         state = self._state
         self.curve.chosen.connect(self._commands.choose)
         self.curve.pointed.connect(self._point)
+        self.scene.activated.connect(self._look)
         self.wish.currentIndexChanged.connect(lambda _: self._show_wish())
         self.ask.clicked.connect(self._ask)
         for box in (self.budget, self.error):
@@ -108,6 +117,8 @@ class ForecastPanel(QWidget):
             state.trouble.follow(lambda _: self._show_note()),
             state.refusal.follow(lambda _: self._show_note()),
             state.answer.follow(self._show_answer),
+            state.look.follow(lambda _: self._show_scene()),
+            state.last_look.follow(lambda _: self._show_scene()),
         ]
 
     def _show_wish(self) -> None:
@@ -120,6 +131,15 @@ class ForecastPanel(QWidget):
             self._commands.answer(budget_s=self.budget.value())
         else:
             self._commands.answer(error=self.error.value())
+
+    def _look(self, index: int) -> None:
+        self._commands.look(self._state.last_look.value if index else None)
+
+    def _show_scene(self) -> None:
+        look, latest = self._state.look.value, self._state.last_look.value
+        self.scene.setCurrentIndex(0 if look is None else 1)
+        self.scene.setEnabled(latest is not None)
+        self._show_note()
 
     def _show_answer(self, text: str) -> None:
         self._answer.setText(text)
@@ -182,7 +202,9 @@ class ForecastPanel(QWidget):
         elif not state.points.value:
             text = "Predicting …" if total else NOTHING_YET
         else:
-            text = f"{done} of {total} plans predicted. {ORIGIN}" if total > 1 else ORIGIN
+            scene = CHART if state.look.value is None else f"the scene of {state.look.value.stem}"
+            origin = f"Expected from the calibration, for {scene}: F1 says how."
+            text = f"{done} of {total} plans predicted. {origin}" if total > 1 else origin
         self._note.setText(text)
         self.ask.setEnabled(bool(state.points.value))
 

@@ -85,7 +85,7 @@ class OperatingCurve(QWidget):
         self.marker.sigPositionChangeFinished.connect(self._dropped)
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
+        self.head = head = QHBoxLayout()
         head.addWidget(self.figure)
         head.addStretch(1)
         column = QVBoxLayout(self)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.state.evented import Value
@@ -73,6 +74,7 @@ class ForecastState:
     ``points`` are the plans predicted so far, ``current`` is the plan at hand (None while not known, the
     reason being ``trouble`` or, for this plan alone, ``refusal``). ``progress`` is how many plans are done of
     how many (0 of 0: nothing is computed). ``answer`` says what became of a wish for time or accuracy.
+    ``look`` is the result whose scene is planned for (None: a Color Checker), ``last_look`` the latest one.
     """
 
     def __init__(self) -> None:
@@ -82,6 +84,8 @@ class ForecastState:
         self.refusal = Value("")
         self.progress = Value((0, 0))
         self.answer = Value("")
+        self.look: Value[Path | None] = Value(None)
+        self.last_look: Value[Path | None] = Value(None)
         self.measured: Value[Measured | None] = Value(None)
 
     @property

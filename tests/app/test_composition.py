@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,11 @@ from pytestqt.qtbot import QtBot
 from app.application import make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
+from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from tests.app.scan_bench import foreseen
 
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 
@@ -52,6 +57,31 @@ def test_the_rig_is_remembered(
     qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
     window.close()
     assert '"scene": "box"' in (tmp_path / "settings.json").read_text()
+
+
+def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dsl_core.planning import prediction
+
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
+
+    def predict(rig: Rig, plan: CapturePlan, view: object, latency_ms: float) -> prediction.Prediction:
+        time.sleep(0.05)
+        return foreseen(rig, plan, latency_ms)
+
+    monkeypatch.setattr(prediction, "predict", predict)
+    composition = Composition(Wish(TWIN, predicts=True))
+    window = make_window(composition.pages, tmp_path)
+    qtbot.addWidget(window)
+    window.show()
+    page = window.open_page("scan")
+    assert isinstance(page, ScanPage)
+    composition.start(window)
+    qtbot.waitUntil(lambda: len(page.forecast._state.points.value) > 3, timeout=60_000)
+    assert page.curve.marker.isVisible()
+    window.close()
+    assert list((tmp_path / "forecasts").glob("*.json"))
 
 
 def test_starting_loads_nothing_heavy() -> None:
