@@ -14,7 +14,7 @@ from dsl_core.cli.options import PlanChoice
 from dsl_core.io.plan_file import load_plan
 from dsl_core.io.result_file import load_result
 from dsl_core.io.session import SessionReader
-from dsl_core.model.plan import GrayCode, LineComb, Setting
+from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
 
@@ -83,6 +83,30 @@ def test_a_plan_is_written_for_the_rig_and_says_what_it_takes(give: Give, tmp_pa
     assert (info["kind"], info["frames"]) == ("plan", plan.shot_count)
     assert give("scan", tmp_path / "a.dsl", *SMALL_RIG, "--plan", path).code == 0
     assert SessionReader(tmp_path / "a.dsl").plan == plan
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "frames"),
+    [("ensemble-04", EnsembleCode(rows=False), 40), ("full-xor-02", XorCode(base_px=2), 38)],
+)
+def test_other_codes_are_planned_by_name(
+    give: Give, tmp_path: Path, name: str, code: object, frames: int
+) -> None:
+    gray, other = (
+        give(
+            "plan", tmp_path / f"{word}.json", *SMALL_RIG, "--code", word, "--comb", "20x20x160", "--json"
+        ).json
+        for word in ("columns", name)
+    )
+    plan = load_plan(tmp_path / f"{name}.json")
+    assert plan.code == code
+    assert plan.code_count == frames
+    # At both settings.
+    assert other["frames"] - gray["frames"] == 2 * (frames - 20)
+    assert other["minutes"] > gray["minutes"]
+    refused = give("plan", tmp_path / "no.json", *SMALL_RIG, "--code", "gray")
+    assert refused.code == 2
+    assert "ensemble-04" in refused.sentence
 
 
 def test_a_scan_says_before_it_starts_what_it_takes(give: Give, tmp_path: Path) -> None:
