@@ -15,6 +15,7 @@ from dsl_core.reconstruction.spectral_solver import (
     band_mean,
     parabola_peak,
     roughness,
+    too_faint,
     within_band,
 )
 from dsl_core.solve import banded
@@ -25,6 +26,15 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
 
     ``data`` is (pixels, bands, bands), ``right`` (pixels, bands).
     """
+    found = _solve(data, right, prior)
+    faint = too_faint(torch.diagonal(data, dim1=1, dim2=2).T, prior)
+    if len(faint):
+        found.put(faint, _solve(data[faint].double(), right[faint].double(), prior))
+    return found
+
+
+def _solve(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
+    """Solve in the precision of the equations."""
     bands = right.shape[1]
     shape = banded.to_dense(roughness(bands, data)[..., None])[0]
     ridge = torch.eye(bands).to(data) * prior.level_std**-2

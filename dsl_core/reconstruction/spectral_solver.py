@@ -8,7 +8,7 @@ loose prior and smooth spectra a tight one, from one setting. Bounds follow by a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
@@ -22,6 +22,9 @@ WITHIN_BAND = 1 / 36
 LOCAL_STD = 0.1
 #: How far outside a bound counts, how stiffly a bound holds, and how often bands change sides.
 TOLERANCE, PENALTY, ACTIVE_SET_ROUNDS = 1e-4, 1e4, 5
+#: Data with less than this share of the tightest prior's information are too faint for single precision: the
+#: rounding of that prior would choose the smoothness.
+FAINT = 0.01
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,12 @@ class Spectra:
     data_share: Tensor
     tau: Tensor
     at_bound: Tensor
+
+    def put(self, where: Tensor, other: Spectra) -> None:
+        """Replace the pixels at some indices by those of other spectra."""
+        for field in fields(self):
+            mine, others = getattr(self, field.name), getattr(other, field.name)
+            mine[..., where] = others.to(mine.dtype)
 
 
 def roughness(bands: int, like: Tensor) -> Tensor:
@@ -157,6 +166,16 @@ def solve_spectra(
     equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are
     already in ``right``. ``check`` is called where this may stop.
     """
+    found = _solve(data, right, rows, prior, check)
+    faint = too_faint(data[0], prior)
+    if len(faint):
+        some_rows = None if rows is None else rows[..., faint].double()
+        found.put(faint, _solve(data[..., faint].double(), right[:, faint].double(), some_rows, prior, check))
+    return found
+
+
+def _solve(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check: Check) -> Spectra:
+    """Solve in the precision of the equations."""
     if data.shape[0] < 3:
         data = torch.nn.functional.pad(data, (0, 0, 0, 0, 0, 3 - data.shape[0]))
     shape = roughness(data.shape[1], data)
@@ -171,6 +190,16 @@ def solve_spectra(
     check()
     std = torch.hypot(posterior.band_mean_variance().clip(min=1e-12).sqrt(), within_band(mean))
     return Spectra(mean, band_mean(mean), std, data_share(data), tau, at_bound)
+
+
+def too_faint(information: Tensor, prior: Prior) -> Tensor:
+    """Indices of the pixels that single precision cannot solve; none in double.
+
+    ``information`` (bands, pixels) is the diagonal of the data's normal equations.
+    """
+    if information.dtype == torch.float64:
+        return torch.empty(0, dtype=torch.long, device=information.device)
+    return torch.nonzero(information.amax(0) * min(prior.taus) ** 2 < FAINT).ravel()
 
 
 def band_mean(nodes: Tensor) -> Tensor:
