@@ -19,6 +19,8 @@ from dsl_core.reconstruction.hdr import MergedFrame
 ZERO_ORDER_SHARE = 0.4
 #: What is enough where one of two codes points at the peak: first orders, some 150 columns wide, stay below.
 DISPUTED_SHARE = 0.2
+#: First orders alone bring less than this share in any one line, by so many standard deviations.
+DARK_SHARE, DARK_SIGMAS = 0.1, 3.0
 #: Of two peaks the higher one counts when it is so many times the other.
 CLEARLY_HIGHER = 2.0
 SAME_PEAK_PX = 0.5
@@ -70,3 +72,11 @@ def has_peak(
     """Whether lines refined the column of pixels with at least a share of their white light, (P,)."""
     light, saturated = white.radiance.ravel()[pixels], white.saturated.ravel()[pixels]
     return np.asarray(maps.refined & (saturated | (maps.amplitude >= share * light)))
+
+
+def is_dark(maps: ColumnMaps, white: MergedFrame) -> Bools:
+    """Whether lines failed to refine pixels because they surely bring hardly any of the white light, (P,)."""
+    light = np.where(white.saturated.ravel(), -np.inf, white.radiance.ravel())
+    return np.asarray(
+        ~maps.refined & (maps.amplitude + DARK_SIGMAS * maps.amplitude_std < DARK_SHARE * light)
+    )

@@ -49,11 +49,12 @@ def refine(
 
     ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
     saturated. Where the fit fails, the decoded column stays, with the deviation of a whole pixel,
-    ``1/sqrt(12)``.
+    ``1/sqrt(12)``, and the brightest frame near it for an amplitude; that one's deviation is infinite unless
+    all frames near it were measured.
     """
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
     q = coarse_px.clone()
-    amplitude = y.amax(0)
+    brightest = amplitude = y.amax(0)
     error = MODEL_ERROR if lines.frames == lines.lines else COMB_ERROR
     for _ in range(ITERATIONS):
         g, slope = _profile(q - centres, lines.width_px, response)
@@ -70,11 +71,12 @@ def refine(
     std_px = torch.sqrt(chi_square.clip(min=1) / information)
     good = (used > 3) & (amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
+    known = good | torch.isfinite(variance).all(0)
     return Column(
         torch.where(good, q, coarse_px),
         torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
-        amplitude,
-        1 / torch.sqrt(gg),
+        torch.where(good, amplitude, brightest),
+        torch.where(known, 1 / torch.sqrt(gg), torch.inf),
         good,
     )
 

@@ -22,7 +22,9 @@ def triangulate(rig: Rig, pixels: Tensor, column_px: Tensor) -> tuple[Tensor, Te
     z = z.clip(0.3 * low, 3 * high)
     for _ in range(ITERATIONS):
         here, slope = _column_and_slope(rig, pixels, z)
-        z = (z - (here - column_px) / slope).clip(0.1 * low, 10 * high)
+        # A column is nearly linear in inverse depth, whatever the baseline: Newton's step is taken there.
+        nearer = 1 + (here - column_px) / (slope * z)
+        z = (z / nearer.clip(min=0.01)).clip(0.1 * low, 10 * high)
     here, slope = _column_and_slope(rig, pixels, z)
     met = (here - column_px).abs() < 0.01
     return torch.where(met, z, torch.nan), 1 / slope.abs()

@@ -12,7 +12,7 @@ from dsl_core.model.result import DEPTH_INVALID, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.patterns.gray_code import DecodedCode
-from dsl_core.reconstruction.code_dispute import Settled, has_peak, settle
+from dsl_core.reconstruction.code_dispute import Settled, has_peak, is_dark, settle
 from dsl_core.reconstruction.column_maps import WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.line_set import LineSet
@@ -125,6 +125,8 @@ def _flags(
         # The amplitude is a lower bound of nothing: first orders alone never reach this share of white.
         peak = has_peak(maps, slice(None), white) | settled.straight
         mark(lit & maps.refined & ~peak, Flag.NO_LIGHT)
+        # Nor is a column right whose lines were measured and are dark.
+        mark(lit & is_dark(maps, white) & ~settled.straight, Flag.NO_LIGHT)
         mark(lit & ~maps.refined, Flag.NOT_REFINED)
     mark(lit & settled.disagree, Flag.CODES_DISAGREE)
     low, high = rig.depth_range_mm

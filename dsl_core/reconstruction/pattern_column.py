@@ -75,7 +75,7 @@ def refine_by_profiles(
         torch.where(good, coarse_px + shifts[best] + move, coarse_px),
         torch.where(good, std_px, torch.full_like(coarse_px, 1 / math.sqrt(12))),
         amplitude,
-        amplitude.abs() * DIRECT_ERROR,
+        torch.where(good, amplitude.abs() * DIRECT_ERROR, torch.inf),
         good,
     )
 
