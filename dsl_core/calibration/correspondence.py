@@ -30,7 +30,7 @@ DEPTH_UNIT_MM = 1000.0
 #: Exponents that are searched. A point seen off the projector's axis moves as 1/z; lens distortion and film
 #: bend change that a little. Near zero the model degenerates to a line in log z, which is left out.
 EXPONENTS = np.concatenate([np.linspace(-4.0, -0.1, 40), np.linspace(0.1, 2.0, 20)])
-GOLDEN_STEPS = 30
+GOLDEN_STEPS, OFF_AXIS = 30, -1.0
 #: Residuals beyond this many robust deviations are wrong samples (a lost peak, a neighbouring order).
 OUTLIER_SIGMAS = 6.0
 #: Columns are never better than this (px), so that exact samples have no outliers.
@@ -136,7 +136,12 @@ def _fit_map(values: Floats, samples: GridSamples, name: str) -> tuple[Floats, F
         beta, weight = np.full(len(q), np.nan), np.zeros(len(q))
         beta[enough] = _exponents(z, q[enough], used[enough])
         weight[enough] = _sensitivity(beta[enough], z, q[enough], used[enough])
-        beta = _smooth(beta.reshape(shape), weight.reshape(shape)).ravel()
+        # Where columns do not move with depth any exponent fits, and that of a point off the axis is taken.
+        beta = (
+            _smooth(beta.reshape(shape), weight.reshape(shape)).ravel()
+            if (weight > 0).any()
+            else np.full(len(q), OFF_AXIS)
+        )
         linear = np.full((len(q), 2), np.nan)
         linear[enough] = _linear(beta[enough], z, q[enough], used[enough])[1]
         residual = q - (linear[:, :1] * z ** beta[:, None] + linear[:, 1:])

@@ -19,6 +19,8 @@ Mask = NDArray[np.bool_]
 OUTLIER_SIGMAS, LEAST_RELATIVE = 4.0, 0.012
 ROUNDS = 8
 MIN_PIXELS = 200
+#: Pixels must spread this much across their longest extent, relative to it.
+LEAST_WIDTH = 0.02
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
                 f"Only {int(on_plane.sum())} pixels lie on one plane. Check that a flat target fills the"
                 " middle of the picture, that the projector lights it, and that the code is readable."
             )
+        _require_area(rays[:2, on_plane])
         plane = Plane(_least_squares(rays[:, on_plane], inverse[on_plane]))
         miss = np.tensordot(plane.inverse, rays, 1) / inverse - 1
         spread = 1.4826 * float(np.median(np.abs(miss[on_plane])))
@@ -56,6 +59,16 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
             break
     off = (miss * depth_mm)[on_plane]
     return PlaneFit(plane, on_plane, float(np.sqrt(np.mean(off**2))))
+
+
+def _require_area(rays: Floats) -> None:
+    """Raise `CalibrationError` where pixels (2, n) lie along one line, which many planes contain."""
+    narrow, wide = np.linalg.eigvalsh(np.cov(rays))
+    if narrow < LEAST_WIDTH**2 * wide:
+        raise CalibrationError(
+            "The pixels that lie on one plane form a line, which does not tell how it is turned."
+            " Check that the flat target fills the middle of the picture and that the projector lights it."
+        )
 
 
 def _least_squares(rays: Floats, inverse: Floats) -> Floats:

@@ -79,7 +79,8 @@ def fit_zero_order(
     data = _window(lines, coarse_px, radiance, std)
     common = np.array([start.blur_px, start.halo_peak_per_px, np.log(start.halo_decay_px or DECAY_PX)])
     column, amplitude, offset = coarse_px.copy(), data.y.max(0), np.zeros(len(coarse_px))
-    use = np.ones(len(coarse_px), bool)
+    use = amplitude > 0
+    _require_peaks(use)
     progress = progress or NoProgress()
     for round_ in range(ITERATIONS):
         progress.report("blur and halo", round_, ITERATIONS)
@@ -100,11 +101,7 @@ def fit_zero_order(
                 & (np.abs(column - coarse_px) < MAX_SHIFT_PX)
                 & (amplitude > 0)
             )
-        if use.sum() < MIN_PIXELS:
-            raise CalibrationError(
-                f"Only {int(use.sum())} of {len(use)} pixels see the lines as lines. Check that a flat white"
-                " target fills the picture, in focus and not saturated, and capture the step again."
-            )
+        _require_peaks(use)
         common = common + step_common
         common[:2] = common[0].clip(0.05, 5.0), common[1].clip(0.0, 0.1)
         common[2] = common[2].clip(np.log(3.0), np.log(300.0))
@@ -116,6 +113,15 @@ def fit_zero_order(
     return ZeroOrderFit(
         column, amplitude, use, response, (spread[0], spread[1], spread[2]), float(np.mean(chi[use]))
     )
+
+
+def _require_peaks(use: NDArray[np.bool_]) -> None:
+    """Raise `CalibrationError` where too few pixels are used."""
+    if use.sum() < MIN_PIXELS:
+        raise CalibrationError(
+            f"Only {int(use.sum())} of {len(use)} pixels see the lines as lines. Check that a flat white"
+            " target fills the picture, in focus and not saturated, and capture the step again."
+        )
 
 
 def _window(
