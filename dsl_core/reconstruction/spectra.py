@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
@@ -12,7 +12,7 @@ from torch import Tensor
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import Reach
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Correspondence, Footprint, like
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
@@ -33,6 +33,8 @@ from dsl_core.solve.many import Check, work_through
 
 #: Pixels of a tile; even numbers keep the Bayer phase.
 TILE = (64, 96)
+#: Pixels whose full matrices are solved at a time.
+DENSE_PIXELS = 512
 #: Relative error of the linear model (correspondence, profile, interpolation), added to each variance.
 MODEL_ERROR = 0.01
 #: Relative error granted to the zero-order colour as a constraint on the spectrum.
@@ -218,8 +220,6 @@ class SpectralReconstruction:
     def _dense(
         self, flat: NDArray[np.intp], traced: dict[int, Footprint], window: _Window, check: Check
     ) -> tuple[Spectra, Tensor]:
-        from dsl_core.reconstruction.dense_solver import solve_dense
-
         response = self.rig.projector_response
         profiles = radiance_profiles(self.rig, self.plan)
         shading = self._map(self.pixels.shading, flat)
@@ -233,15 +233,43 @@ class SpectralReconstruction:
         weight = 1 / (1 / weight + (DIRECT_ERROR * colour[:, None] * lit) ** 2)
         width, height = self.plan.projector_size_px
         inside = {order: f.inside(width, height, margin_px=EDGE_PX) for order, f in traced.items()}
-        matrix, right, square = dense_equations(
-            response, self.bands, profiles, column, traced, inside, radiance, weight
-        )
-        check()
+        samples = (weight > 0).sum((0, 1))
+        found, misfit = [], []
+        # Full matrices take long: a part of the pixels at a time, so that a cancel need not wait.
+        for start in range(0, len(flat), DENSE_PIXELS):
+            part = slice(start, start + DENSE_PIXELS)
+            check()
+            spectra, left = self._dense_part(
+                response,
+                profiles,
+                shading[part],
+                column[part],
+                {order: Footprint(f.columns[:, part], f.rows[:, part]) for order, f in traced.items()},
+                {order: mask[:, part] for order, mask in inside.items()},
+                (radiance[..., part], weight[..., part]),
+            )
+            found.append(spectra)
+            misfit.append(left / (samples[part] - PARAMETERS).clip(min=1))
+        return _joined(found), torch.cat(misfit)
+
+    def _dense_part(
+        self,
+        response: ProjectorResponse,
+        profiles: NDArray[np.float64],
+        shading: Tensor,
+        column: Tensor,
+        traced: dict[int, Footprint],
+        inside: dict[int, Tensor],
+        seen: tuple[Tensor, Tensor],
+    ) -> tuple[Spectra, Tensor]:
+        """Spectra of some pixels, and the weighted squares they leave; ``seen`` is radiance and weight."""
+        from dsl_core.reconstruction.dense_solver import solve_dense
+
+        matrix, right, square = dense_equations(response, self.bands, profiles, column, traced, inside, *seen)
         spectra = solve_dense(matrix * (shading**2)[:, None, None], right * shading[:, None], self.prior)
         radiance = (spectra.nodes * shading).T
         explained = (radiance * (2 * right - (matrix @ radiance[..., None])[..., 0])).sum(1)
-        samples = (weight > 0).sum((0, 1))
-        return spectra, (square - explained) / (samples - PARAMETERS).clip(min=1)
+        return spectra, square - explained
 
     def _map(self, values: NDArray[np.float32], flat: NDArray[np.intp]) -> Tensor:
         return torch.as_tensor(values.ravel()[flat], device=self.device, dtype=self.dtype)
@@ -274,6 +302,12 @@ class SpectralReconstruction:
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
         out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()
         out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
+
+
+def _joined(parts: list[Spectra]) -> Spectra:
+    """Spectra of some pixels after the other."""
+    maps = ([getattr(part, field.name) for part in parts] for field in fields(Spectra))
+    return Spectra(*(torch.cat(each, -1) for each in maps))
 
 
 class _Window:
