@@ -13,7 +13,7 @@ from dsl_core.planning.designed import designed_sets
 #: different columns find the column best.
 LINES = ((5, 2), (5, 3), (5, 4), (8, 2))
 COMBS = (
-    (6, 4, 64), (5, 2, 64), (6, 4, 128), (5, 3, 96), (5, 2, 80), (5, 2, 106), (5, 2, 128), (4, 3, 192),
+    (6, 4, 64), (5, 2, 64), (6, 4, 128), (5, 3, 96), (5, 2, 80), (9, 2, 64), (9, 2, 80), (4, 3, 192),
 )  # fmt: skip
 #: Cycles and levels of the settings of a bracket; a setting twice is a repeat.
 BRACKETS = (
@@ -21,7 +21,7 @@ BRACKETS = (
     ((2, 0.2), (8, 0.8)),
     ((4, 0.2), (12, 0.8)),
     ((10, 0.2), (40, 0.8)),
-    ((10, 0.2), (20, 1.0), (20, 1.0)),
+    ((10, 0.2), (20, 0.8), (20, 0.8), (20, 0.8)),
     ((20, 0.4),),
 )
 

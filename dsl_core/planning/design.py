@@ -4,7 +4,8 @@ The model is the reconstruction's (see `virtual`), differentiable in the pattern
 radiance by the projector's gamma, are blurred, and reach a sample through all orders. The noise is the
 bracket's, saturation included, so that the design learns to keep the bright zero order out of the way. The
 loss is the trace of the posterior covariance of band means, for random smooth reflectances at random places
-and depths, plus what an uncertain column adds. Levels are rounded to what a projector of 8 bit can show.
+and depths, plus what spectra make of light that an uncertain column moves. Levels are rounded to what a
+projector of 8 bit can show.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ from dsl_core.solve import banded
 DEPTHS_MM, SAMPLES = (600.0, 700.0, 800.0), (10, 3)
 #: Deviation of second differences that posterior errors are taken under; of chart spectra at 5 nm.
 TAU = 0.012
-#: Reflectance error for a column that is a pixel off, and the deviation of a column that was not refined.
-PER_PX, UNREFINED_PX = 0.4, 12**-0.5
+#: Deviation of a column that was not refined.
+UNREFINED_PX = 12**-0.5
 #: A bilinear mosaic's mean variance of a colour, relative to a sample's.
 DEMOSAIC = 0.5
 #: How softly a setting saturates in the search, as a share of full scale.
@@ -144,8 +145,7 @@ class Samples:
 
         ``radiance`` is (width, frames, LEDs), relative to full drive.
         """
-        light = torch.einsum("smjx,xfl->smjfl", self.first[at], radiance)
-        first = torch.einsum("smjfl,mclj->scfj", light, self.moments) * self.shading[at, None, None, None]
+        first = self._first_orders(radiance, at)
         zero = torch.einsum("sx,xfl->sfl", self.zero[at], radiance)
         direct = torch.einsum("sfl,clj->scfj", zero, self.moments_zero) * self.shading[at, None, None, None]
         whole = first + direct
@@ -157,20 +157,30 @@ class Samples:
         white = colour.sum(-1)
         variance = DEMOSAIC * self._variance(y) + (MODEL_ERROR * y) ** 2
         variance = variance + (DIRECT_ERROR * white[..., None] * lit[:, None, None]) ** 2
-        rows = (whole[:, None] / variance.sqrt()[..., None]).flatten(2, 3)
+        root = variance.rsqrt()
+        rows = (whole[:, None] * root[..., None]).flatten(2, 3)
         inverse = torch.linalg.inv(rows.mT @ rows + prior)
         spread = torch.einsum("ij,snjk,ik->sni", means, inverse, means)[..., self.bands.reported].mean(-1)
-        return spread + PER_PX**2 * self._column_variance(radiance, at, zero, colour, y)
+        # A wrong column moves the light of all orders, which the spectrum answers.
+        slope = torch.einsum("sx,xfl->sfl", self.slope[at], radiance)
+        moved = torch.einsum("sncl,sfl->sncf", colour, slope)
+        drawn = self._first_orders(torch.gradient(radiance, dim=0)[0], at)
+        moved = ((moved + torch.einsum("scfj,snj->sncf", drawn, reflectance)) * root).flatten(2, 3)
+        answer = means @ inverse @ (rows.mT @ moved[..., None])
+        per_px = answer[..., self.bands.reported, 0].square().mean(-1)
+        return spread + per_px * self._column_variance(slope, zero, colour, y)
 
-    def _column_variance(
-        self, radiance: Tensor, at: Tensor, zero: Tensor, colour: Tensor, y: Tensor
-    ) -> Tensor:
+    def _first_orders(self, radiance: Tensor, at: Tensor) -> Tensor:
+        """Operator of the first orders, (samples, channels, frames, bands)."""
+        light = torch.einsum("smjx,xfl->smjfl", self.first[at], radiance)
+        return torch.einsum("smjfl,mclj->scfj", light, self.moments) * self.shading[at, None, None, None]
+
+    def _column_variance(self, slope: Tensor, zero: Tensor, colour: Tensor, y: Tensor) -> Tensor:
         """Variance of the refined column (px^2), mean over the colours of the mosaic, (samples, spectra).
 
         Amplitude and column are fitted together, as `pattern_column` does; what the amplitude explains of a
         shift tells nothing of the column. Grey patterns have one amplitude.
         """
-        slope = torch.einsum("sx,xfl->sfl", self.slope[at], radiance)
         white = colour.sum(-1)[..., None]
         change = torch.einsum("sncl,sfl->sncf", colour, slope)
         level = torch.einsum("sncl,sfl->sncf", colour, zero)
