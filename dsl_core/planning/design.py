@@ -168,7 +168,8 @@ class Samples:
         moved = ((moved + torch.einsum("scfj,snj->sncf", drawn, reflectance)) * root).flatten(2, 3)
         answer = means @ inverse @ (rows.mT @ moved[..., None])
         per_px = answer[..., self.bands.reported, 0].square().mean(-1)
-        return spread + per_px * self._column_variance(slope, zero, colour, y)
+        loss: Tensor = spread + per_px * self._column_variance(slope, zero, colour, y)
+        return loss
 
     def _first_orders(self, radiance: Tensor, at: Tensor) -> Tensor:
         """Operator of the first orders, (samples, channels, frames, bands)."""
