@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 TWIN = RigChoice("twin", (("scene", "color-checker"), ("size", "64x48")))
 SHORT = PRESETS[0].plan
+#: All frames of the short plan, and its patterns.
+FRAMES, PATTERNS = SHORT.shot_count, SHORT.spectral_count
 COMB = CapturePlan(name="comb 5x2x64", spectral=LineComb(period_px=64))
 
 

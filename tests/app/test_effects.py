@@ -17,7 +17,7 @@ from app.theme import LIGHT
 from dsl_core.io.session import SessionReader
 from dsl_core.simulation.effects.catalogue import NAMES, NEEDED, USUAL
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import TWIN, ScanBench, make_bench
+from tests.app.scan_bench import FRAMES, TWIN, ScanBench, make_bench
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_every_effect_has_its_bound_cost_and_reason(control: EffectsController, 
     # A flat chart lights nothing else, is not glossy and not translucent.
     assert not {"interreflection", "subsurface", "specular"} & set(view.on)
     assert 0 < view.saved_share < 1
-    assert view.frames == 75
+    assert view.frames == FRAMES
     control.look("all", "1 DN")
     everything = control.state.view.value
     assert everything is not None

@@ -15,7 +15,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import SHORT, TWIN, ScanBench, make_bench
+from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, TWIN, ScanBench, make_bench
 
 
 @pytest.fixture
@@ -52,8 +52,8 @@ def test_a_plan_is_fitted_to_the_rig_and_its_cost_is_known(bench: ScanBench) -> 
     facts = bench.state.facts.value
     assert facts is not None
     assert bench.state.plan.value.camera_size_px == (64, 48)
-    assert (facts.frames, facts.obstacles, facts.remarks) == (75, (), ())
-    assert facts.seconds == pytest.approx(16.25)
+    assert (facts.frames, facts.obstacles, facts.remarks) == (FRAMES, (), ())
+    assert facts.seconds == pytest.approx(SHORT.duration_s(50.0))
     assert 0 < facts.needed_bytes < facts.free_bytes
 
 
@@ -75,7 +75,7 @@ def test_an_impossible_plan_says_why(bench: ScanBench) -> None:
 def test_a_scan_is_stored_and_the_next_has_another_name(bench: ScanBench, tmp_path: Path) -> None:
     bench.scans.start()
     assert phase(bench) is Phase.DONE
-    assert bench.state.status.value.done == 75
+    assert bench.state.status.value.done == FRAMES
     assert SessionReader(tmp_path / "first.dsl").missing() == []
     assert bench.state.target.value == tmp_path / "scan-20260301-1020.dsl"
     assert bench.state.picture.value is not None
@@ -86,7 +86,7 @@ def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -
     bench.scans.start()
     graph = bench.state.graph.value
     assert graph is not None
-    assert graph.mean_dn.shape == (1, 53, 3)
+    assert graph.mean_dn.shape == (1, PATTERNS, 3)
     assert (graph.mean_dn[0].max(0) > graph.mean_dn[0].min(0) + 20).all()
 
 
@@ -109,9 +109,9 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     session = bench.state.interrupted.value
     assert phase(bench) is Phase.LOST
     assert session is not None
-    assert (session.done, session.total) == (30, 75)
+    assert (session.done, session.total) == (30, FRAMES)
     assert "Check its cable" in bench.state.trouble.value
-    assert "30 of 75 frames are safe" in bench.state.trouble.value
+    assert f"30 of {FRAMES} frames are safe" in bench.state.trouble.value
     assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
     bench.scans.start()
     assert phase(bench) is Phase.DONE
@@ -256,6 +256,6 @@ def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
         bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "The disk is full" in bench.state.trouble.value
-    assert "20 of 75 frames are safe" in bench.state.trouble.value
+    assert f"20 of {FRAMES} frames are safe" in bench.state.trouble.value
     bench.scans.start()
     assert SessionReader(tmp_path / "first.dsl").missing() == []

@@ -26,7 +26,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import TWIN, ScanBench, foreseen, make_bench, make_forecast
+from tests.app.scan_bench import FRAMES, SHORT, TWIN, ScanBench, foreseen, make_bench, make_forecast
 
 Bench = tuple[ScanPage, ScanBench, list[Path]]
 
@@ -91,7 +91,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert SessionReader(tmp_path / "first.dsl").missing() == []
     assert page.plan.isEnabled()
-    assert "75 of 75" in page.run._what.text()
+    assert f"{FRAMES} of {FRAMES}" in page.run._what.text()
 
 
 def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
@@ -167,8 +167,11 @@ def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
     page.plan.step.setValue(3)
     spectral = bench.state.plan.value.spectral
     assert isinstance(spectral, LineComb)
-    assert (spectral.step_px, spectral.period_px) == (3, 105)
-    assert page.plan.period.value() == 105
+    # As near to the preset's period as whole steps come.
+    assert isinstance(SHORT.spectral, LineComb)
+    assert spectral.step_px == 3
+    assert spectral.period_px == 3 * round(SHORT.spectral.period_px / 3)
+    assert page.plan.period.value() == spectral.period_px
     assert page.plan.preset.currentText() == "Own plan"
 
 
@@ -239,7 +242,7 @@ def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
     page, bench, _ = ready
     state = begin(qtbot, page)
     curve = page.curve
-    assert figures(page, 1)["Frames"] == "75"
+    assert figures(page, 1)["Frames"] == str(FRAMES)
     assert figures(page, 2)["Frames"] == "716"
     assert figures(page, 2)["Capture"] == "3.6 min"
     published = state.published
@@ -266,7 +269,7 @@ def test_arrow_keys_walk_along_the_curve(qtbot: QtBot, ready: Bench, predicted: 
     current = state.current.value
     assert current is not None
     assert current in page.curve.front()
-    assert current.expected.seconds > 16.25
+    assert current.expected.seconds > SHORT.duration_s(50.0)
     QTest.keyClick(page.curve.plot, Qt.Key.Key_Left)
     assert bench.state.preset is PRESETS[0]
 
@@ -299,7 +302,7 @@ def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> No
     page, bench, _ = ready
     click(page.run.start)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
-    assert figures(page, 3)["Frames"] == "75"
+    assert figures(page, 3)["Frames"] == str(FRAMES)
     # The twin does not wait for exposures.
     assert figures(page, 3)["Capture"] == "–"
 
