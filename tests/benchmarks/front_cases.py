@@ -35,7 +35,7 @@ MORE_COMBS = (
     (5, 3, 63), (6, 4, 80), (7, 3, 72), (4, 2, 64), (9, 2, 64), (9, 2, 80), (9, 2, 128),
 )  # fmt: skip
 COLOURED = ((6, 4, 96), (5, 2, 80), (4, 3, 192), (5, 3, 96))
-KNOBS = ("comb 6x4x64", "comb 9x2x80", "comb 9x2x64", "lines 5x4")
+KNOBS = ("comb 6x4x64", "comb 9x2x80", "comb 9x2x64", "comb 5x2x80", "lines 5x4")
 
 
 def line_sets() -> dict[str, SpectralSet]:
