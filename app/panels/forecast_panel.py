@@ -64,6 +64,8 @@ class ForecastPanel(QWidget):
         self.scene = ChoiceBox("Scene", "For what is predicted: a chart, or the scene of the last result")
         self.scene.addItems(("for a chart", "for the last scan"))
         self.scene.setEnabled(False)
+        for box in (self.scene, self.curve.figure):
+            box.be_narrow(100)
         self.table = _table()
         self.wish = ChoiceBox("Wish", "What is given: the time at hand, or the error that is good enough")
         self.wish.addItem("Time at most", BUDGET)
