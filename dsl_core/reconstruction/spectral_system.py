@@ -38,8 +38,8 @@ PAD_NM = 15.0
 SLOPE_STEP = 0.02
 #: How much closer than their mean spacing bands may lie, because the response moves their centroids.
 CENTROID_SLACK_PX = 0.5
-#: Bands of usable first orders are never closer; evanescent ones, far outside the frame, may coincide.
-MIN_SPACING_PX = 0.5
+#: Bands of usable first orders are never closer, px per nm; evanescent ones, far outside, may coincide.
+MIN_DISPERSION = 0.1
 #: Diagonals whose sum is below this share of the main one are left out.
 DROPPED = 2e-5
 #: Bands that share one window of lines while the normal equations are added up.
@@ -139,7 +139,9 @@ class BandedAccumulator:
         table = profile_table(self.rig, self.lines.width_px, half, columns, blur_px)
         # On the table's grid a band has the same profile in every group, and the matrix is a true square.
         columns = (columns * SAMPLES).round() / SAMPLES
-        spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(min=MIN_SPACING_PX)
+        spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(
+            min=MIN_DISPERSION * self.bands.step_nm
+        )
         tails = table.overlaps(float(spacing), CENTROID_SLACK_PX)[::-1].cumsum()[::-1]
         bandwidth = max(min(int((tails > DROPPED).sum()), self.bands.count - 1), 1)
         # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels

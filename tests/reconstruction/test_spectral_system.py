@@ -49,3 +49,20 @@ def test_banded_equations_are_those_of_the_full_model(order: int) -> None:
     right = model.adjoint(radiance * weight)
     assert (system.right - right).abs().max() < 0.01 * right.abs().max()
     assert not system.right[~inside].any()
+
+
+def test_bands_narrower_than_a_column_leave_the_equations_positive() -> None:
+    rig, plan = published_rig(), CapturePlan()
+    bands, lines = Bands.of(rig, WavelengthGrid(step_nm=1.0)), LineSet.of(plan)
+    assert lines is not None
+    pixels = torch.arange(0, 890 * 580, 8009)
+    depth = torch.full((len(pixels),), 700.0, dtype=torch.float64)
+    bright = torch.full((3, plan.spectral_count, len(pixels)), 1e5, dtype=torch.float64)
+    system = BandedAccumulator(rig, bands, lines, len(pixels), depth)
+    for order in (1, -1):
+        footprint = GratingModel(rig).trace(pixels, depth, order, bands.centroids_nm[order])
+        inside = footprint.inside(*plan.projector_size_px)
+        system.add(order, footprint.columns, inside, bright, bright, 0, 0.0)
+    matrix = system.positive_matrix()
+    matrix[0] += 2.8
+    assert bool((banded.factorise(matrix).diagonal > 0).all())
