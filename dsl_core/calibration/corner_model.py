@@ -1,4 +1,4 @@
-"""Corners of a board to a few thousandths of a pixel: two straight edges, fitted to the pixels around them.
+"""Corners of a board to a thousandth of a pixel: two edges of known bend, fitted to the pixels around them.
 
 Where four squares meet, the picture is ``a(x) + b(x) p(d1) p(d2)``: two levels that vary linearly, and the
 profiles p of two edges at signed distances d1 and d2. A profile is that of a sharp edge averaged over the
@@ -55,22 +55,29 @@ def even_mosaic(mosaic: NDArray[Any], bayer: BayerPattern, reach_px: float) -> N
 
 
 def fit_corners(
-    grey: NDArray[np.floating], start_px: Floats, along_px: Floats, gap: float = 1.0
+    grey: NDArray[np.floating],
+    start_px: Floats,
+    along_px: Floats,
+    gap: float = 1.0,
+    bend_per_px: Floats | None = None,
 ) -> EdgeCorners:
     """Fit corners in a linear picture (rows, columns), not finite where a pixel must not count.
 
     ``start_px`` (corners, 2); ``along_px`` (corners, 2, 2): one square's step along board x and y. Only
-    pixels within ``gap`` squares of an edge count (markers lie beyond). Corners without a fit are NaN.
+    pixels within ``gap`` squares of an edge count (markers lie beyond). ``bend_per_px`` (corners, 2) is the
+    curvature of both edges in the picture, as lenses bend them, towards the left of board x and y; none if
+    not given. Corners without a fit are NaN.
     """
+    bend = np.zeros((len(start_px), 2)) if bend_per_px is None else bend_per_px
     pitch = np.linalg.norm(along_px, axis=2).min(1)
     reach = np.clip(REACH * pitch, MIN_REACH_PX, MAX_REACH_PX)
     state = _start(start_px, along_px)
     places, values, usable = _windows(np.asarray(grey, np.float64), start_px, reach)
-    near = np.abs(_edge_distances(state, places)).min(0)
+    near = np.abs(_edge_distances(state, places, bend)).min(0)
     usable &= near < np.maximum(gap * pitch - 1.0, 1.5)[:, None]
     levels = np.zeros((len(state), 6))
     for _ in range(ROUNDS):
-        model, slope = _model(state, places, start_px)
+        model, slope = _model(state, places, start_px, bend)
         levels = _levels(model, values, usable)
         moved = _step(state, slope, model, levels, values, usable)
         change, state = np.abs(moved - state)[:, :2].max(), moved
@@ -102,20 +109,19 @@ def _windows(grey: Floats, start_px: Floats, reach: Floats) -> tuple[Floats, Flo
     return places.astype(float), np.where(usable, values, 0.0), usable
 
 
-def _edge_distances(state: Floats, places: Floats) -> Floats:
+def _edge_distances(state: Floats, places: Floats, bend_per_px: Floats) -> Floats:
     """Signed distance (px) of pixels to both edges, shape (2, corners, pixels)."""
     away = places - state[:, None, :2]
-    return np.stack(
-        [
-            away[..., 1] * np.cos(angle)[:, None] - away[..., 0] * np.sin(angle)[:, None]
-            for angle in state[:, 2:4].T
-        ]
-    )
+    distances = []
+    for angle, bend in zip(state[:, 2:4].T[..., None], bend_per_px.T[..., None], strict=True):
+        along = away[..., 0] * np.cos(angle) + away[..., 1] * np.sin(angle)
+        distances.append(away[..., 1] * np.cos(angle) - away[..., 0] * np.sin(angle) - 0.5 * bend * along**2)
+    return np.stack(distances)
 
 
-def _model(state: Floats, places: Floats, start_px: Floats) -> tuple[Floats, Floats]:
+def _model(state: Floats, places: Floats, start_px: Floats, bend_per_px: Floats) -> tuple[Floats, Floats]:
     """Level functions (corners, pixels, 6) and slopes of the edges' product by the state (..., 5)."""
-    distances = _edge_distances(state, places)
+    distances = _edge_distances(state, places, bend_per_px)
     angles, blur = state[:, 2:4].T, state[:, 4][:, None]
     (p, dp, sp), (q, dq, sq) = (
         _profile(d, angle[:, None], blur) for d, angle in zip(distances, angles, strict=True)

@@ -109,8 +109,11 @@ def refine_corners(frames: PoseFrames, corners: Corners, board: Board) -> tuple[
     grey = grey_of(light)
     grey[saturated(frames)] = np.nan
     gap = 0.5 * (1 - board.marker_mm / board.square_mm) if isinstance(board, Charuco) else 1.0
-    found = fit_corners(grey, corners.points_px, along, gap)
-    points = np.where(np.isfinite(found.points_px), found.points_px, corners.points_px)
+    straight = fit_corners(grey, corners.points_px, along, gap)
+    points = np.where(np.isfinite(straight.points_px), straight.points_px, corners.points_px)
+    # A lens bends edges by some hundredths of a pixel, which would draw every corner towards its axis.
+    found = fit_corners(grey, points, along, gap, _bends_per_px(Corners(corners.ids, points), board))
+    points = np.where(np.isfinite(found.points_px), found.points_px, points)
     return Corners(corners.ids, points), float(np.median(found.blur_px))
 
 
@@ -123,6 +126,36 @@ def _full_light(frames: PoseFrames) -> NDArray[np.float32]:
     return np.asarray(
         total / (pairs + 1) - np.asarray(frames.black, np.float32) * ((2 * pairs + 1) / (pairs + 1))
     )
+
+
+def _bends_per_px(corners: Corners, board: Board) -> Floats:
+    """Curvature of the edges along board x and y at every corner, (corners, 2), from corners beside it.
+
+    Straight lines stay straight in any perspective, so that what bends them is the lens. Corners without
+    neighbours on both sides take what the nearest other has.
+    """
+    places = np.rint(corner_positions_mm(board)[corners.ids, :2] / board.square_mm).astype(int)
+    index = {tuple(place): number for number, place in enumerate(places.tolist())}
+    bends = np.full((len(places), 2), np.nan)
+    for number, (x, y) in enumerate(places.tolist()):
+        for axis, (dx, dy) in enumerate(((1, 0), (0, 1))):
+            before, after = index.get((x - dx, y - dy)), index.get((x + dx, y + dy))
+            if before is not None and after is not None:
+                a, b, c = corners.points_px[[before, number, after]]
+                along, bent = (c - a) / 2, a - 2 * b + c
+                bends[number, axis] = (along[0] * bent[1] - along[1] * bent[0]) / np.linalg.norm(along) ** 3
+    return _nearest_known(places, bends, np.isfinite(bends))
+
+
+def _nearest_known(places: NDArray[np.int_], values: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Values (corners, 2) with those that are not known taken from the nearest corner, or zero."""
+    filled = np.where(known, values, 0.0)
+    for axis in range(2):
+        have, lack = (np.flatnonzero(which[:, axis]) for which in (known, ~known))
+        if len(have) and len(lack):
+            apart = ((places[lack, None] - places[None, have]) ** 2).sum(2)
+            filled[lack, axis] = values[have[apart.argmin(1)], axis]
+    return filled
 
 
 def _steps_px(corners: Corners, board: Board) -> Floats:

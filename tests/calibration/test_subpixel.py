@@ -50,6 +50,14 @@ def test_edges_tell_corners_to_a_hundredth_of_a_pixel(seen: PoseObservation) -> 
     assert np.abs(off.mean(0)).max() < 0.004
 
 
+def test_bent_edges_do_not_draw_corners_to_the_axis(seen: PoseObservation) -> None:
+    off, _ = errors(seen)
+    centre = np.array([222, 145]) * (428.9 / 890, 294.8 / 580)
+    away = seen.camera_px - centre
+    # Edges taken as straight would give -2.2e-5.
+    assert abs((off * away).sum() / (away**2).sum()) < 1e-5
+
+
 def test_grey_values_of_the_code_tell_places_to_a_few_thousandths(seen: PoseObservation) -> None:
     _, code = errors(seen)
     assert np.sqrt((code**2).mean()) < 0.003
