@@ -326,7 +326,9 @@ class _Run:
         root = (~reached).float()[:, None, None] / (variance + (COLOUR_ERROR * colour) ** 2).sqrt()
         moments = like(owner.bands.moments[0].sum(1), matrix)
         rows = (moments * (root * self.shading[..., None])[..., None]).flatten(0, 1)
-        clean, noise = (colour * root), self._normal(colour.shape) * variance.sqrt() * root
+        # Where the amplitude is unknown its equation weighs nothing, and neither does its noise.
+        share = torch.where(torch.isfinite(variance), variance.sqrt() * root, 0.0)
+        clean, noise = colour * root, self._normal(colour.shape) * share
         add = [torch.einsum("ncj,nc->nj", rows, v.flatten(0, 1)) for v in (clean + noise, clean)]
         return matrix + rows.mT @ rows, right + add[0], quiet + add[1]
 
