@@ -150,12 +150,13 @@ class CampaignBox(QFrame):
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""
         dialog = NewCampaignDialog(self._home, self._rig.choice.value.words, self)
-        # Else it would stay as long as the page.
-        dialog.finished.connect(dialog.deleteLater)
         before = self._state.campaign.value
-        if dialog.exec() != QDialog.DialogCode.Accepted:
+        wanted, target = dialog.exec() == QDialog.DialogCode.Accepted, dialog.target
+        # Else it would stay as long as the page; before its answer is read, it must not go.
+        dialog.deleteLater()
+        if not wanted:
             return False
-        self._commands.begin_campaign(dialog.target)
+        self._commands.begin_campaign(target)
         return self._state.campaign.value != before
 
     def _ask_open(self) -> None:

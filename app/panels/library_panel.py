@@ -178,11 +178,12 @@ class LibraryPanel(QGroupBox):
         other = box.addButton("&Another target", QMessageBox.ButtonRole.AcceptRole)
         other.setToolTip("The light is not judged then, as nothing says how bright the target is")
         box.addButton(QMessageBox.StandardButton.Cancel)
-        # Else it would stay as long as the page.
-        box.finished.connect(box.deleteLater)
         box.exec()
-        if box.clickedButton() in (spectralon, other):
-            self._commands.check(self.key, box.clickedButton() is spectralon)
+        wanted, is_spectralon = box.clickedButton() in (spectralon, other), box.clickedButton() is spectralon
+        # Else it would stay as long as the page; before its answer is read, it must not go.
+        box.deleteLater()
+        if wanted:
+            self._commands.check(self.key, is_spectralon)
 
     def _export(self) -> None:
         line = self.line
