@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,9 +35,14 @@ class Ending:
     @property
     def sentence(self) -> str:
         """What was said to the user; fails when it was not said in one line or with a traceback."""
-        lines = self.err.strip().splitlines()
+        lines = without_progress(self.err).strip().splitlines()
         assert len(lines) == 1, self.err
         return lines[0]
+
+
+def without_progress(text: str) -> str:
+    """Error output without the lines that work prints now and then when it takes long."""
+    return re.sub(r"(?m)^.*: \d+ of \d+ \(\d+%\)\n", "", text)
 
 
 Give = Callable[..., Ending]

@@ -1,7 +1,8 @@
 """Scans on request, each in a process of its own that may be killed.
 
-Reads lines ``[folder, seconds or null]`` from standard input; for each, forks a child that creates or
-resumes the session and scans, kills it after that time, and prints how it ended. The rig is opened once.
+Reads lines ``[folder, frames, seconds]`` from standard input; for each, forks a child that creates or
+resumes the session and scans, kills it when so many frames are stored and that time has passed since, and
+prints how it ended. Frames are null for a scan that may end. The rig is opened once.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import os
 import signal
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,20 +51,31 @@ def make(kind: str) -> tuple[CapturePlan, DeviceRig]:
     return plan, replay_rig(Made(plan))
 
 
+def wait_for_frames(folder: Path, frames: int, child: int) -> None:
+    """Return when a session has so many frames, or when its process has ended."""
+    log = folder / "frames.jsonl"
+    while not log.exists() or log.read_bytes().count(b"\n") < frames:
+        if os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+            return
+        time.sleep(0.0005)
+
+
 def main() -> None:
     plan, rig = make(sys.argv[1])
     # Once through, so that no child spends its life on what can be prepared.
     Runner(rig, plan, MemorySink(plan), pattern_image).run()
     print("ready", flush=True)
     for line in sys.stdin:
-        folder, kill_after_s = json.loads(line)
+        folder, frames, delay_s = json.loads(line)
         child = os.fork()
         if child == 0:
             with SessionWriter.open(folder, plan, rig) as sink:
                 Runner(rig, plan, sink, pattern_image).run()
             os._exit(0)
-        if kill_after_s is not None:
-            time.sleep(kill_after_s)
+        if frames is not None:
+            if frames > 0:
+                wait_for_frames(Path(folder), frames, child)
+            time.sleep(delay_s)
             os.kill(child, signal.SIGKILL)
         _, status = os.waitpid(child, 0)
         print(os.waitstatus_to_exitcode(status), flush=True)

@@ -194,7 +194,7 @@ def test_frames_that_show_nothing(
         ("scan a.dsl -o size=112x72 --lines 5x9", "leave columns between them dark"),
         ("scan a.dsl -o size=112x72 --lines 5x2 --comb 5x2x50", "exclude each other"),
         ("scan a.dsl -o size=112x72 --comb 50x2x50", "narrower than its period"),
-        ("scan a.dsl -o size=112x72 --code rows", "'full' or 'columns'"),
+        ("scan a.dsl -o size=112x72 --code rows", "one of full, columns, xor-04"),
         ("scan a.dsl -o size=112x72 --setting 100", "--setting must be EXPOSURE_MS@LEVEL"),
         ("scan a.dsl -o size=112x72 --setting 100@2", "settings.0.level"),
         ("scan a.dsl -o size=112x72 --setting nan@0.5", "settings.0.exposure_ms"),

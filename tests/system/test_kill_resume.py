@@ -43,10 +43,11 @@ class Server:
         )
         assert self._line() == "ready"
 
-    def scan(self, folder: Path, kill_after_s: float | None = None) -> int:
-        """Start or resume a scan, kill it if wanted, and return its exit code."""
+    def scan(self, folder: Path, kill_after: tuple[int, float] | None = None) -> int:
+        """Start or resume a scan, kill it after frames and seconds if wanted, and return its exit code."""
+        frames, delay_s = kill_after or (None, 0.0)
         assert self.process.stdin is not None
-        self.process.stdin.write(json.dumps([str(folder), kill_after_s]) + "\n")
+        self.process.stdin.write(json.dumps([str(folder), frames, delay_s]) + "\n")
         self.process.stdin.flush()
         return int(self._line())
 
@@ -90,17 +91,18 @@ def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path
     duration_s = server.duration_s(tmp_path / "unbroken.dsl")
     unbroken = _frames(tmp_path / "unbroken.dsl")
     assert unbroken.std() > 0
-    moments = np.sort(np.random.default_rng(2024).uniform(0.0, 0.95, KILLS)) * duration_s
+    # By frames and not by time alone, since the time that a scan takes changes with the machine's load.
+    share = np.sort(np.random.default_rng(2024).uniform(0.0, 0.95, KILLS))
     left = []
-    for number, moment in enumerate(moments):
+    for number, moment in enumerate(share * len(unbroken)):
         folder = tmp_path / f"{number}.dsl"
-        server.scan(folder, kill_after_s=float(moment))
+        server.scan(folder, kill_after=(int(moment), moment % 1 * duration_s / len(unbroken)))
         left.append(_frames_left(folder))
         assert server.scan(folder) == 0
         assert find_problems(SessionReader(folder), verify=True) == []
         np.testing.assert_array_equal(_frames(folder), unbroken)
     # The kills must have hit scans under way, at many different frames.
-    assert len({count for count in left if count > 0}) >= KILLS // 4, left
+    assert len({count for count in left if count > 0}) >= KILLS // 2, left
 
 
 @pytest.mark.parametrize("server", ["made"], indirect=True)
@@ -108,6 +110,6 @@ def test_one_scan_killed_again_and_again_gets_there(server: Server, tmp_path: Pa
     duration_s = server.duration_s(tmp_path / "unbroken.dsl")
     folder = tmp_path / "scan.dsl"
     for _ in range(KILLS):
-        server.scan(folder, kill_after_s=duration_s / 4)
+        server.scan(folder, kill_after=(0, duration_s / 4))
     assert server.scan(folder) == 0
     np.testing.assert_array_equal(_frames(folder), _frames(tmp_path / "unbroken.dsl"))
