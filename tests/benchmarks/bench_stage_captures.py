@@ -121,8 +121,8 @@ def row(
     mounted = truth.model_copy(update={"film": Film()})
     film, samples = fit_first_orders(mounted, planes, data, NoProgress())
     fitted = truth.model_copy(update={"film": film.film})
-    names = [[str(i) for i in range(7)]] * 2
-    residual, _ = choose_residual(fitted, samples, *names)
+    names = [str(i) for i in range(7)]
+    residual, _ = choose_residual(fitted, samples, names, names)
     lines = (640 - 5) // step_px + 1
     return Row(
         len(positions),
