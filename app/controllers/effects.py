@@ -15,13 +15,13 @@ from app.views import Notifier
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.plan import CapturePlan
 from dsl_core.progress import Progress
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
 if TYPE_CHECKING:
     from dsl_core.simulation.effects.planner import EffectPlan
     from dsl_core.simulation.world import World
 
 EFFECTS, TOLERANCE = "effects", "tolerance"
-ONE_DN = "1 DN"
 
 
 class EffectsController:
@@ -46,12 +46,13 @@ class EffectsController:
         state.view.set(None)
         if devices is None and self._rig.state.link.value is Link.OPENING:
             return  # what comes may be simulated again
-        state.offered.set(_world_of(devices) is not None)
+        world = _world_of(devices)
+        state.offered.set(world is not None)
         state.in_use.set(options.get(EFFECTS, Wanted.USUAL.value))
-        state.tolerance.set(options.get(TOLERANCE, ONE_DN))
+        state.tolerance.set(ONE_DN if world is None else world.tolerance)
         self._asked = (state.in_use.value, state.tolerance.value)
 
-    def look(self, choice: str, tolerance: str) -> None:
+    def look(self, choice: str, tolerance: Tolerance) -> None:
         """Show what a choice renders, and what the rest would change and cost."""
         self._asked = choice, tolerance
         world, plan = _world_of(self._rig.state.devices.value), self._scan.plan.value
@@ -82,7 +83,7 @@ class EffectsController:
         """Show the choice looked at last, for the plan at hand."""
         self.look(*self._asked)
 
-    def apply(self, choice: str, tolerance: str) -> None:
+    def apply(self, choice: str, tolerance: Tolerance) -> None:
         """Let the twin render a choice from now on."""
         if self._scan.phase.value.is_busy:
             self._notifier.tell("info", "A scan is running. Wait for its end, then change the effects.")
@@ -93,7 +94,7 @@ class EffectsController:
             options[EFFECTS] = choice
         if choice == Wanted.AUTO.value and tolerance != ONE_DN:
             # Options of a rig are separated by spaces.
-            options[TOLERANCE] = tolerance.replace(" ", "")
+            options[TOLERANCE] = str(tolerance).replace(" ", "")
         self._rig.connect(RigChoice(now.name, tuple(options.items())))
 
     def close(self) -> None:
@@ -110,20 +111,14 @@ def _world_of(devices: DeviceRig | None) -> World | None:
     return devices.camera.world
 
 
-def view_of(world: World, choice: str, tolerance: str, plan: CapturePlan) -> EffectsView:
+def view_of(world: World, choice: str, tolerance: Tolerance, plan: CapturePlan) -> EffectsView:
     """What a world would render by a choice; the world itself stays as it is."""
     from dsl_core.simulation.effects.catalogue import Choice
-    from dsl_core.simulation.effects.planner import Tolerance
 
-    chosen = Choice.of(choice)
-    other = replace(
-        world, effects=chosen, tolerance=Tolerance.of(tolerance), settings=plan.settings, _path=None
-    )
+    other = replace(world, effects=Choice.of(choice), tolerance=tolerance, settings=plan.settings, _path=None)
     made = other.effect_plan()
     frame_s, all_s = made.seconds
-    return EffectsView(
-        chosen.text, str(made.tolerance), _rows(made), _left_out(made), frame_s, all_s, plan.shot_count
-    )
+    return EffectsView(_rows(made), _left_out(made), frame_s, all_s, plan.shot_count)
 
 
 def _rows(made: EffectPlan) -> tuple[EffectRow, ...]:

@@ -22,6 +22,7 @@ from app.state.effects import EffectRow, EffectsState, EffectsView, Wanted
 from app.state.evented import Value
 from app.theme import DARK, Theme
 from app.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
 _COLUMNS = ("Effect", "At most", "In σ", "A frame", "Why")
 _CHOICES = (
@@ -31,19 +32,20 @@ _CHOICES = (
     (Wanted.NONE, "Nothing", "only what cannot be left out"),
     (Wanted.CHOSEN, "Chosen below", "those that are ticked"),
 )
-_UNITS = ("DN", "sigma")
+#: Signs and names of the units of a tolerance.
+_UNITS = (("DN", "DN"), ("σ", "sigma"))
 
 
 class EffectsCommands(Protocol):
     """What the panel asks of its controller."""
 
-    def look(self, choice: str, tolerance: str) -> None:
+    def look(self, choice: str, tolerance: Tolerance) -> None:
         """Show what a choice renders."""
 
     def look_again(self) -> None:
         """Show the choice looked at last."""
 
-    def apply(self, choice: str, tolerance: str) -> None:
+    def apply(self, choice: str, tolerance: Tolerance) -> None:
         """Put a choice in force."""
 
     def close(self) -> None:
@@ -61,11 +63,16 @@ class EffectsPanel(QWidget):
             self.choice.addItem(title, wanted.value)
             self.choice.setItemData(self.choice.count() - 1, f"{title}: {what}", Qt.ItemDataRole.ToolTipRole)
         self.tolerance = NumberBox(
-            "Tolerance", 0.01, 100, 1.0, "", 2, "What is left out changes no pixel of any picture by more"
+            "Tolerance",
+            0.001,
+            1000,
+            ONE_DN.value,
+            decimals=3,
+            tip="What is left out changes no pixel of any picture by more",
         )
         self.unit = ChoiceBox("Unit of the tolerance", "Counts, or standard deviations of a dark pixel")
-        self.unit.addItem("DN", _UNITS[0])
-        self.unit.addItem("σ", _UNITS[1])
+        for sign, name in _UNITS:
+            self.unit.addItem(sign, name)
         self._within = label("within", "muted")
         self.apply = QPushButton("Apply")
         self.apply.setToolTip(
@@ -97,7 +104,7 @@ class EffectsPanel(QWidget):
         self.tolerance.valueChanged.connect(lambda _: self._look())
         self.unit.currentIndexChanged.connect(lambda _: self._look())
         self.table.itemChanged.connect(self._ticked)
-        self.apply.clicked.connect(lambda: self._commands.apply(self._wanted(), self._tolerance_text()))
+        self.apply.clicked.connect(lambda: self._commands.apply(self._wanted(), self._chosen_tolerance()))
         self.stops: list[Callable[[], None]] = [
             state.in_use.follow(lambda _: self._show_in_use()),
             state.tolerance.follow(lambda _: self._show_in_use()),
@@ -131,12 +138,12 @@ class EffectsPanel(QWidget):
         items = [self.table.item(i, 0) for i in range(self.table.rowCount())]
         return [(row, item) for row, item in zip(rows, items, strict=False) if item is not None]
 
-    def _tolerance_text(self) -> str:
-        return f"{self.tolerance.value():g} {self.unit.currentData()}"
+    def _chosen_tolerance(self) -> Tolerance:
+        return Tolerance(self.tolerance.value(), str(self.unit.currentData()))
 
     def _look(self) -> None:
         if self.isVisible():
-            self._commands.look(self._wanted(), self._tolerance_text())
+            self._commands.look(self._wanted(), self._chosen_tolerance())
         self._show_state()
 
     def _ticked(self, item: QTableWidgetItem) -> None:
@@ -154,12 +161,12 @@ class EffectsPanel(QWidget):
         """Bring the controls to what the rig renders now."""
         named = [wanted.value for wanted in Wanted]
         kind = self._state.in_use.value if self._state.in_use.value in named else Wanted.CHOSEN.value
-        number, unit = _parse(self._state.tolerance.value)
+        tolerance = self._state.tolerance.value
         for box in (self.choice, self.tolerance, self.unit):
             box.blockSignals(True)
         self.choice.setCurrentIndex(self.choice.findData(kind))
-        self.tolerance.setValue(number)
-        self.unit.setCurrentIndex(self.unit.findData(unit))
+        self.tolerance.setValue(tolerance.value)
+        self.unit.setCurrentIndex(self.unit.findData(tolerance.unit))
         for box in (self.choice, self.tolerance, self.unit):
             box.blockSignals(False)
         if self.isVisible():
@@ -202,7 +209,7 @@ class EffectsPanel(QWidget):
             and not state.busy.value
             and (
                 self._wanted() != state.in_use.value
-                or (is_auto and _parse(self._tolerance_text()) != _parse(state.tolerance.value))
+                or (is_auto and self._chosen_tolerance() != state.tolerance.value)
             )
         )
         if view is None:
@@ -239,17 +246,6 @@ def number(value: float) -> str:
     ('0.667', '94731')
     """
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
-
-
-def _parse(text: str) -> tuple[float, str]:
-    """Number and unit of a tolerance as the command line has it.
-
-    >>> _parse("0.5sigma"), _parse("2")
-    ((0.5, 'sigma'), (2.0, 'DN'))
-    """
-    is_sigma = "sigma" in text.lower()
-    digits = "".join(letter for letter in text if letter.isdigit() or letter == ".")
-    return float(digits or 1), _UNITS[is_sigma]
 
 
 def _item(text: str, colour: str, right: bool = False) -> QTableWidgetItem:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from app.state.evented import Value
+from dsl_core.simulation.effects.tolerance import ONE_DN
 
 
 class Wanted(Enum):
@@ -36,12 +37,10 @@ class EffectRow:
 class EffectsView:
     """A decision on every effect of the scene at hand.
 
-    ``text`` is the choice as the command line has it, ``left_out`` the most that what is off changes, in
-    words; ``frame_s`` and ``all_s`` are computing of a frame, of which the scan takes ``frames``.
+    ``left_out`` is the most that what is off changes, in words; ``frame_s`` and ``all_s`` are computing of a
+    frame, of which the scan takes ``frames``.
     """
 
-    text: str
-    tolerance: str
     rows: tuple[EffectRow, ...]
     left_out: str
     frame_s: float
@@ -69,6 +68,6 @@ class EffectsState:
     def __init__(self) -> None:
         self.offered = Value(False)
         self.in_use = Value(Wanted.USUAL.value)
-        self.tolerance = Value("1 DN")
+        self.tolerance = Value(ONE_DN)
         self.view: Value[EffectsView | None] = Value(None)
         self.busy = Value(False)

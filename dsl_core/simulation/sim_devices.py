@@ -22,7 +22,8 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.bandpass_filters import measured_transmissions
 from dsl_core.simulation.effects.catalogue import USUAL_CHOICE, Choice
-from dsl_core.simulation.effects.planner import Tolerance, describe
+from dsl_core.simulation.effects.planner import describe
+from dsl_core.simulation.effects.tolerance import Tolerance
 from dsl_core.simulation.placing import Mishaps, TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig

@@ -15,7 +15,8 @@ from dsl_core.optics.led_cycle import led_weights
 from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.effects.catalogue import EXTRAS, USUAL_CHOICE, Choice, with_effects
 from dsl_core.simulation.effects.path import LightPath, View
-from dsl_core.simulation.effects.planner import ONE_DN, EffectPlan, Tolerance, plan_effects
+from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.effects.view import make_view
 from dsl_core.simulation.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread

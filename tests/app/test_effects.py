@@ -12,10 +12,12 @@ from app.controllers.effects import EffectsController
 from app.jobs.base import InlineRunner
 from app.panels.effects_panel import EffectsPanel
 from app.state.effects import EffectsState
+from app.state.rig import RigChoice
 from app.state.scan import Phase
 from app.theme import LIGHT
 from dsl_core.io.session import SessionReader
 from dsl_core.simulation.effects.catalogue import NAMES, NEEDED, USUAL
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.scan_bench import FRAMES, TWIN, ScanBench, make_bench
 
@@ -49,7 +51,7 @@ def choose(panel: EffectsPanel, key: str) -> None:
 
 
 def test_every_effect_has_its_bound_cost_and_reason(control: EffectsController, bench: ScanBench) -> None:
-    control.look("auto", "1 DN")
+    control.look("auto", ONE_DN)
     view = control.state.view.value
     assert view is not None
     assert [row.name for row in view.rows] == list(NAMES)
@@ -59,7 +61,7 @@ def test_every_effect_has_its_bound_cost_and_reason(control: EffectsController, 
     assert not {"interreflection", "subsurface", "specular"} & set(view.on)
     assert 0 < view.saved_share < 1
     assert view.frames == FRAMES
-    control.look("all", "1 DN")
+    control.look("all", ONE_DN)
     everything = control.state.view.value
     assert everything is not None
     assert everything.on == NAMES
@@ -71,7 +73,7 @@ def test_looking_changes_nothing_in_the_rig(control: EffectsController, bench: S
     assert devices is not None
     assert isinstance(devices.camera, SimCamera)
     before = devices.camera.world.effects
-    control.look("none", "1 DN")
+    control.look("none", ONE_DN)
     assert devices.camera.world.effects is before
     assert control.state.in_use.value == "usual"
 
@@ -79,27 +81,27 @@ def test_looking_changes_nothing_in_the_rig(control: EffectsController, bench: S
 def test_a_choice_is_put_in_force_by_options_that_scans_note(
     control: EffectsController, bench: ScanBench, tmp_path: Path
 ) -> None:
-    control.apply("auto", "0.5 sigma")
+    control.apply("auto", Tolerance(0.5, "sigma"))
     assert dict(bench.rig.state.choice.value.options)["tolerance"] == "0.5sigma"
-    assert (control.state.in_use.value, control.state.tolerance.value) == ("auto", "0.5sigma")
+    assert (control.state.in_use.value, control.state.tolerance.value) == ("auto", Tolerance(0.5, "sigma"))
     assert "--option effects=auto" in bench.scans.command_line()
     bench.scans.start()
     assert bench.state.phase.value is Phase.DONE
     notes = SessionReader(tmp_path / "first.dsl").manifest.notes
     assert '"choice": "auto"' in notes["effects"]
-    control.apply("usual", "1 DN")
+    control.apply("usual", ONE_DN)
     assert bench.rig.state.choice.value == TWIN
 
 
 def test_while_a_scan_runs_effects_stay(control: EffectsController, bench: ScanBench) -> None:
     bench.state.phase.set(Phase.RUNNING)
-    control.apply("all", "1 DN")
+    control.apply("all", ONE_DN)
     assert bench.rig.state.choice.value == TWIN
     assert "A scan is running" in bench.notifier.told[-1][1]
 
 
 def test_a_choice_that_makes_no_sense_is_told(control: EffectsController, bench: ScanBench) -> None:
-    control.look("magic", "1 DN")
+    control.look("magic", ONE_DN)
     assert "no effect 'magic'" in bench.notifier.told[-1][1]
 
 
@@ -118,6 +120,21 @@ def test_the_panel_shows_the_choice_and_what_it_saves(panel: EffectsPanel) -> No
     assert panel.tolerance.isVisible()
     assert "changes no pixel" in panel._summary.text()
     assert "are saved" in panel._saved.text()
+
+
+def test_the_tolerance_of_the_rig_is_shown_and_is_nothing_to_apply(
+    panel: EffectsPanel, bench: ScanBench
+) -> None:
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("effects", "auto"), ("tolerance", "0.005sigma"))))
+    assert (panel.tolerance.value(), panel.unit.currentText()) == (0.005, "σ")
+    assert not panel.apply.isEnabled()
+    panel.tolerance.setValue(0.25)
+    assert panel.apply.isEnabled()
+
+
+def test_a_tolerance_that_makes_no_sense_is_told(control: EffectsController, bench: ScanBench) -> None:
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("effects", "auto"), ("tolerance", "1e-05"))))
+    assert "must be a number of DN or of sigmas" in bench.notifier.told[-1][1]
 
 
 def test_ticking_an_effect_chooses_by_name_and_apply_renders_it(

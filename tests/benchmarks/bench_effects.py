@@ -20,7 +20,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.simulation.effects.catalogue import EFFECTS, NAMES, Choice, with_effects
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath, View
-from dsl_core.simulation.effects.planner import Tolerance, plan_effects
+from dsl_core.simulation.effects.planner import plan_effects
+from dsl_core.simulation.effects.tolerance import Tolerance
 from dsl_core.simulation.effects.view import make_view
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig

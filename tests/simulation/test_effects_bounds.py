@@ -13,8 +13,9 @@ from dsl_core.optics.led_cycle import led_weights
 from dsl_core.simulation.effects.catalogue import EFFECTS, Choice
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.effects.planner import EffectPlan, Tolerance, plan_effects
+from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
 from dsl_core.simulation.effects.projector_light import largest_deviation
+from dsl_core.simulation.effects.tolerance import Tolerance
 from dsl_core.simulation.effects.view import make_view
 from tests.cases.effect_scenes import (
     CALLS_FOR,

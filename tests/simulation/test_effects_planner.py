@@ -12,7 +12,8 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.plan import Setting
 from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, Choice, with_effects
 from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.planner import EffectPlan, Tolerance, describe, plan_effects
+from dsl_core.simulation.effects.planner import EffectPlan, describe, plan_effects
+from dsl_core.simulation.effects.tolerance import Tolerance
 from dsl_core.simulation.renderer import Renderer
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from dsl_core.simulation.world import World
@@ -92,6 +93,12 @@ def test_texts_of_choices() -> None:
 def test_bad_tolerances_are_refused(text: str) -> None:
     with pytest.raises(DeviceError, match=r"0\.5DN"):
         Tolerance.of(text)
+
+
+@pytest.mark.parametrize("value", [1.0, 0.5, 1e-5, 0.1 + 0.2, 12345678.0])
+def test_a_tolerance_is_read_as_it_is_written(value: float) -> None:
+    for tolerance in (Tolerance(value), Tolerance(value, "sigma")):
+        assert Tolerance.of(str(tolerance)) == tolerance
 
 
 def world_in(rig: DeviceRig) -> World:

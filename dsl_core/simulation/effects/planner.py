@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from dsl_core.errors import DeviceError
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.simulation.effects.base import Effect
 from dsl_core.simulation.effects.bound import EffectBound
@@ -14,39 +12,7 @@ from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.machine import PLAIN_MS, PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import LightPath
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """How far a picture may be from that with all effects, in counts or in noise of a dark pixel."""
-
-    value: float = 1.0
-    unit: str = "DN"
-
-    @classmethod
-    def of(cls, text: str) -> Tolerance:
-        """A tolerance from ``1``, ``0.5 DN`` or ``2 sigma``; raises `DeviceError`.
-
-        >>> Tolerance.of("0.5 sigma")
-        Tolerance(value=0.5, unit='sigma')
-        """
-        match = re.fullmatch(r"\s*(\d+\.?\d*|\.\d+)\s*(DN|sigmas?)?\s*", text, re.IGNORECASE)
-        if match is None:
-            raise DeviceError(
-                f"The tolerance of effects must be a number of DN or of sigmas, like 1, 0.5DN or 2sigma, not"
-                f" {text!r}."
-            )
-        return cls(float(match[1]), "sigma" if (match[2] or "").lower().startswith("sigma") else "DN")
-
-    def of_bound(self, bound: EffectBound) -> float:
-        """A bound in the tolerance's unit."""
-        return bound.sigmas if self.unit == "sigma" else bound.dn
-
-    def __str__(self) -> str:
-        return f"{self.value:g} {self.unit}"
-
-
-ONE_DN = Tolerance()
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
 
 @dataclass(frozen=True)
