@@ -6,13 +6,10 @@ from collections.abc import Callable
 from typing import Protocol
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QShowEvent
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
     QHBoxLayout,
-    QHeaderView,
     QPushButton,
-    QTableWidget,
     QTableWidgetItem,
     QVBoxLayout,
     QWidget,
@@ -22,6 +19,7 @@ from app.state.effects import EffectRow, EffectsState, EffectsView, Wanted
 from app.state.evented import Value
 from app.theme import DARK, Theme
 from app.widgets.forms import ChoiceBox, NumberBox, label
+from app.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
 _COLUMNS = ("Effect", "At most", "In σ", "A frame", "Why")
@@ -187,17 +185,17 @@ class EffectsPanel(QWidget):
     def _cells(self, row: EffectRow) -> tuple[QTableWidgetItem, ...]:
         theme = self._theme
         colour = theme.text if row.on else theme.muted
-        first = _item(row.name, colour)
+        first = cell(row.name, colour)
         first.setToolTip(row.what)
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         first.setFlags(flags if row.needed else flags | Qt.ItemFlag.ItemIsUserCheckable)
         first.setCheckState(Qt.CheckState.Checked if row.on else Qt.CheckState.Unchecked)
         cost = f"{1e3 * row.cost_s:.1f} ms" if row.cost_s else "–"
         numbers = tuple(
-            _item(text, colour, right=True)
+            cell(text, colour, RIGHT)
             for text in (f"{number(row.bound_dn)} DN", f"{number(row.bound_sigmas)} σ", cost)
         )
-        return (first, *numbers, _item(row.why, colour))
+        return (first, *numbers, cell(row.why, colour))
 
     def _show_state(self) -> None:
         state, view = self._state, self._state.view.value
@@ -248,29 +246,7 @@ def number(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def _item(text: str, colour: str, right: bool = False) -> QTableWidgetItem:
-    item = QTableWidgetItem(text)
-    item.setForeground(QColor(colour))
-    item.setToolTip(text)
-    side = Qt.AlignmentFlag.AlignRight if right else Qt.AlignmentFlag.AlignLeft
-    item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-    return item
-
-
-def _table() -> QTableWidget:
-    table = QTableWidget(0, len(_COLUMNS))
-    table.setAccessibleName("Effects of the simulated rig")
-    table.setToolTip("Tick effects to choose them by name")
-    table.setHorizontalHeaderLabels(_COLUMNS)
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-    table.setTabKeyNavigation(False)
-    table.setWordWrap(True)
-    table.setShowGrid(False)
-    table.verticalHeader().hide()
-    header = table.horizontalHeader()
-    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    header.setSectionResizeMode(len(_COLUMNS) - 1, QHeaderView.ResizeMode.Stretch)
-    header.sectionResized.connect(lambda *_: table.resizeRowsToContents())
+def _table() -> ReadTable:
+    table = ReadTable("Effects of the simulated rig", "Tick effects to choose them by name", _COLUMNS)
+    table.wrap(len(_COLUMNS) - 1)
     return table

@@ -13,8 +13,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QHeaderView,
     QPushButton,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -24,6 +22,7 @@ from app.panels.operating_curve import OperatingCurve
 from app.state.forecast import ForecastState, Foreseen, identity
 from app.theme import Theme
 from app.widgets.forms import ChoiceBox, NumberBox, label
+from app.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
 #: How often news of the predictions is fetched, ms.
 FETCH_MS = 200
@@ -31,6 +30,7 @@ BUDGET, ERROR = "budget", "error"
 #: Height of a row of the table.
 ROW_PX = 19
 NOTHING_YET = "Nothing is predicted yet. It takes a connected rig with a calibration, and no scan under way."
+_HEADS = ("Expected of", "This plan", "Published", "Last scan")
 CHART = "a Color Checker at 700 mm"
 
 
@@ -160,9 +160,8 @@ class ForecastPanel(QWidget):
         state = self._state
         shown = self._pointed or state.current.value
         scan, published = state.measured.value, state.published
-        title = "This plan" if self._pointed is None else "Pointed at"
-        names = ("Expected of", title, "Published", "Last scan")
-        self.table.setHorizontalHeaderLabels(names)
+        title = _HEADS[1] if self._pointed is None else "Pointed at"
+        self.table.setHorizontalHeaderLabels((_HEADS[0], title, *_HEADS[2:]))
         self._tell_scan(shown)
         expected = None if shown is None else shown.expected
         best = None if published is None else published.expected
@@ -227,37 +226,30 @@ class ForecastPanel(QWidget):
         self._commands.close()
 
 
-def _table() -> QTableWidget:
-    table = QTableWidget(len(FIGURES), 4)
-    table.setAccessibleName("Expected figures")
-    table.setToolTip(
-        "What is expected of the plan and of the published one, and what the last scan really was"
+def _table() -> ReadTable:
+    table = ReadTable(
+        "Expected figures",
+        "What is expected of the plan and of the published one, and what the last scan really was",
+        _HEADS,
+        rows=len(FIGURES),
     )
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
     table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-    table.setTabKeyNavigation(False)
-    table.setShowGrid(False)
     table.setFrameShape(QFrame.Shape.NoFrame)
     table.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    table.verticalHeader().hide()
     table.verticalHeader().setDefaultSectionSize(ROW_PX)
     table.verticalHeader().setMinimumSectionSize(ROW_PX)
     header = table.horizontalHeader()
-    header.setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
-    header.setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
+    header.setDefaultAlignment(RIGHT)
+    for column in range(1, len(_HEADS)):
+        header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
     header.setHighlightSections(False)
-    right = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-    header.setDefaultAlignment(right)
     for row, figure in enumerate(FIGURES):
-        for column in range(4):
-            item = QTableWidgetItem(figure.title if column == 0 else "")
+        for column in range(len(_HEADS)):
+            item = cell(figure.title if column == 0 else "", side=RIGHT if column else LEFT)
             item.setToolTip(figure.tip)
-            if column:
-                item.setTextAlignment(right)
             table.setItem(row, column, item)
-    table.setHorizontalHeaderLabels(("Expected of", "This plan", "Published", "Last scan"))
     first = table.horizontalHeaderItem(0)
     if first is not None:
-        first.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        first.setTextAlignment(LEFT)
     table.setFixedHeight(header.sizeHint().height() + len(FIGURES) * ROW_PX + 4)
     return table

@@ -12,11 +12,9 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGroupBox,
     QHBoxLayout,
-    QHeaderView,
     QMessageBox,
     QPushButton,
     QSplitter,
-    QTableWidget,
     QTableWidgetItem,
     QTextBrowser,
     QVBoxLayout,
@@ -26,6 +24,7 @@ from app.panels.calibrate_commands import LibraryCommands
 from app.panels.library_words import NOTHING, details_of
 from app.state.calibrate import CalibrateState
 from app.widgets.forms import label
+from app.widgets.read_table import ReadTable
 from dsl_core.io.calibration_library import LibraryLine
 
 _COLUMNS = ("Name", "Stored", "Use", "Camera", "Projector", "Outside limits")
@@ -202,21 +201,12 @@ class LibraryPanel(QGroupBox):
             self._commands.take_in(Path(name))
 
 
-def _table() -> QTableWidget:
-    table = QTableWidget(0, len(_COLUMNS))
-    table.setAccessibleName("Calibrations of this computer")
-    table.setToolTip("Every version of every calibration, the newest first")
-    table.setHorizontalHeaderLabels(_COLUMNS)
-    table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-    table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+def _table() -> ReadTable:
+    table = ReadTable(
+        "Calibrations of this computer", "Every version of every calibration, the newest first", _COLUMNS
+    )
     table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-    table.setTabKeyNavigation(False)
-    table.setShowGrid(False)
-    table.verticalHeader().hide()
-    header = table.horizontalHeader()
-    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-    header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-    header.setStretchLastSection(True)
+    table.horizontalHeader().setStretchLastSection(True)
     return table
 
 

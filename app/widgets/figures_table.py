@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
+from PySide6.QtWidgets import QHeaderView, QTableWidgetItem
 
 from app.theme import DARK, Theme
+from app.widgets.read_table import ReadTable, cell
 from dsl_core.model.figure import Figure
 
 _COLUMNS = ("", "Figure", "Value", "Wanted", "What to do")
@@ -18,28 +18,16 @@ _MARK_PX = 26
 _SIGN = re.compile(r"(?<!\w)-(?=\d)")
 
 
-class FiguresTable(QTableWidget):
+class FiguresTable(ReadTable):
     """A row a figure: whether it passes, value ± standard deviation with unit, limits, advice."""
 
     def __init__(self, name: str) -> None:
-        super().__init__(0, len(_COLUMNS))
+        super().__init__(name, "Values with their standard deviation, against their limits", _COLUMNS)
         self._theme, self._figures = DARK, tuple[Figure, ...]()
-        self.setAccessibleName(name)
-        self.setToolTip("Values with their standard deviation, against their limits")
-        self.setHorizontalHeaderLabels(_COLUMNS)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setTabKeyNavigation(False)
-        self.setWordWrap(True)
-        self.setShowGrid(False)
-        self.verticalHeader().hide()
         header = self.horizontalHeader()
-        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
         header.resizeSection(0, _MARK_PX)
-        header.setSectionResizeMode(4, QHeaderView.ResizeMode.Stretch)
-        header.sectionResized.connect(lambda *_: self.resizeRowsToContents())
+        self.wrap(len(_COLUMNS) - 1)
 
     def show_figures(self, figures: Sequence[Figure]) -> None:
         """Show figures in their order."""
@@ -60,17 +48,17 @@ class FiguresTable(QTableWidget):
         colour = theme.text if not limited else (theme.good if figure.passed else theme.bad)
         mark = "" if not limited else ("✓" if figure.passed else "✗")
         advice = "" if figure.passed else figure.advice
-        first = _item(mark, colour)
+        first = cell(mark, colour)
         first.setData(
             Qt.ItemDataRole.AccessibleTextRole,
             "" if not limited else ("passed" if figure.passed else "missed"),
         )
         return (
             first,
-            _item(_SIGN.sub("−", figure.name), theme.text),
-            _item(value_words(figure), colour if not figure.passed else theme.text),
-            _item(figure.limits.replace("-", "−"), theme.muted),
-            _item(advice, theme.text),
+            cell(_SIGN.sub("−", figure.name), theme.text),
+            cell(value_words(figure), colour if not figure.passed else theme.text),
+            cell(figure.limits.replace("-", "−"), theme.muted),
+            cell(advice, theme.text),
         )
 
 
@@ -85,12 +73,3 @@ def value_words(figure: Figure) -> str:
     if figure.std is None and figure.unit == "" and figure.value == round(figure.value):
         return f"{figure.value:.0f}".replace("-", "−")
     return str(figure).removeprefix(figure.name).strip().replace("-", "−")
-
-
-def _item(text: str, colour: str) -> QTableWidgetItem:
-    item = QTableWidgetItem(text)
-    item.setForeground(QColor(colour))
-    item.setTextAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-    if text:
-        item.setToolTip(text)
-    return item

@@ -14,12 +14,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, QThreadPool, QTimer, Signal
 from PySide6.QtGui import QColor, QFont, QShowEvent
 from PySide6.QtWidgets import (
-    QAbstractItemView,
-    QHeaderView,
     QLabel,
     QStackedLayout,
-    QTableWidget,
-    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -27,6 +23,7 @@ from PySide6.QtWidgets import (
 from app.theme import DARK, Theme
 from app.widgets.forms import label
 from app.widgets.plots import calm_plot, theme_plots
+from app.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
 Floats = NDArray[np.floating[Any]]
 #: A name of the legend with its colour (``#rrggbb``) and the sign that stands for it.
@@ -164,28 +161,19 @@ class Cell:
     role: str = ""
 
 
-class NumberTable(QTableWidget):
+class NumberTable(ReadTable):
     """Rows of numbers in figures of equal width, right-aligned below their heads; nothing to edit."""
 
     def __init__(self, name: str, heads: Sequence[tuple[str, str]], words: Sequence[int] = (0,)) -> None:
         """``heads`` are names and tool tips of the columns; ``words`` are those that hold words."""
-        super().__init__(0, len(heads))
+        super().__init__(name, "", [head for head, _ in heads])
         self._theme, self._words, self._rows = DARK, set(words), list[list[Cell]]()
-        self.setAccessibleName(name)
-        self.setHorizontalHeaderLabels([head for head, _ in heads])
         for column, (_, tip) in enumerate(heads):
             head = self.horizontalHeaderItem(column)
             assert head is not None
             head.setToolTip(tip)
-            side = Qt.AlignmentFlag.AlignLeft if column in self._words else Qt.AlignmentFlag.AlignRight
-            head.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setTabKeyNavigation(False)
-        self.setShowGrid(False)
-        self.verticalHeader().hide()
+            head.setTextAlignment(LEFT if column in self._words else RIGHT)
         self.verticalHeader().setDefaultSectionSize(22)
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         self.horizontalHeader().setStretchLastSection(len(heads) - 1 in self._words)
         self.setStyleSheet("QTableView::item { padding: 0px 6px; }")
         font = self.font()
@@ -197,13 +185,10 @@ class NumberTable(QTableWidget):
         self._rows = [[each if isinstance(each, Cell) else Cell(each) for each in row] for row in rows]
         self.setRowCount(len(rows))
         for i, row in enumerate(self._rows):
-            for column, cell in enumerate(row):
+            for column, each in enumerate(row):
                 words = column in self._words
-                item = QTableWidgetItem(cell.text if words else cell.text.replace("-", "−"))
-                side = Qt.AlignmentFlag.AlignLeft if words else Qt.AlignmentFlag.AlignRight
-                item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-                item.setToolTip(cell.text if words else "")
-                self.setItem(i, column, item)
+                text = each.text if words else each.text.replace("-", "−")
+                self.setItem(i, column, cell(text, side=LEFT if words else RIGHT))
         self._colour()
 
     def row_texts(self, row: int) -> list[str]:
@@ -215,10 +200,10 @@ class NumberTable(QTableWidget):
         theme = self._theme
         colours = {"": theme.text, "good": theme.good, "warn": theme.warn, "bad": theme.bad}
         for i, row in enumerate(self._rows):
-            for column, cell in enumerate(row):
+            for column, each in enumerate(row):
                 item = self.item(i, column)
                 if item is not None:
-                    item.setForeground(QColor(colours.get(cell.role, theme.muted)))
+                    item.setForeground(QColor(colours.get(each.role, theme.muted)))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
