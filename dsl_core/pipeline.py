@@ -163,6 +163,7 @@ def reconstruct(
             refine_columns=options.refine_columns,
             surface_window_px=options.surface_window_px,
             device=options.device,
+            progress=progress,
         )
         require_pixels(geometry.flags)
     spectra = None

@@ -43,7 +43,7 @@ def diffuser_lines(
     code, white = decode_columns(merged, progress)
     require_light(white.radiance, white.saturated)
     stack = stack_lines(merged, progress)
-    geometry = reconstruct_geometry(rig, plan, code, white, stack)
+    geometry = reconstruct_geometry(rig, plan, code, white, stack, progress=progress)
     require_pixels(geometry.flags)
     known = known_pixels(geometry)
     # One plane for all pixels: its shading has none of the noise of normals of single pixels.

@@ -26,7 +26,8 @@ def zero_order_columns(source: FrameSource, rig: Rig, progress: Progress | None 
     merged = MergedScan(source, certain)
     code, white = decode_columns(merged, progress)
     require_light(white.radiance, white.saturated)
-    geometry = reconstruct_geometry(certain, plan, code, white, stack_lines(merged, progress))
+    stack = stack_lines(merged, progress)
+    geometry = reconstruct_geometry(certain, plan, code, white, stack, progress=progress)
     require_pixels(geometry.flags)
     invalid = (geometry.flags & int(DEPTH_INVALID)) != 0
     return tile_columns(np.where(invalid, np.nan, geometry.column_px), geometry.column_std_px)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.progress import Progress
 from dsl_core.reconstruction.column_maps import ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.hdr import MergedFrame
 
@@ -35,7 +36,9 @@ class Settled:
     disagree: Bools
 
 
-def settle(code: DecodedCode, maps: ColumnMaps, finder: ColumnFinder, lit: Bools) -> Settled:
+def settle(
+    code: DecodedCode, maps: ColumnMaps, finder: ColumnFinder, lit: Bools, progress: Progress | None = None
+) -> Settled:
     """Put the better of both answers into the maps of all pixels; ``lit`` (P,) are worth it."""
     straight = np.zeros(lit.size, bool) if code.straight is None else code.straight.ravel().copy()
     disagree = np.zeros(lit.size, bool)
@@ -49,7 +52,7 @@ def settle(code: DecodedCode, maps: ColumnMaps, finder: ColumnFinder, lit: Bools
         disagree[disputed] = ~sound
         return Settled(straight, disagree)
     first = maps.of(disputed)
-    second = finder.find(disputed, rival[disputed].astype(np.float32))
+    second = finder.find(disputed, rival[disputed].astype(np.float32), progress=progress)
     one = has_peak(first, disputed, finder.white, np.where(sound, 0.0, DISPUTED_SHARE))
     two = has_peak(second, disputed, finder.white, DISPUTED_SHARE)
     ratio = second.amplitude / np.maximum(first.amplitude, 1e-30)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -11,12 +10,14 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import Column, dark_offset, refine
 from dsl_core.reconstruction.depth import triangulate
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.pattern_column import refine_by_profiles
+from dsl_core.solve.many import Check, work_through
 
 CHUNK = 16384
 Floats = NDArray[np.float32]
@@ -69,11 +70,17 @@ class ColumnFinder:
     profiles: NDArray[np.float64] | None
     device: str = "cpu"
 
-    def find(self, pixels: Indices, start_px: Floats, start_std_px: Floats | None = None) -> ColumnMaps:
+    def find(
+        self,
+        pixels: Indices,
+        start_px: Floats,
+        start_std_px: Floats | None = None,
+        progress: Progress | None = None,
+    ) -> ColumnMaps:
         """Columns of pixels (P,), flat indices, from decoded ones (P,) and what those are sure to."""
         maps = ColumnMaps.empty(len(pixels))
 
-        def work(start: int) -> None:
+        def work(start: int, _: Check) -> None:
             part = slice(start, min(start + CHUNK, len(pixels)))
             std = None if start_std_px is None else start_std_px[part]
             maps.put(part, self._chunk(pixels[part], start_px[part], std))
@@ -81,8 +88,7 @@ class ColumnFinder:
         before = torch.get_num_threads()
         torch.set_num_threads(1)
         try:
-            with ThreadPoolExecutor(2) as pool:
-                list(pool.map(work, range(0, len(pixels), CHUNK)))
+            work_through(work, range(0, len(pixels), CHUNK), 2, "columns", progress or NoProgress())
         finally:
             torch.set_num_threads(before)
         return maps

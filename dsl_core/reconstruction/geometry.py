@@ -12,6 +12,7 @@ from dsl_core.model.result import DEPTH_INVALID, Flag
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.progress import Progress
 from dsl_core.reconstruction.code_dispute import Settled, has_peak, is_dark, settle
 from dsl_core.reconstruction.column_maps import WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.hdr import MergedFrame
@@ -55,6 +56,7 @@ def reconstruct_geometry(
     refine_columns: bool = True,
     surface_window_px: int | None = None,
     device: str = "cpu",
+    progress: Progress | None = None,
 ) -> Geometry:
     """Refine decoded columns on the frames of the spectral patterns, triangulate, and fit the surface.
 
@@ -65,9 +67,9 @@ def reconstruct_geometry(
     profiles = radiance_profiles(rig, plan) if refine_columns and plan.spectral_count else None
     finder = ColumnFinder(rig, white, stack, lines, profiles, device)
     start_px, start_std_px = _start(code)
-    maps = finder.find(np.arange(start_px.size), start_px, start_std_px)
+    maps = finder.find(np.arange(start_px.size), start_px, start_std_px, progress)
     lit = _lit(white)
-    settled = settle(code, maps, finder, lit)
+    settled = settle(code, maps, finder, lit, progress)
     dq = np.hypot(maps.column_std_px, rig.column_std_px)
     flags = _flags(rig, code, white, maps, settled, lit, profiles is not None)
     good = (flags & int(DEPTH_INVALID)) == 0

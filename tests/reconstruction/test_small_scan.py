@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -9,13 +11,16 @@ from numpy.typing import NDArray
 from dsl_core import pipeline, sessions
 from dsl_core.calibration.correspondence import fit_grid, sample_grating
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import PlanError
+from dsl_core.errors import Cancelled, PlanError
 from dsl_core.evaluation.summary import Evaluation
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.result import build_result
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.progress import CallbackProgress, CancelToken
+from dsl_core.reconstruction import column_maps
+from dsl_core.reconstruction.column_maps import ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectra import SpectralReconstruction
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
@@ -28,6 +33,11 @@ def scanned() -> tuple[DeviceRig, MemoryScan]:
     """A plane of the ColorChecker's patches at 112 x 72 pixels."""
     plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
     return twin_scan(plan, size="112x72", scene="color-checker")
+
+
+def calibration_of(devices: DeviceRig) -> Rig:
+    assert devices.calibration is not None
+    return devices.calibration
 
 
 def grid_rig(rig: Rig) -> Rig:
@@ -54,6 +64,27 @@ def test_both_correspondence_models_give_the_same_spectra(scanned: tuple[DeviceR
     assert np.isfinite(difference).mean() > 0.5
     assert np.nanmedian(difference) < 0.01
     assert np.nanmax(difference) > 0
+
+
+def test_a_cancel_while_columns_are_refined_leaves_the_other_chunks(
+    scanned: tuple[DeviceRig, MemoryScan], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    devices, scan = scanned
+    begun, find, token = list[int](), ColumnFinder._chunk, CancelToken()
+
+    def chunk(finder: ColumnFinder, *given: Any) -> ColumnMaps:
+        begun.append(len(given[0]))
+        return find(finder, *given)
+
+    def cancel(stage: str, done: int, total: int) -> None:
+        if stage == "columns":
+            token.cancel()
+
+    monkeypatch.setattr(column_maps, "CHUNK", 100)
+    monkeypatch.setattr(ColumnFinder, "_chunk", chunk)
+    with pytest.raises(Cancelled, match="columns"):
+        pipeline.reconstruct(scan, calibration_of(devices), progress=CallbackProgress(cancel, token))
+    assert 0 < len(begun) < 8064 // 100
 
 
 def test_published_objective_is_close_and_the_banded_solver_closer(
