@@ -16,7 +16,7 @@ NOTHING = "–"
 
 @dataclass(frozen=True)
 class ForecastFigure:
-    """A figure: its field in `Prediction` and in `Measured` (empty: measured nowhere), and how it reads."""
+    """A figure: its field in `Prediction`, how it reads, and its field in `Measured` if that is another."""
 
     field: str
     title: str
@@ -30,7 +30,7 @@ class ForecastFigure:
 
     def found(self, scan: Measured | None) -> str:
         """The measured value as it reads."""
-        return _words(self, None if scan is None or not self.measured else getattr(scan, self.measured))
+        return _words(self, None if scan is None else getattr(scan, self.measured or self.field))
 
 
 def _words(figure: ForecastFigure, value: float | None) -> str:
@@ -55,52 +55,39 @@ def volume(count: float) -> str:
     return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{count / 1e6:.0f} MB"
 
 
-def _reflectance(value: float) -> str:
-    return f"{value:.4f}"
-
-
 FIGURES: tuple[ForecastFigure, ...] = (
     ForecastFigure(
-        "rmse", "Reflectance, patch", "RMSE over the bands of the mean spectrum of a patch",
-        _reflectance, "rmse",
+        "rmse", "Reflectance, patch", "RMSE over the bands of the mean spectrum of a patch", "{:.4f}".format
     ),
     ForecastFigure(
-        "pixel_rmse", "Reflectance, pixel", "RMSE over the bands of single pixels",
-        _reflectance, "pixel_rmse",
+        "pixel_rmse", "Reflectance, pixel", "RMSE over the bands of single pixels", "{:.4f}".format
     ),
     ForecastFigure(
         "pixel_angle_rad", "Angle, pixel", "Angle between measured and true spectrum of single pixels",
-        lambda value: f"{value:.3f} rad", "pixel_angle_rad",
+        "{:.3f} rad".format,
     ),
+    ForecastFigure("delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means", "{:.2f}".format),
     ForecastFigure(
-        "delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means",
-        lambda value: f"{value:.2f}", "delta_e",
-    ),
-    ForecastFigure(
-        "fwhm_nm", "Width of 10 nm", "How wide a filter of 10 nm looks (FWHM)",
-        lambda value: f"{value:.1f} nm", "fwhm_nm",
+        "fwhm_nm", "Width of 10 nm", "How wide a filter of 10 nm looks (FWHM)", "{:.1f} nm".format
     ),
     ForecastFigure(
         "depth_std_mm", "Depth, pixel", "Error of depth of single pixels, without that of the calibration",
-        lambda value: f"{value:.2f} mm", "depth_rmse_mm",
+        "{:.2f} mm".format, "depth_rmse_mm",
     ),
     ForecastFigure(
         "coverage", "Coverage",
         "Expected: share of the picture that gets a depth. Measured: share of what is lit",
-        lambda value: f"{100 * value:.0f} %", "coverage",
+        lambda value: f"{100 * value:.0f} %",
     ),
-    ForecastFigure(
-        "frames", "Frames", "All exposures, code and black among them",
-        lambda value: f"{value:.0f}", "frames",
-    ),
+    ForecastFigure("frames", "Frames", "All exposures, code and black among them", "{:.0f}".format),
     ForecastFigure(
         "seconds", "Capture",
         "Exposures and the projector's latency. A simulated rig does not wait, so that its time is not shown",
-        minutes, "seconds",
+        minutes,
     ),
     ForecastFigure(
         "computing_s", "Computing", "Reconstruction; expected on a machine like the one that was measured",
-        minutes, "computing_s",
+        minutes,
     ),
-    ForecastFigure("raw_bytes", "Raw data", "Frames before compression", volume, "raw_bytes"),
+    ForecastFigure("raw_bytes", "Raw data", "Frames before compression", volume),
 )  # fmt: skip

@@ -19,8 +19,10 @@ from app.state.wizard import WizardState
 from app.views import RecordingNotifier
 from dsl_core.campaign.recipe import Recipe
 from dsl_core.campaign.recipes import _build
+from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.rig import Rig
 from tests.cases.fake_recipe import FakeGeometry, FakeSelfTest
 
 SMALL = RigChoice("twin", (("scene", "plane"), ("size", "32x24")))
@@ -48,6 +50,14 @@ class CalibrateBench:
     @property
     def told(self) -> str:
         return self.notifier.told[-1][1] if self.notifier.told else ""
+
+    @property
+    def calibrated(self) -> tuple[DeviceRig, Rig]:
+        """The devices that are connected, and their calibration."""
+        devices = self.rig.state.devices.value
+        assert devices is not None
+        assert devices.calibration is not None
+        return devices, devices.calibration
 
     def row(self, name: str) -> Row:
         return next(row for row in self.state.rows.value if row.name == name)

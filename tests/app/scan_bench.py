@@ -42,6 +42,14 @@ class ScanBench:
     undo: UndoStack
     library: CalibrationLibrary
 
+    @property
+    def calibration(self) -> Rig:
+        """The calibration of the rig that is connected."""
+        devices = self.rig.state.devices.value
+        assert devices is not None
+        assert devices.calibration is not None
+        return devices.calibration
+
     def plan(self, plan: CapturePlan = SHORT) -> None:
         """Plan a short scan without reconstruction."""
         self.state.then_reconstruct.set(False)
@@ -57,6 +65,14 @@ def make_bench(folder: Path, runner: JobRunner | None = None) -> ScanBench:
     clock = lambda: datetime(2026, 3, 1, 10, 20)  # noqa: E731
     scans = ScanController(state, rig, runner, notifier, undo, library, clock)
     return ScanBench(state, rig, scans, notifier, undo, library)
+
+
+def planned_bench(folder: Path) -> ScanBench:
+    """A bench with its rig connected and a short scan planned."""
+    made = make_bench(folder)
+    made.rig.connect(TWIN)
+    made.plan()
+    return made
 
 
 def make_forecast(

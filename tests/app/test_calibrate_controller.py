@@ -474,15 +474,13 @@ def test_another_devices_captures_do_not_pass(bench: CalibrateBench) -> None:
 
 
 def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) -> None:
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    assert devices.calibration is not None
+    devices, calibration = bench.calibrated
     assert bench.control.library.must_be_placed
     conditions = current_conditions(devices)
     other = conditions.model_copy(
         update={"projector": conditions.projector.model_copy(update={"mode": "6500 K"})}
     )
-    bench.library.store("other", devices.calibration.model_copy(update={"conditions": other}))
+    bench.library.store("other", calibration.model_copy(update={"conditions": other}))
     bench.control.library.check("other")
     assert "the projector's mode was 6500 K and is not named" in bench.told
     assert bench.state.drift.value is None
@@ -492,37 +490,34 @@ def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) 
     assert "No rig is connected" in bench.told
 
 
-def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(tmp_path: Path) -> None:
+@pytest.fixture
+def plane(tmp_path: Path) -> CalibrateBench:
+    """A connected twin of a flat target that can be checked for drift."""
     choice = RigChoice("twin", (("scene", "plane"), ("size", "112x72")))
-    bench = make_bench(tmp_path, choice=choice)
-    bench.rig.connect(choice)
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    assert devices.calibration is not None
-    bench.library.store("own", devices.calibration)
-    bench.control.library.check("own")
-    verdict = bench.state.drift.value
-    assert verdict is not None, bench.told
+    made = make_bench(tmp_path, choice=choice)
+    made.rig.connect(choice)
+    return made
+
+
+def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(plane: CalibrateBench) -> None:
+    _, calibration = plane.calibrated
+    plane.library.store("own", calibration)
+    plane.control.library.check("own")
+    verdict = plane.state.drift.value
+    assert verdict is not None, plane.told
     assert {figure.name for figure in verdict.figures} >= {"row drift"}
-    assert "The rig is as own says." in bench.state.note.value
+    assert "The rig is as own says." in plane.state.note.value
 
 
-def test_a_check_in_spite_of_other_settings_says_which(tmp_path: Path) -> None:
-    choice = RigChoice("twin", (("scene", "plane"), ("size", "112x72")))
-    bench = make_bench(tmp_path, choice=choice)
-    bench.rig.connect(choice)
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    assert devices.calibration is not None
+def test_a_check_in_spite_of_other_settings_says_which(plane: CalibrateBench) -> None:
+    devices, calibration = plane.calibrated
     conditions = current_conditions(devices)
     gain = conditions.camera.model_copy(update={"gain_db": 6.0})
-    other = devices.calibration.model_copy(
-        update={"conditions": conditions.model_copy(update={"camera": gain})}
-    )
-    bench.library.store("own", other)
-    bench.control.library.check("own")
-    assert "the camera's gain (dB) was 6 and is 0" in bench.told
-    bench.notifier.offers["Check all the same"]()
-    verdict = bench.state.drift.value
-    assert verdict is not None, bench.told
+    other = calibration.model_copy(update={"conditions": conditions.model_copy(update={"camera": gain})})
+    plane.library.store("own", other)
+    plane.control.library.check("own")
+    assert "the camera's gain (dB) was 6 and is 0" in plane.told
+    plane.notifier.offers["Check all the same"]()
+    verdict = plane.state.drift.value
+    assert verdict is not None, plane.told
     assert verdict.overridden == ("the camera's gain (dB) was 6 and is 0",)

@@ -19,15 +19,12 @@ from dsl_core.io.session import SessionReader
 from dsl_core.simulation.effects.catalogue import NAMES, NEEDED, USUAL
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import FRAMES, TWIN, ScanBench, make_bench
+from tests.app.scan_bench import FRAMES, TWIN, ScanBench, planned_bench
 
 
 @pytest.fixture
 def bench(tmp_path: Path) -> ScanBench:
-    made = make_bench(tmp_path)
-    made.rig.connect(TWIN)
-    made.plan()
-    return made
+    return planned_bench(tmp_path)
 
 
 @pytest.fixture

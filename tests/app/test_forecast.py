@@ -16,7 +16,7 @@ from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
 from dsl_core.planning import prediction, views
-from tests.app.scan_bench import COMB, TWIN, ScanBench, foreseen, make_bench, make_forecast
+from tests.app.scan_bench import COMB, TWIN, ScanBench, foreseen, make_bench, make_forecast, planned_bench
 from tests.app.small_result import write_small_result
 
 
@@ -26,10 +26,7 @@ def forecast(bench: ScanBench, folder: Path, automatic: bool = True) -> Forecast
 
 @pytest.fixture
 def bench(tmp_path: Path) -> ScanBench:
-    made = make_bench(tmp_path)
-    made.rig.connect(TWIN)
-    made.plan()
-    return made
+    return planned_bench(tmp_path)
 
 
 @pytest.fixture
@@ -48,11 +45,8 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    assert devices.calibration is not None
-    work = ForecastJob(Rigging(devices.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False)
-    found = work._of(COMB, ForecastStore(tmp_path, devices.calibration, 50.0), "")
+    work = ForecastJob(Rigging(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False)
+    found = work._of(COMB, ForecastStore(tmp_path, bench.calibration, 50.0), "")
     assert isinstance(found, Foreseen)
     assert found.expected.spectral_frames == 32
     assert 0 < found.expected.rmse < found.expected.pixel_rmse < 1
@@ -191,14 +185,11 @@ def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
 
 
 def test_a_damaged_store_is_made_anew(bench: ScanBench, tmp_path: Path) -> None:
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    assert devices.calibration is not None
-    store = ForecastStore(tmp_path, devices.calibration, 50.0)
+    store = ForecastStore(tmp_path, bench.calibration, 50.0)
     store._path.write_text("[1")
-    assert ForecastStore(tmp_path, devices.calibration, 50.0).find(COMB) is None
+    assert ForecastStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
     store._path.write_text('{"a": {"frames": 1}}')
-    assert ForecastStore(tmp_path, devices.calibration, 50.0).find(COMB) is None
+    assert ForecastStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
 
 
 def test_titles_have_typographic_signs() -> None:

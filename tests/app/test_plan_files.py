@@ -14,15 +14,12 @@ from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
 from dsl_core.model.presets import PRESETS
 from dsl_core.planning.designed import DesignedSet, packed, save_design
-from tests.app.scan_bench import COMB, TWIN, ScanBench, make_bench
+from tests.app.scan_bench import COMB, ScanBench, planned_bench
 
 
 @pytest.fixture
 def bench(tmp_path: Path) -> ScanBench:
-    made = make_bench(tmp_path)
-    made.rig.connect(TWIN)
-    made.plan()
-    return made
+    return planned_bench(tmp_path)
 
 
 def design(folder: Path, width_px: int = 640) -> Path:

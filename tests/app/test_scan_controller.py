@@ -15,15 +15,12 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, TWIN, ScanBench, make_bench
+from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, TWIN, ScanBench, make_bench, planned_bench
 
 
 @pytest.fixture
 def bench(tmp_path: Path) -> ScanBench:
-    made = make_bench(tmp_path)
-    made.rig.connect(TWIN)
-    made.plan()
-    return made
+    return planned_bench(tmp_path)
 
 
 def phase(bench: ScanBench) -> Phase:
