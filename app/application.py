@@ -17,7 +17,8 @@ from PySide6.QtWidgets import QApplication
 
 from app.jobs.housekeeping import LOOK_MS, Housekeeper, share_heaps
 from app.jobs.qt_runner import QtRunner
-from app.main_window import Command, MainWindow, PageMaker, Parts
+from app.main_window import Command, MainWindow, PageMaker
+from app.paged_window import Parts
 from app.panels.log import LogRecords
 from app.settings import load_settings, settings_folder
 from app.state.recent import RecentFiles

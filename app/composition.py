@@ -93,7 +93,7 @@ class Composition(QObject):
             window.parts.settings.tour_seen = True
             window.toasts.offer(
                 "New here? A tour of seven steps shows what is where; Help, Guided tour has it later too.",
-                {"Take the tour": window.do_tour},
+                {"Take the tour": lambda: window.do("tour")},
             )
 
     def rig(self, window: MainWindow) -> RigController:

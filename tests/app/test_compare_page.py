@@ -61,7 +61,7 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     assert not page.hint.isVisible()
     assert page.report.isEnabled()
     assert not page.swap.isEnabled()
-    first = page.table.item(0, 0)
+    first = page.figures.table.item(0, 0)
     assert first is not None
     assert first.text() == "Depth, RMSE per pixel"
     shapes = [item.image.shape for item in page.view.images]
@@ -71,19 +71,19 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     assert low == -high
     QTest.keyClick(page.view, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     assert state.cursor.value == (22, 24)
-    assert "column 22, row 24" in page._readout.text()
-    assert all(curve.solid.isVisible() for curve in page._curves)
+    assert "column 22, row 24" in page.bar.readout.text()
+    assert all(curve.solid.isVisible() for curve in page.figures.curves)
     page.apply_theme(DARK)
 
 
 def test_the_slider_steps_through_common_bands(qtbot: QtBot, bench: Bench, chart: Path) -> None:
     page, state, _ = bench
     with_truth(qtbot, bench, chart)
-    page.shown.setCurrentIndex(1)
-    page.shown.activated.emit(1)
+    page.bar.shown.setCurrentIndex(1)
+    page.bar.shown.activated.emit(1)
     assert state.shown.value is Shown.BAND
-    assert page.band.isVisible()
-    page.band.setFocus()
-    QTest.keyClick(page.band, Qt.Key.Key_Right)
-    assert page._nm.text() == "550 nm"
+    assert page.bar.band.isVisible()
+    page.bar.band.setFocus()
+    QTest.keyClick(page.bar.band, Qt.Key.Key_Right)
+    assert page.bar.nm.text() == "550 nm"
     assert page.view.images[0].levels[0] == 0.0

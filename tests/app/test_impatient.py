@@ -20,7 +20,8 @@ from shiboken6 import isValid
 from app.actions import PAGES
 from app.application import ExceptionHook, make_window
 from app.composition import Composition, Wish
-from app.main_window import SMALLEST, MainWindow
+from app.main_window import MainWindow
+from app.paged_window import SMALLEST
 from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
 from app.state.scan import Phase

@@ -68,7 +68,7 @@ def running(stage: Stage) -> None:
     stage.press("Pause", scan.page)
     stage.wait(lambda: scan.state.phase.value is Phase.PAUSED)
     stage.shoot("paused")
-    stage.shoot_question("closing", stage.window.do_quit)
+    stage.shoot_question("closing", lambda: stage.window.do("quit"))
     stage.press("Cancel", scan.page)
     stage.wait(lambda: scan.state.phase.value is Phase.STOPPED)
     stage.shoot("stopped")

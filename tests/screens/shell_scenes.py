@@ -70,10 +70,12 @@ def tour(stage: Stage) -> None:
     stage.open()
     stage.connect()
     stage.window.do("tour")
+    made = stage.window.findChild(Tour)
+    assert made is not None
+    ended = list[bool]()
+    made.ended.connect(lambda: ended.append(True))
     number = 0
-    while stage.window._tour is not None:
-        made = stage.window.findChild(Tour)
-        assert made is not None
+    while not ended:
         number += 1
         stage.idle()
         stage.shoot(str(number))
