@@ -70,6 +70,10 @@ def prepare_scene() -> None:
     """Import what a scene needs: seconds, in which a thread does not stop the window."""
     import pyvistaqt  # noqa: F401
 
+    # What pyvista imports no sooner than when a scene is made, in the window's thread.
+    import vtkmodules.vtkInteractionWidgets
+    import vtkmodules.vtkViewsContext2D  # noqa: F401
+
 
 def make_scene(moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> Scene:
     """The best scene that works here; ``moved`` hears of new views, ``mouse`` may take mouse events."""
@@ -101,6 +105,8 @@ class GlScene:
         # It renders when asked: neither every 200 ms nor with four samples a pixel.
         interactor: Any = QtInteractor
         self._plotter: Any = interactor(None, auto_update=False, multi_samples=0)
+        # Not even when a view is set up: the next update does it, once.
+        self._plotter.suppress_rendering = True
         self.widget: QWidget = self._plotter
         self.widget.setAccessibleName("Point cloud")
         self._cloud, self._moved = Cloud(self._plotter), moved
@@ -158,6 +164,7 @@ class GlScene:
         if not self._is_ready:
             self._waiting = points, colours
             return
+        self._waiting = None
         if self._cloud.show(points, colours):
             self.reset()
         self._is_grown = False
@@ -168,9 +175,12 @@ class GlScene:
             return
         self._is_ready = True
         self._plotter.add_axes(interactive=False, color="#808080")
-        if self._waiting is not None:
-            self.show_cloud(*self._waiting)
-            self._waiting = None
+        QTimer.singleShot(GROW_MS, self.widget, self._show_waiting)
+
+    def _show_waiting(self) -> None:
+        waiting, self._waiting = self._waiting, None
+        if waiting is not None:
+            self.show_cloud(*waiting)
         self._plotter.update()
 
     def _begin(self) -> None:

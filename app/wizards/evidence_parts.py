@@ -54,6 +54,7 @@ class ChartBox(QWidget):
         self._make = partial(calm_plot, title, tip, left, bottom, left_width)
         self._plot: Any = None
         self._draw: Callable[[], object] | None = None
+        self._is_next = False
         self.title = label(title, "heading")
         self.legend = QLabel()
         self.legend.setWordWrap(True)
@@ -78,6 +79,11 @@ class ChartBox(QWidget):
     @property
     def plot(self) -> Any:
         """The plot with all that is to be seen on it."""
+        self._make_plot()
+        self._draw_now()
+        return self._plot
+
+    def _make_plot(self) -> None:
         if self._plot is None:
             self._plot = self._make()
             self._plot.setMouseEnabled(False, False)
@@ -85,8 +91,6 @@ class ChartBox(QWidget):
             theme_plots((self._plot,), self._theme)
             self._stack.addWidget(self._plot)
             self._prepare(self._plot)
-        self._draw_now()
-        return self._plot
 
     @property
     def item(self) -> Any:
@@ -105,8 +109,22 @@ class ChartBox(QWidget):
         self._draw_soon()
 
     def _draw_soon(self) -> None:
-        seen = [box for box in self.window().findChildren(ChartBox) if box.isVisible()]
-        QTimer.singleShot(TURN_MS * (seen.index(self) if self in seen else 0), self, self._draw_now)
+        """Let the first box that waits take its turn; others follow when that is over, however long it is."""
+        boxes = self.window().findChildren(ChartBox) or [self]
+        waiting = [box for box in boxes if box.isVisible() and box._draw]
+        if waiting and not any(box._is_next for box in waiting):
+            waiting[0]._is_next = True
+            QTimer.singleShot(TURN_MS, waiting[0], waiting[0]._take_turn)
+
+    def _take_turn(self) -> None:
+        self._is_next = False
+        if self.isVisible():
+            # Making a plot takes as long as drawing on it: a turn each.
+            if self._plot is None and self._draw is not None:
+                self._make_plot()
+            else:
+                self._draw_now()
+        self._draw_soon()
 
     def _draw_now(self) -> None:
         draw, self._draw = self._draw, None

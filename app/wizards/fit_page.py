@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
 
 from app.state.wizard import Doing, Fit, WizardState
@@ -10,6 +11,7 @@ from app.theme import DARK, Theme
 from app.widgets.figures_table import FiguresTable
 from app.widgets.forms import label, set_role
 from app.wizards.evidence import Evidence, make_evidence
+from app.wizards.evidence_parts import TURN_MS
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.figure import failures
 
@@ -25,7 +27,8 @@ class FitPage(QWidget):
         super().__init__()
         self._state, self._theme = state, DARK
         self._shown: Fit | None = None
-        self.evidence: Evidence | None = None
+        self._evidence: Evidence | None = None
+        self._due: Fit | None = None
         self.verdict = label("", "heading")
         self.verdict.setWordWrap(True)
         self.verdict.setAccessibleName("Verdict on the fit")
@@ -59,43 +62,65 @@ class FitPage(QWidget):
 
     def _show_fit(self, fit: Fit | None) -> None:
         if fit is not None and fit is not self._shown:
-            if self.evidence is None:
-                self._make_evidence()
-            assert self.evidence is not None
             self.figures.show_figures(fit.fitted.figures)
-            self.evidence.show_fit(fit.fitted, fit.record, fit.session)
+            self._due = fit
+            if self.isVisible():
+                self._show_due_soon()
         if fit is None or self._shown is None or fit.fitted.figures != self._shown.fitted.figures:
             self.allow.setChecked(False)
         self._shown = fit
-        for widget in (self.evidence, self.figures):
+        if fit is None:
+            self._due = None
+        for widget in (self._evidence, self.figures):
             if widget is not None:
                 widget.setVisible(fit is not None)
         self._show_verdict()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Make the evidence that waited for somebody to look: after the page itself, as it takes as long."""
+        super().showEvent(event)
+        self._show_due_soon()
+
+    def _show_due_soon(self) -> None:
+        QTimer.singleShot(TURN_MS, self, self._show_due)
+
+    def _show_due(self) -> None:
+        fit, self._due = self._due, None
+        if fit is not None:
+            made = self._evidence or self._make_evidence()
+            made.show_fit(fit.fitted, fit.record, fit.session)
+            made.setVisible(True)
+
+    @property
+    def evidence(self) -> Evidence | None:
+        """What the fit rests on; None while there is nothing to show."""
+        self._show_due()
+        return self._evidence
 
     def _show_misfit(self, session: CalibrationSession | None) -> None:
         """Show captures that no fit came of, where a look at them helps."""
         if session is None or self._state.fit.value is not None:
             return
-        if self.evidence is None:
-            self._make_evidence()
-        assert self.evidence is not None
-        self.evidence.setVisible(self.evidence.show_captures(session))
+        made = self._evidence or self._make_evidence()
+        made.setVisible(made.show_captures(session))
 
-    def _make_evidence(self) -> None:
-        self.evidence = make_evidence(self._state.name)
-        self.evidence.apply_theme(self._theme)
-        self.evidence.settings_wanted.connect(self.settings_wanted)
-        self.evidence.setMinimumHeight(200)
-        self._split.insertWidget(0, self.evidence)
+    def _make_evidence(self) -> Evidence:
+        self._evidence = made = make_evidence(self._state.name)
+        made.apply_theme(self._theme)
+        made.settings_wanted.connect(self.settings_wanted)
+        made.setMinimumHeight(200)
+        made.setEnabled(not self._state.doing.value.is_long)
+        self._split.insertWidget(0, made)
         self._split.setStretchFactor(0, 3)
         self._split.setStretchFactor(1, 1)
         self._split.setSizes([420, 150])
+        return made
 
     def _show_verdict(self) -> None:
         fit, doing = self._state.fit.value, self._state.doing.value
         self.allow.setVisible(fit is not None and not fit.is_accepted and bool(failures(fit.fitted.figures)))
-        if self.evidence is not None:
-            self.evidence.setEnabled(not doing.is_long)
+        if self._evidence is not None:
+            self._evidence.setEnabled(not doing.is_long)
         text, role = self._words(fit, doing)
         self.verdict.setText(text)
         set_role(self.verdict, role)
@@ -121,5 +146,5 @@ class FitPage(QWidget):
         """Take the colours of a theme."""
         self._theme = theme
         self.figures.apply_theme(theme)
-        if self.evidence is not None:
-            self.evidence.apply_theme(theme)
+        if self._evidence is not None:
+            self._evidence.apply_theme(theme)

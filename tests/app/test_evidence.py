@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 
 import pytest
-from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.state.wizard import WizardState
+from app.state.wizard import Fit, WizardState
 from app.wizards.evidence import PlainEvidence, make_evidence
-from app.wizards.evidence_parts import Aside, ChartBox, NumberTable, with_spread
+from app.wizards.evidence_parts import TURN_MS, Aside, ChartBox, NumberTable, with_spread
 from app.wizards.fit_page import FitPage
 from dsl_core.campaign.recipes import recipe_names
 from dsl_core.campaign.session import CalibrationSession
@@ -21,6 +23,7 @@ from tests.app.evidence_bench import THEMES, session_of
 
 MAKE_ALL = """
 import sys
+from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication
 application = QApplication([])
 from app.theme import DARK
@@ -81,6 +84,48 @@ def test_captures_without_a_fit_are_shown_where_that_helps(
         assert page.evidence.isVisible() == helps
         assert not page.figures.isVisible()
     assert len(seen) == 1
+
+
+def test_evidence_waits_until_the_page_is_seen(qtbot: QtBot) -> None:
+    state = WizardState("another", "Another")
+    fitted = AcceptedCalibration(name="another", title="Another")
+    state.fit.set(Fit(fitted, Record(), session_of({})))
+    page = FitPage(state)
+    qtbot.addWidget(page)
+    assert page.findChildren(PlainEvidence) == []
+    page.show()
+    assert page.findChildren(PlainEvidence) == []
+    qtbot.waitUntil(lambda: bool(page.findChildren(PlainEvidence)))
+    assert page.findChildren(PlainEvidence)[0].isVisible()
+    state.fit.set(None)
+    assert not page.findChildren(PlainEvidence)[0].isVisible()
+
+
+def test_between_two_charts_the_window_comes_round(qtbot: QtBot) -> None:
+    page = QWidget()
+    qtbot.addWidget(page)
+    row, rounds, drawn = QHBoxLayout(page), list[None](), list[int]()
+    clock = QTimer(page)
+    clock.timeout.connect(lambda: rounds.append(None))
+    clock.start(0)
+
+    def draw() -> None:
+        drawn.append(len(rounds))
+        time.sleep(2.5e-3 * TURN_MS)
+
+    boxes = [ChartBox(f"Chart {i}", "A chart", "y", "x") for i in range(3)]
+    for box in boxes:
+        row.addWidget(box)
+        box.draw(draw)
+    page.show()
+    qtbot.waitUntil(lambda: len(drawn) == 3)
+    assert len(set(drawn)) == 3
+    boxes[1].hide()
+    for box in boxes:
+        box.draw(draw)
+    qtbot.waitUntil(lambda: len(drawn) == 5)
+    boxes[1].show()
+    qtbot.waitUntil(lambda: len(drawn) == 6)
 
 
 def test_only_the_latest_of_what_is_read_is_shown(qtbot: QtBot) -> None:
