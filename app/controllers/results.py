@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -276,11 +277,12 @@ class ResultsController:
 
             data, written = load_result(result.path), []
             for done, (form, path) in enumerate(targets.items()):
-                progress.report(f"write {form}", done, len(targets))
+                check = partial(progress.report, f"write {form}", done, len(targets))
+                check()
                 if form == "csv":
-                    written += export_csv(data, path, overwrite=overwrite, pixels=pixels)
+                    written += export_csv(data, path, overwrite=overwrite, pixels=pixels, check=check)
                 else:
-                    written += export(data, path, form, overwrite=overwrite)
+                    written += export(data, path, form, overwrite=overwrite, check=check)
             return written
 
         self._runner.submit(Job(f"Export {result.path.stem}", work, self._exported, self._tell))

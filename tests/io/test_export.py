@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.errors import StoreError
+from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export import export, export_csv, export_envi, export_exr, export_ply, export_png, formats
 from dsl_core.io.export.exr import linear_from_srgb
 from dsl_core.io.export.png import GREY, flags_picture
@@ -238,3 +238,20 @@ def test_every_format_says_what_the_result_lacks(tmp_path: Path, name: str) -> N
 def test_an_unknown_format(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="csv, envi, exr, ply, png"):
         export(small_result(), tmp_path / "x.las", "las")
+
+
+@pytest.mark.parametrize("name", sorted(set(formats()) - {"csv"}))
+def test_who_stops_an_export_finds_nothing_half_written(tmp_path: Path, name: str) -> None:
+    asked, least = list[None](), 0
+
+    def check() -> None:
+        asked.append(None)
+        if len(asked) == least:
+            raise Cancelled("Stopped.")
+
+    export(small_result(), tmp_path / "whole" / f"x{SUFFIX[name]}", name, check=check)
+    least = len(asked)
+    asked.clear()
+    with pytest.raises(Cancelled):
+        export(small_result(), tmp_path / "part" / f"x{SUFFIX[name]}", name, check=check)
+    assert list(tmp_path.glob("part/*")) == []

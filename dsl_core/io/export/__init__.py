@@ -2,7 +2,8 @@
 
 Every exporter writes whole files or nothing, replaces files only with ``overwrite=True``, names the scan
 and the program's version where the format has room for it, and keeps pixels without an answer
-recognisable: NaN, or what the format has in its place.
+recognisable: NaN, or what the format has in its place. ``check`` is called every second or so, and may
+raise to stop; then nothing is left behind.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
+from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,8 +37,10 @@ __all__ = [
 class Exporter(Protocol):
     """What every format offers; some take more keywords, all of them optional here."""
 
-    def __call__(self, result: xr.Dataset, path: Path, *, overwrite: bool = False) -> list[Path]:
-        """Write the result and return the files written; raises `StoreError`."""
+    def __call__(
+        self, result: xr.Dataset, path: Path, *, overwrite: bool = False, check: Check = never
+    ) -> list[Path]:
+        """Write the result and return the files written; raises `StoreError`, and what ``check`` raises."""
 
 
 def formats() -> dict[str, Exporter]:
@@ -50,9 +54,11 @@ def formats() -> dict[str, Exporter]:
     }
 
 
-def export(result: xr.Dataset, path: Path, name: str, *, overwrite: bool = False) -> list[Path]:
+def export(
+    result: xr.Dataset, path: Path, name: str, *, overwrite: bool = False, check: Check = never
+) -> list[Path]:
     """Write a result in the named format; raises `StoreError` for a name that is not in `formats`."""
     known = formats()
     if name not in known:
         raise StoreError(f"There is no export format {name!r}. Choose one of {', '.join(known)}.")
-    return known[name](result, path, overwrite=overwrite)
+    return known[name](result, path, overwrite=overwrite, check=check)

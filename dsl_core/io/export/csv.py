@@ -15,6 +15,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.model.result import Reach, reasons
+from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +39,12 @@ HEADER = (
 
 
 def export_csv(
-    result: xr.Dataset, path: Path, *, overwrite: bool = False, pixels: Sequence[Pixel] = ()
+    result: xr.Dataset,
+    path: Path,
+    *,
+    overwrite: bool = False,
+    pixels: Sequence[Pixel] = (),
+    check: Check = never,
 ) -> list[Path]:
     """Write the spectra of pixels given as (x, y).
 
@@ -55,6 +61,7 @@ def export_csv(
         writer = csv.writer(file)
         writer.writerow(HEADER)
         for pixel in pixels:
+            check()
             writer.writerows(_rows(result, pixel))
     return [path]
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from dsl_core.io.export.common import ascii_text, plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
+from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,7 +22,12 @@ IGNORE_VALUE = -9999.0
 
 
 def export_envi(
-    result: xr.Dataset, path: Path, *, overwrite: bool = False, with_std: bool = True
+    result: xr.Dataset,
+    path: Path,
+    *,
+    overwrite: bool = False,
+    with_std: bool = True,
+    check: Check = never,
 ) -> list[Path]:
     """Write ``NAME.hdr`` with its data ``NAME.img``, and ``NAME_std.*`` where the result has a deviation.
 
@@ -35,6 +41,7 @@ def export_envi(
     targets = [target for header in cubes.values() for target in (header, header.with_suffix(".img"))]
     with staged(targets, overwrite=overwrite) as drafts:
         for name, draft in zip(cubes, drafts[::2], strict=True):
+            check()
             _write_cube(result, name, draft)
     return targets
 

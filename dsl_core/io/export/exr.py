@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
+from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +31,9 @@ def channel_name(wavelength_nm: float) -> str:
     return f"T.{wavelength_nm:.6f}nm".replace(".", ",").replace(",", ".", 1)
 
 
-def export_exr(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> list[Path]:
+def export_exr(
+    result: xr.Dataset, path: Path, *, overwrite: bool = False, check: Check = never
+) -> list[Path]:
     """Write all bands, linear R, G, B and depth into one file; raises `StoreError`."""
     require_suffix(path, ".exr")
     require(result, "A spectral OpenEXR file", "reflectance", "wavelength_nm")
@@ -42,9 +45,11 @@ def export_exr(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> li
         for w, band in zip(wavelengths_nm(result), cube, strict=True)
     }
     if "rgb" in result:
+        check()
         linear = linear_from_srgb(plane(result, "rgb"))
         channels |= {name: np.ascontiguousarray(c) for name, c in zip("RGB", linear, strict=True)}
     if "depth_mm" in result:
+        check()
         channels["Z"] = np.ascontiguousarray(plane(result, "depth_mm"))
     header: dict[str, Any] = {
         **provenance(result),
@@ -55,6 +60,7 @@ def export_exr(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> li
         "depthUnit": "mm",
     }
     with staged([path], overwrite=overwrite) as (draft,):
+        check()
         try:
             OpenEXR.File(header, channels).write(str(draft))
         except (RuntimeError, ValueError, TypeError) as error:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.io.export.common import ascii_text, plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
+from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 _PLY_NAMES = {"<f4": "float", "|u1": "uchar"}
 
 
-def export_ply(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> list[Path]:
+def export_ply(
+    result: xr.Dataset, path: Path, *, overwrite: bool = False, check: Check = never
+) -> list[Path]:
     """Write the points in mm with normals, colours, spectra, depth's standard deviation and flags.
 
     What the result lacks is left out, points excepted. Raises `StoreError`.
@@ -30,9 +33,10 @@ def export_ply(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> li
     require_suffix(path, ".ply")
     require(result, "A PLY file", "points_mm")
     lit: NDArray[np.bool_] = np.asarray(np.isfinite(plane(result, "points_mm")).all(axis=0))
-    columns = _columns(result, lit)
+    columns = _columns(result, lit, check)
     table = np.empty(int(lit.sum()), [(name, column.dtype.str) for name, column in columns.items()])
     for name, column in columns.items():
+        check()
         table[name] = column
     with staged([path], overwrite=overwrite) as (draft,), draft.open("wb") as file:
         file.write(_header(table, provenance(result)))
@@ -40,7 +44,7 @@ def export_ply(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> li
     return [path]
 
 
-def _columns(result: xr.Dataset, lit: NDArray[np.bool_]) -> dict[str, NDArray[Any]]:
+def _columns(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> dict[str, NDArray[Any]]:
     """Properties in the order they are written, each with one value per lit pixel."""
     columns: dict[str, NDArray[Any]] = {}
     for name, properties in (("points_mm", ("x", "y", "z")), ("normals", ("nx", "ny", "nz"))):
@@ -51,6 +55,7 @@ def _columns(result: xr.Dataset, lit: NDArray[np.bool_]) -> dict[str, NDArray[An
         columns.update(zip(("red", "green", "blue"), np.rint(levels).astype("u1"), strict=True))
     if "reflectance" in result:
         for band, wavelength in enumerate(wavelengths_nm(result)):
+            check()
             values = np.asarray(result["reflectance"][band].values, "<f4")
             columns[f"scalar_{wavelength:g}nm"] = values[lit]
     if "depth_std_mm" in result:

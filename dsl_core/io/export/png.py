@@ -18,6 +18,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.model.result import Flag
+from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +44,12 @@ _FLAG_COLOURS = (
 
 
 def export_png(
-    result: xr.Dataset, path: Path, *, overwrite: bool = False, band_nm: float | None = None
+    result: xr.Dataset,
+    path: Path,
+    *,
+    overwrite: bool = False,
+    band_nm: float | None = None,
+    check: Check = never,
 ) -> list[Path]:
     """Write ``NAME_rgb``, ``NAME_depth``, ``NAME_550nm``, ``NAME_flags.png``, as far as the result has them.
 
@@ -66,6 +72,7 @@ def export_png(
     targets = {path.with_name(f"{path.stem}_{name}.png"): picture for name, picture in pictures.items()}
     with staged(list(targets), overwrite=overwrite) as drafts:
         for draft, picture in zip(drafts, targets.values(), strict=True):
+            check()
             draft.write_bytes(png_bytes(picture, provenance(result)))
     return list(targets)
 
