@@ -82,7 +82,7 @@ class VirtualPixels:
         seed: int = 0,
     ) -> None:
         self.rig, self.plan, self.grid, self.view = rig, plan, grid, view
-        self.prior, self.seed = prior or Prior(), seed
+        self.prior, self.seed = prior or Prior().at_step(grid.step_nm), seed
         self.shading = torch.as_tensor(view.shading, dtype=torch.float32)
         self.window_px = surface_window_px or default_window_px(rig)
         self.bands, self.bracket, self.lines = Bands.of(rig, grid), Bracket.of(rig, plan), LineSet.of(plan)

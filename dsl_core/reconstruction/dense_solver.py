@@ -26,11 +26,29 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
 
     ``data`` is (pixels, bands, bands), ``right`` (pixels, bands).
     """
-    found = _solve(data, right, prior)
+    try:
+        found = _solve(data, right, prior)
+    except torch.linalg.LinAlgError:
+        data = _semidefinite(data, prior)
+        found = _solve(data.double(), right.double(), prior)
     faint = too_faint(torch.diagonal(data, dim1=1, dim2=2).T, prior)
-    if len(faint):
+    if bool(faint.any()):
         found.put(faint, _solve(data[faint].double(), right[faint].double(), prior))
     return found
+
+
+def _semidefinite(data: Tensor, prior: Prior) -> Tensor:
+    """Equations, in double precision, without what rounding left below zero.
+
+    Bright data that leave a combination of bands open have there the rounding of the others as information,
+    which may be negative and more than the prior's. It is zero; anything else would claim knowledge.
+    """
+    data = data.double()
+    ridge = torch.eye(data.shape[1]).to(data) * prior.level_std**-2
+    broken = torch.linalg.cholesky_ex(data + ridge).info > 0
+    values, vectors = torch.linalg.eigh(data[broken])
+    data[broken] = (vectors * values.clip(min=0)[:, None]) @ vectors.mT
+    return data
 
 
 def _solve(data: Tensor, right: Tensor, prior: Prior) -> Spectra:

@@ -31,8 +31,8 @@ from dsl_core.reconstruction.spectral_system import (
 from dsl_core.solve.banded import multiply
 from dsl_core.solve.many import Check, work_through
 
-#: Pixels of a tile; even numbers keep the Bayer phase.
-TILE = (64, 96)
+#: Pixels of a tile of up to `TILE_BANDS` bands, and of the smallest; even numbers keep the Bayer phase.
+TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
 #: Pixels whose full matrices are solved at a time.
 DENSE_PIXELS = 512
 #: Relative error of the linear model (correspondence, profile, interpolation), added to each variance.
@@ -113,7 +113,7 @@ class SpectralReconstruction:
         self.bands = Bands.of(rig, grid)
         self.radiance, self.std = radiance, std
         self.lines = LineSet.of(plan)
-        self.prior = prior or Prior()
+        self.prior = prior or Prior().at_step(grid.step_nm)
         self.device, self.dtype = torch.device(device), dtype
         self.colour_weight = self._colour_weight()
 
@@ -136,9 +136,10 @@ class SpectralReconstruction:
 
     def _tiles(self) -> Iterator[tuple[slice, slice]]:
         height, width = self.pixels.valid.shape
-        for y in range(0, height, TILE[0]):
-            for x in range(0, width, TILE[1]):
-                yield slice(y, min(y + TILE[0], height)), slice(x, min(x + TILE[1], width))
+        rows, columns = tile_shape(self.bands.count)
+        for y in range(0, height, rows):
+            for x in range(0, width, columns):
+                yield slice(y, min(y + rows, height)), slice(x, min(x + columns, width))
 
     def _colour_weight(self) -> NDArray[np.float32]:
         """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed 7.1)."""
@@ -302,6 +303,15 @@ class SpectralReconstruction:
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
         out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()
         out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
+
+
+def tile_shape(bands: int) -> tuple[int, int]:
+    """Rows and columns of a tile: the equations of a pixel grow as the square of the bands."""
+    share = min(TILE_BANDS / bands, 1.0)
+    rows, columns = (
+        max(2 * int(side * share / 2), least) for side, least in zip(TILE, LEAST_TILE, strict=True)
+    )
+    return min(rows, TILE[0]), min(columns, TILE[1])
 
 
 def _joined(parts: list[Spectra]) -> Spectra:

@@ -8,7 +8,7 @@ loose prior and smooth spectra a tight one, from one setting. Bounds follow by a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import torch
 from torch import Tensor
@@ -18,6 +18,8 @@ from dsl_core.solve.many import Check, never
 
 #: Deviation between centre and mean of a band, relative to the differences of its spectrum.
 WITHIN_BAND = 1 / 36
+#: Band step that the candidates of the prior are for, nm.
+STEP_NM = 5.0
 #: Deviation against which local data are weighed in the data share.
 LOCAL_STD = 0.1
 #: How far outside a bound counts, how stiffly a bound holds, and how often bands change sides.
@@ -29,12 +31,23 @@ FAINT = 0.01
 
 @dataclass(frozen=True)
 class Prior:
-    """Candidates of the second-difference deviation, the level's mean and deviation, and the bounds."""
+    """Candidates of the second-difference deviation, the level's mean and deviation, and the bounds.
+
+    The candidates are for bands of `STEP_NM`.
+    """
 
     taus: tuple[float, ...] = (0.002, 0.0085, 0.036, 0.15, 0.6)
     level: float = 0.4
     level_std: float = 0.6
     bounds: tuple[float, float] = (0.0, 1.5)
+
+    def at_step(self, step_nm: float) -> Prior:
+        """The same belief in spectra for other bands.
+
+        Were slopes a random walk over wavelength, second differences would vary as the cube of the step.
+        """
+        scale = (step_nm / STEP_NM) ** 1.5
+        return replace(self, taus=tuple(tau * scale for tau in self.taus))
 
 
 @dataclass(frozen=True)
@@ -48,8 +61,14 @@ class Spectra:
     tau: Tensor
     at_bound: Tensor
 
+    @classmethod
+    def empty(cls, like: Tensor) -> Spectra:
+        """Spectra to be filled by `put`, for (bands, pixels) as ``like``."""
+        cubes = [torch.empty_like(like) for _ in range(4)]
+        return cls(*cubes, torch.empty_like(like[0]), torch.zeros_like(like, dtype=torch.bool))
+
     def put(self, where: Tensor, other: Spectra) -> None:
-        """Replace the pixels at some indices by those of other spectra."""
+        """Replace the pixels of a mask (pixels,) by other spectra."""
         for field in fields(self):
             mine, others = getattr(self, field.name), getattr(other, field.name)
             mine[..., where] = others.to(mine.dtype)
@@ -166,11 +185,15 @@ def solve_spectra(
     equations in reflectance; ``rows`` (bands, n, pixels) are weighted broad-band equations whose values are
     already in ``right``. ``check`` is called where this may stop.
     """
-    found = _solve(data, right, rows, prior, check)
     faint = too_faint(data[0], prior)
-    if len(faint):
-        some_rows = None if rows is None else rows[..., faint].double()
-        found.put(faint, _solve(data[..., faint].double(), right[:, faint].double(), some_rows, prior, check))
+    if not bool(faint.any()):
+        return _solve(data, right, rows, prior, check)
+    found = Spectra.empty(right)
+    for where, dtype in ((~faint, data.dtype), (faint, torch.float64)):
+        if bool(where.any()):
+            some_rows = None if rows is None else rows[..., where].to(dtype)
+            some = (data[..., where].to(dtype), right[:, where].to(dtype), some_rows)
+            found.put(where, _solve(*some, prior, check))
     return found
 
 
@@ -193,13 +216,13 @@ def _solve(data: Tensor, right: Tensor, rows: Tensor | None, prior: Prior, check
 
 
 def too_faint(information: Tensor, prior: Prior) -> Tensor:
-    """Indices of the pixels that single precision cannot solve; none in double.
+    """Mask (pixels,) of those that single precision cannot solve; none in double.
 
     ``information`` (bands, pixels) is the diagonal of the data's normal equations.
     """
     if information.dtype == torch.float64:
-        return torch.empty(0, dtype=torch.long, device=information.device)
-    return torch.nonzero(information.amax(0) * min(prior.taus) ** 2 < FAINT).ravel()
+        return torch.zeros_like(information[0], dtype=torch.bool)
+    return information.amax(0) * min(prior.taus) ** 2 < FAINT
 
 
 def band_mean(nodes: Tensor) -> Tensor:

@@ -83,22 +83,28 @@ def _for_columns(values: Tensor, right: Tensor) -> Tensor:
 
 
 def inverse_band(factor: Factor) -> Tensor:
-    """Elements of the inverse inside the band, stored like the matrix (Takahashi's recursion)."""
+    """Elements of the inverse inside the band, stored like the matrix (Takahashi's recursion).
+
+    ``block`` holds those between the ``bandwidth`` unknowns after j; unknown k has row and column k modulo
+    bandwidth, so that nothing moves when j goes on.
+    """
     bandwidth, unknowns = factor.lower.shape[0], factor.diagonal.shape[0]
-    z = torch.zeros(
-        (bandwidth + 1, *factor.diagonal.shape), dtype=factor.diagonal.dtype, device=factor.diagonal.device
-    )
+    inverse = factor.diagonal.new_zeros((bandwidth + 1, *factor.diagonal.shape))
+    if bandwidth == 0:
+        inverse[0] = 1 / factor.diagonal
+        return inverse
+    block = factor.lower.new_zeros((bandwidth, bandwidth, factor.diagonal.shape[1]))
     for j in range(unknowns - 1, -1, -1):
-        reach = min(bandwidth, unknowns - 1 - j)
-        low = factor.lower[:reach, j]
-        for a in range(1, reach + 1):
-            # Z[j, j + a] = -sum_b L[j + b, j] Z[j + b, j + a], with the symmetric element inside the band.
-            block = torch.stack([z[abs(a - b), j + min(a, b)] for b in range(1, reach + 1)])
-            z[a, j] = -(low * block).sum(0)
-        z[0, j] = 1 / factor.diagonal[j]
-        if reach:
-            z[0, j] -= (low * z[1 : reach + 1, j]).sum(0)
-    return z
+        low = factor.lower[:, j].roll(j + 1, 0)
+        # Z[j, k] = -sum_i L[i, j] Z[i, k]
+        row = torch.zeros_like(low)
+        for i in range(bandwidth):
+            row.addcmul_(block[i], low[i], value=-1)
+        inverse[0, j] = 1 / factor.diagonal[j] - (low * row).sum(0)
+        inverse[1:, j] = row.roll(-j - 1, 0)
+        row[j % bandwidth] = inverse[0, j]
+        block[j % bandwidth] = block[:, j % bandwidth] = row
+    return inverse
 
 
 def multiply(matrix: Tensor, x: Tensor) -> Tensor:

@@ -159,3 +159,40 @@ def test_a_line_under_one_band_makes_it_and_its_neighbours_less_certain() -> Non
     # The shares of 1, 4, 6, 4, 1 that a spike's fourth difference has, not those of its second.
     assert (36 * spread[3:8, 0]).tolist() == pytest.approx([1, 4, 6, 4, 1])
     assert spread[:, 1].max() < 1e-12
+
+
+def test_what_bright_data_leave_open_stays_open_in_single_precision() -> None:
+    # Sums of four neighbours at a time leave three of four bands to the prior; in single precision the
+    # rounding of these equations is more than the prior, and negative for some.
+    sums = torch.kron(torch.eye(3), torch.ones(1, 4)) * torch.tensor([[3e4], [7e4], [2e4]])
+    mixed = torch.tensor([[1.0, 0.3, -0.7], [0.1, 0.9, 0.4], [0.6, -0.2, 0.8]]) @ sums
+    truth = torch.tensor([0.2, 0.5, 0.7]).repeat_interleave(4)
+    data = (mixed.T @ mixed)[None] * torch.tensor([1.0, 0.37, 2.3])[:, None, None]
+    right = data @ truth
+    loose = Prior(taus=(6.0, 6.1, 6.2), bounds=(-9.0, 9.0))
+    with pytest.raises(torch._C._LinAlgError):
+        torch.linalg.cholesky(data + torch.eye(12) * loose.level_std**-2)
+    found = solve_dense(data, right, loose)
+    assert (found.nodes.reshape(3, 4, 3).mean(1) - torch.tensor([[0.2], [0.5], [0.7]])).abs().max() < 0.01
+    assert found.std.min() > 0.05
+
+
+def test_faint_pixels_are_solved_in_double_whoever_is_beside_them() -> None:
+    rows, values = observations(smooth_truth(), 0.05)
+    data, right = banded_equations(rows, values)
+    share = torch.tensor([1.0, 1e-6, 1.0, 1e-7, 1.0], dtype=torch.float64)
+    exact = solve_spectra(data * share, right * share, None, Prior())
+    some = solve_spectra((data * share).float(), (right * share).float(), None, Prior())
+    alone = [solve_spectra((data * share).float()[..., [i]], (right * share).float()[:, [i]], None, Prior())
+             for i in range(PIXELS)]  # fmt: skip
+    assert some.mean.dtype == torch.float32
+    assert (some.mean - exact.mean).abs().max() < 1e-3
+    for i, one in enumerate(alone):
+        assert (some.mean[:, i] - one.mean[:, 0]).abs().max() < 1e-5
+
+
+def test_a_prior_means_the_same_spectra_on_other_bands() -> None:
+    fine = Prior().at_step(2.5)
+    assert Prior().at_step(5.0) == Prior()
+    assert fine.taus == pytest.approx([tau / 8**0.5 for tau in Prior().taus])
+    assert (fine.level, fine.level_std, fine.bounds) == (Prior().level, Prior().level_std, Prior().bounds)

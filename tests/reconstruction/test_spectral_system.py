@@ -12,6 +12,7 @@ from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.image_formation import ImageFormation, OrderPath
 from dsl_core.patterns.images import spectral_profiles
 from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.spectra import LEAST_TILE, TILE, tile_shape
 from dsl_core.reconstruction.spectral_system import BandedAccumulator, Bands, band_halfwidth_px
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve import banded
@@ -66,3 +67,13 @@ def test_bands_narrower_than_a_column_leave_the_equations_positive() -> None:
     matrix = system.positive_matrix()
     matrix[0] += 2.8
     assert bool((banded.factorise(matrix).diagonal > 0).all())
+
+
+def test_tiles_shrink_with_the_bands_so_that_memory_stays() -> None:
+    assert tile_shape(51) == TILE
+    for bands in (61, 120, 231, 465):
+        rows, columns = tile_shape(bands)
+        assert LEAST_TILE[0] <= rows < TILE[0]
+        assert LEAST_TILE[1] <= columns < TILE[1]
+        assert rows % 2 == columns % 2 == 0, "the Bayer phase would change from tile to tile"
+    assert tile_shape(465) == LEAST_TILE
