@@ -28,7 +28,7 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
     """
     try:
         found = _solve(data, right, prior)
-    except torch.linalg.LinAlgError:
+    except torch.linalg.LinAlgError:  # type: ignore[attr-defined]
         data = _semidefinite(data, prior)
         found = _solve(data.double(), right.double(), prior)
     faint = too_faint(torch.diagonal(data, dim1=1, dim2=2).T, prior)
