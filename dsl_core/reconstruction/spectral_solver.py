@@ -64,8 +64,10 @@ class Spectra:
     @classmethod
     def empty(cls, like: Tensor) -> Spectra:
         """Spectra to be filled by `put`, for (bands, pixels) as ``like``."""
-        cubes = [torch.empty_like(like) for _ in range(4)]
-        return cls(*cubes, torch.empty_like(like[0]), torch.zeros_like(like, dtype=torch.bool))
+        nodes, mean, std, share = (torch.empty_like(like) for _ in range(4))
+        return cls(
+            nodes, mean, std, share, torch.empty_like(like[0]), torch.zeros_like(like, dtype=torch.bool)
+        )
 
     def put(self, where: Tensor, other: Spectra) -> None:
         """Replace the pixels of a mask (pixels,) by other spectra."""
