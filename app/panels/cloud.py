@@ -13,7 +13,7 @@ Points = NDArray[np.float32]
 COARSE = 30_000
 #: A picture at rest may take so long, s: whoever works on meanwhile must not notice it. Steps that add less
 #: than a share of what is there are not worth it.
-SLOW_S, LEAST_STEP = 0.05, 0.25
+SLOW_S, LEAST_STEP = 0.03, 0.25
 #: Points that graphics take in before one picture: a hundred thousand would stop the window.
 LARGEST_STEP = 40_000
 POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 6

@@ -12,7 +12,7 @@ from app.state.results import spectrum_of_pixel
 from app.theme import Theme
 from app.widgets.help_window import set_help
 from app.widgets.plots import calm_plot, theme_plots
-from app.widgets.read_table import LEFT, RIGHT, ReadTable, cell
+from app.widgets.read_table import RIGHT, ReadTable, cell
 from app.widgets.spectrum_curve import SpectrumCurve
 
 #: Room for the longest figure's name.
@@ -50,10 +50,12 @@ class CompareFigures(QSplitter):
 
     def _show_pair(self, pair: Pair | None) -> None:
         rows = () if pair is None else pair.rows
-        self.table.setRowCount(len(rows))
-        for i, row in enumerate(rows):
-            for column, text in enumerate((row.figure, row.value.replace("-", "−"), row.unit)):
-                self.table.setItem(i, column, cell(text, side=RIGHT if column == 1 else LEFT))
+        self.table.show_rows(
+            [
+                (cell(row.figure), cell(row.value.replace("-", "−"), side=RIGHT), cell(row.unit))
+                for row in rows
+            ]
+        )
         self._show_cursor()
 
     def _show_cursor(self) -> None:

@@ -174,12 +174,8 @@ class EffectsPanel(QWidget):
     def _show(self, view: EffectsView | None) -> None:
         rows = () if view is None else view.rows
         self.table.blockSignals(True)
-        self.table.setRowCount(len(rows))
-        for index, row in enumerate(rows):
-            for column, item in enumerate(self._cells(row)):
-                self.table.setItem(index, column, item)
+        self.table.show_rows([self._cells(row) for row in rows])
         self.table.blockSignals(False)
-        self.table.resizeRowsToContents()
         self._show_state()
 
     def _cells(self, row: EffectRow) -> tuple[QTableWidgetItem, ...]:

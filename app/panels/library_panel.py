@@ -24,7 +24,7 @@ from app.panels.calibrate_commands import LibraryCommands
 from app.panels.library_words import NOTHING, details_of
 from app.state.calibrate import CalibrateState
 from app.widgets.forms import label
-from app.widgets.read_table import ReadTable
+from app.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
 
 _COLUMNS = ("Name", "Stored", "Use", "Camera", "Projector", "Outside limits")
@@ -117,15 +117,17 @@ class LibraryPanel(QGroupBox):
 
     def _list(self, lines: tuple[LibraryLine, ...]) -> None:
         selected = max(self.table.currentRow(), 0)
-        self.table.setRowCount(len(lines))
-        for row, line in enumerate(lines):
-            for column, text in enumerate(self._texts(line)):
-                item = QTableWidgetItem(text)
-                item.setToolTip(line.error or text)
-                self.table.setItem(row, column, item)
+        self.table.show_rows([self._items(line) for line in lines])
         if lines:
             self.table.selectRow(min(selected, len(lines) - 1))
         self._select()
+
+    def _items(self, line: LibraryLine) -> list[QTableWidgetItem]:
+        items = [cell(text) for text in self._texts(line)]
+        if line.error:
+            for item in items:
+                item.setToolTip(line.error)
+        return items
 
     def _texts(self, line: LibraryLine) -> tuple[str, ...]:
         used = self._state.in_use.value in (f"{line.name}@{line.stamp}", line.name if line.is_current else "")

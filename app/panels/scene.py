@@ -110,7 +110,7 @@ class GlScene:
         self.widget: QWidget = self._plotter
         self.widget.setAccessibleName("Point cloud")
         self._cloud, self._moved = Cloud(self._plotter), moved
-        self._is_untouched = True
+        self._is_untouched, self._is_held = True, False
         self._watch = _Watch(mouse, self._resized, self.widget)
         self.widget.installEventFilter(self._watch)
         self.widget.setMouseTracking(True)
@@ -118,7 +118,7 @@ class GlScene:
         self._plotter.frameSwapped.connect(self._drawn)
         style = self._plotter.iren.interactor.GetInteractorStyle()
         style.AddObserver("StartInteractionEvent", lambda *_: self._touched())
-        style.AddObserver("EndInteractionEvent", lambda *_: self._rest())
+        style.AddObserver("EndInteractionEvent", lambda *_: self._let_go())
         self._timer = QTimer(self.widget)
         self._timer.setSingleShot(True)
         self._timer.setInterval(SETTLE_MS)
@@ -136,8 +136,12 @@ class GlScene:
         self._is_ready = False
 
     def _touched(self) -> None:
-        self._is_untouched = False
+        self._is_untouched, self._is_held = False, True
         self._be_coarse()
+
+    def _let_go(self) -> None:
+        self._is_held = False
+        self._rest()
 
     def _be_coarse(self) -> None:
         self._wanted = 0
@@ -149,6 +153,10 @@ class GlScene:
             self._cloud.reset(self.widget.width(), self.widget.height())
 
     def _rest(self) -> None:
+        if self._is_held:
+            # A marker that was moved just before, or new colours, must not slow down who turns the view.
+            self._plotter.update()
+            return
         self._cloud.be_coarse(False)
         self._wanted = 0 if self._is_grown else PICTURES
         self._plotter.update()
@@ -165,6 +173,9 @@ class GlScene:
             self._waiting = points, colours
             return
         self._waiting = None
+        # Taking a cloud in is a turn of its own, and the picture of it another.
+        self.widget.setUpdatesEnabled(False)
+        QTimer.singleShot(GROW_MS, self.widget, lambda: self.widget.setUpdatesEnabled(True))
         if self._cloud.show(points, colours):
             self.reset()
         self._is_grown = False

@@ -118,6 +118,9 @@ class ScenePanel(QWidget):
             self._flat = np.flatnonzero(np.isfinite(result["points_mm"][2]))
             self._points = np.ascontiguousarray(result["points_mm"].reshape(3, -1)[:, self._flat].T)
         self._show_hint()
+        QTimer.singleShot(STEP_MS, self, self._show_result)
+
+    def _show_result(self) -> None:
         self._paint()
         self._show_pins()
         self._show_cursor(self._state.cursor.value)

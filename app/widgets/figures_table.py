@@ -32,11 +32,7 @@ class FiguresTable(ReadTable):
     def show_figures(self, figures: Sequence[Figure]) -> None:
         """Show figures in their order."""
         self._figures = tuple(figures)
-        self.setRowCount(len(self._figures))
-        for row, figure in enumerate(self._figures):
-            for column, item in enumerate(self._items(figure)):
-                self.setItem(row, column, item)
-        self.resizeRowsToContents()
+        self.show_rows([self._items(figure) for figure in self._figures])
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

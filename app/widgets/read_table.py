@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
@@ -17,6 +17,7 @@ class ReadTable(QTableWidget):
 
     def __init__(self, name: str, tip: str, heads: Sequence[str], rows: int = 0) -> None:
         super().__init__(rows, len(heads))
+        self._wraps = False
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.setHorizontalHeaderLabels(heads)
@@ -31,10 +32,26 @@ class ReadTable(QTableWidget):
 
     def wrap(self, column: int) -> None:
         """Let a column take the room that the others leave, and break its lines."""
-        self.setWordWrap(True)
+        self._wraps = True
         header = self.horizontalHeader()
         header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
-        header.sectionResized.connect(lambda *_: self.resizeRowsToContents())
+        # All columns change one after the other; the rows follow once.
+        self.fit_rows = QTimer(self)
+        self.fit_rows.setSingleShot(True)
+        self.fit_rows.timeout.connect(self.resizeRowsToContents)
+        header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
+
+    def show_rows(self, rows: Sequence[Sequence[QTableWidgetItem]]) -> None:
+        """Show other rows; columns and rows find their sizes once, not after every item."""
+        self.setRowCount(len(rows))
+        self.model().blockSignals(True)
+        for number, row in enumerate(rows):
+            for column, item in enumerate(row):
+                self.setItem(number, column, item)
+        self.model().blockSignals(False)
+        self.model().layoutChanged.emit()
+        if self._wraps:
+            self.resizeRowsToContents()
 
 
 def cell(text: str, colour: str = "", side: Qt.AlignmentFlag = LEFT) -> QTableWidgetItem:

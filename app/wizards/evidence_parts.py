@@ -16,6 +16,7 @@ from PySide6.QtGui import QColor, QFont, QShowEvent
 from PySide6.QtWidgets import (
     QLabel,
     QStackedLayout,
+    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -201,13 +202,13 @@ class NumberTable(ReadTable):
     def fill(self, rows: Sequence[Sequence[Cell | str]]) -> None:
         """Show other rows; typographic minus signs throughout."""
         self._rows = [[each if isinstance(each, Cell) else Cell(each) for each in row] for row in rows]
-        self.setRowCount(len(rows))
-        for i, row in enumerate(self._rows):
-            for column, each in enumerate(row):
-                words = column in self._words
-                text = each.text if words else each.text.replace("-", "−")
-                self.setItem(i, column, cell(text, side=LEFT if words else RIGHT))
+        self.show_rows([[self._item(each, i) for i, each in enumerate(row)] for row in self._rows])
         self._colour()
+
+    def _item(self, each: Cell, column: int) -> QTableWidgetItem:
+        if column in self._words:
+            return cell(each.text)
+        return cell(each.text.replace("-", "−"), side=RIGHT)
 
     def row_texts(self, row: int) -> list[str]:
         """What a row says."""

@@ -24,7 +24,7 @@ from app.panels.intensity_window import ticks
 from app.panels.mark_figures import figures_of
 from app.panels.result_layers import Layers, rgb_of
 from app.panels.results_page import ResultsPage
-from app.panels.scene import GlScene, gl_works
+from app.panels.scene import SETTLE_MS, GlScene, gl_works
 from app.panels.still_scene import still_picture
 from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Tool, View
 from app.theme import DARK as DARK_THEME
@@ -413,3 +413,21 @@ def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) 
     assert bench.marks[1].runs
     QTest.qWait(400)
     assert bench.window.grab().toImage().pixelColor(5, 5).isValid()
+
+
+@pytest.mark.gl
+def test_who_turns_the_cloud_is_not_slowed_down_by_what_moved_before(bench: Bench, qtbot: QtBot) -> None:
+    if not gl_works():
+        pytest.skip("no OpenGL here")
+    bench.control.show(View.CLOUD)
+    qtbot.waitUntil(lambda: bench.page.scene.scene is not None)
+    scene = bench.page.scene.scene
+    assert isinstance(scene, GlScene)
+    qtbot.waitUntil(lambda: scene.shown > 0)
+    middle = scene.widget.rect().center()
+    scene.show_marker(np.array([0, 0, 700], np.float32), "#ff0000")
+    QTest.mousePress(scene.widget, Qt.MouseButton.LeftButton, pos=middle)
+    QTest.qWait(2 * SETTLE_MS)
+    assert scene._cloud._is_coarse
+    QTest.mouseRelease(scene.widget, Qt.MouseButton.LeftButton, pos=middle)
+    assert not scene._cloud._is_coarse
