@@ -20,6 +20,7 @@ from app.state.scan import Phase
 from app.state.wizard import Doing
 from app.wizards.wizard import CalibrationWizard
 from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.plan import LineComb
 from tests.benchmarks.stall_watch import Stalls, StallWatch
 from tests.screens.stage import Stage
 
@@ -30,6 +31,11 @@ LIVE_RIG = RigChoice("twin", (("scene", "color-checker"),))
 LIVE_S = 8.0
 #: How long a cloud grows, a step after the other.
 GROW_S = 2.0
+#: Plans tried one after the other, and for how long each, s.
+DRAGS, DRAG_S = 12, 0.2
+#: After so long what is captured or exported is cancelled, s: it is in the middle of the work then.
+CAPTURE_S, EXPORT_S = 0.15, 0.3
+ENDINGS = {"ply": "ply", "envi": "hdr", "exr": "exr", "png": "png"}
 #: How long any job may take on a machine that others keep busy, s.
 PATIENCE_S = 1800.0
 
@@ -77,6 +83,7 @@ class WindowJobs:
             "start": self._start,
             "live": self._live,
             "scan": self._scan,
+            "plan": self._plan,
             **calibrations,
             "results": self._results,
             "export": self._export,
@@ -136,6 +143,34 @@ class WindowJobs:
             self.stage.idle()
         self._reconstruct(_latest(state.target.value))
 
+    def _plan(self) -> None:
+        """Predict for plans that are dragged about, then weigh effects while a person chooses."""
+        self.stage.connect(SCAN_RIG)
+        page = self.stage.window.open_page("scan")
+        assert isinstance(page, ScanPage)
+        self.stage.idle()
+        control, forecast = self.stage.composition._scans, page.forecast
+        assert control is not None
+        page.middle.setCurrentWidget(forecast)
+        control.plans.choose_preset("reference")
+        forecast._commands.begin()  # type: ignore[attr-defined]
+        known = forecast._state.points
+        with self._job("predict while a plan is dragged"):
+            for period_px in range(60, 60 + 2 * DRAGS, 2):
+                spectral = LineComb(period_px=period_px)
+                control.plans.change_plan(page._state.plan.value.model_copy(update={"spectral": spectral}))
+                self._live_for(DRAG_S)
+            self._wait(lambda: len(known.value) > 5)
+        cancel = self.stage.window.parts.runner.cancel_all
+        self._cancel("predict", cancel, lambda: not self.stage.window.parts.runner.active)
+        page.middle.setCurrentWidget(page.effects)
+        with self._job("weigh effects"):
+            for i in range(DRAGS):
+                page.effects.choice.setCurrentIndex(i % page.effects.choice.count())
+                self._live_for(DRAG_S)
+            self.stage.idle()
+        page.middle.setCurrentWidget(page.view)
+
     def _reconstruct(self, session: Path) -> None:
         page = self.stage.window.open_page("results")
         assert isinstance(page, ResultsPage)
@@ -175,7 +210,13 @@ class WindowJobs:
             self._wait(lambda: state.look.value is not None)
             control.check(False)
             self._wait(lambda: state.doing.value is Doing.IDLE)
+        control.capture()
+        self._wait(lambda: state.doing.value is Doing.CAPTURING)
+        self._live_for(CAPTURE_S)
+        if state.doing.value is Doing.CAPTURING:
+            self._cancel(f"{name}: capture", control.stop, lambda: state.doing.value is Doing.IDLE)
         with self._job(f"{name}: capture"):
+            control.go_to(1)
             control.capture()
             self._wait(lambda: state.doing.value is Doing.CAPTURING)
             self._wait(lambda: state.doing.value is Doing.IDLE)
@@ -227,10 +268,17 @@ class WindowJobs:
     def _export(self) -> None:
         page = self.stage.window.open_page("results")
         assert isinstance(page, ResultsPage)
-        forms = ("ply", "envi", "exr", "png")
         with self._job("export"):
-            page._commands.export({form: self.stage.folder / f"out.{form}" for form in forms}, True)
+            page._commands.export(
+                {form: self.stage.folder / f"out.{ENDINGS[form]}" for form in ENDINGS}, True
+            )
             self.stage.idle()
+        runner = self.stage.window.parts.runner
+        for form, ending in ENDINGS.items():
+            page._commands.export({form: self.stage.folder / f"out.{ending}"}, True)
+            self._live_for(EXPORT_S)
+            if runner.active:
+                self._cancel(f"export {form}", runner.cancel_all, lambda: not runner.active)
 
     def _compare(self) -> None:
         page = self.stage.window.open_page("compare")
