@@ -59,9 +59,9 @@ class BlurredProfiles:
             light = zero_order_profile(torch.as_tensor(distance), -0.5, 0.5, response)
         else:
             light = torch.as_tensor(band_profile(distance, 1.0, response.blur_px, band_px))
-        index = torch.arange(samples)[:, None] + OVERSAMPLE * (width - 1 - torch.arange(width))
-        spread = light[index]
-        self.table = torch.einsum("sx,fxl->slf", spread.to(other), like(profiles, other))
+        # From the last column to the first, a column's light begins one column of samples later.
+        spread = light.to(other).unfold(0, OVERSAMPLE * (width - 1) + 1, 1)[:, ::OVERSAMPLE]
+        self.table = torch.einsum("sx,fxl->slf", spread, like(profiles, other).flip(1))
 
     def at(self, columns_px: Tensor) -> Tensor:
         """Light at columns of shape (pixels,): (pixels, LEDs, frames); almost none far outside the frame."""
