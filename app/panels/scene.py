@@ -131,7 +131,7 @@ class GlScene:
         self._wanted = 0
         self._is_grown = False
         self._begun: float | None = None
-        #: What to show after the first picture, which is slow enough when it is empty.
+        #: What to show in the next turn; at first after a picture, which is slow enough when it is empty.
         self._waiting: tuple[Points, NDArray[np.uint8]] | None = None
         self._is_ready = False
 
@@ -169,17 +169,10 @@ class GlScene:
 
     def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
         """Show points with their colours, as many as this machine draws in time."""
-        if not self._is_ready:
-            self._waiting = points, colours
-            return
-        self._waiting = None
-        # Taking a cloud in is a turn of its own, and the picture of it another.
-        self.widget.setUpdatesEnabled(False)
-        QTimer.singleShot(GROW_MS, self.widget, lambda: self.widget.setUpdatesEnabled(True))
-        if self._cloud.show(points, colours):
-            self.reset()
-        self._is_grown = False
-        self._rest()
+        # Colours were made just now: taking them in is a turn of its own, and the picture another.
+        self._waiting = points, colours
+        if self._is_ready:
+            QTimer.singleShot(GROW_MS, self.widget, self._show_waiting)
 
     def _make_ready(self) -> None:
         if self._is_ready:
@@ -190,9 +183,15 @@ class GlScene:
 
     def _show_waiting(self) -> None:
         waiting, self._waiting = self._waiting, None
-        if waiting is not None:
-            self.show_cloud(*waiting)
-        self._plotter.update()
+        if waiting is None:
+            self._plotter.update()
+            return
+        self.widget.setUpdatesEnabled(False)
+        QTimer.singleShot(GROW_MS, self.widget, lambda: self.widget.setUpdatesEnabled(True))
+        if self._cloud.show(*waiting):
+            self.reset()
+        self._is_grown = False
+        self._rest()
 
     def _begin(self) -> None:
         self._begun = time.perf_counter()
