@@ -109,10 +109,18 @@ def _draw(axes: Axes, comparison: Comparison) -> None:
             axes.scatter(seconds, errors, s=12, color=colour, label=f"{solver} solver")
     line = [(m.point.seconds, m.error) for m in comparison.best]
     axes.plot(*zip(*line, strict=True), color="#cc3311", lw=1, label="none is better in both")
-    for solver, m in comparison.published.items():
-        if m.point.pixel_rmse is not None:
-            axes.scatter([m.point.seconds], [m.error], s=110, marker="*", color=COLOURS[solver], zorder=3)
-            axes.annotate(f"published plan, {solver}", (m.point.seconds, m.error), fontsize=7, ha="right")
+    marked = [(m.error, m.point.seconds, s) for s, m in comparison.published.items() if m.point.pixel_rmse]
+    for rank, (error, seconds, solver) in enumerate(sorted(marked)):
+        axes.scatter([seconds], [error], s=110, marker="*", color=COLOURS[solver], zorder=3)
+        # Words in turn below and above their stars, so that those of neighbours stay apart.
+        axes.annotate(
+            f"published plan, {solver}",
+            (seconds, error),
+            (-8, 5 if rank % 2 else -11),
+            textcoords="offset points",
+            fontsize=7,
+            ha="right",
+        )
     axes.set(xscale="log", yscale="log", xlabel="capture, s", ylabel="reflectance error of a pixel (RMSE)")
     axes.set_title(comparison.palette)
     axes.legend(fontsize=7)
