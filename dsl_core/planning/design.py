@@ -153,10 +153,10 @@ class Samples:
         colour = (
             torch.einsum("clj,snj->sncl", self.moments_zero, reflectance) * self.shading[at, None, None, None]
         )
-        lit = torch.einsum("snx,xfl->snfl", self.near[at], radiance).amax((1, 3))
-        white = colour.sum(-1)
+        lit = torch.einsum("snx,xfl->snfl", self.near[at], radiance).amax(1)
+        dazzle = torch.einsum("sncl,sfl->sncf", colour, lit)
         variance = DEMOSAIC * self._variance(y) + (MODEL_ERROR * y) ** 2
-        variance = variance + (DIRECT_ERROR * white[..., None] * lit[:, None, None]) ** 2
+        variance = variance + (DIRECT_ERROR * dazzle) ** 2
         root = variance.rsqrt()
         rows = (whole[:, None] * root[..., None]).flatten(2, 3)
         inverse = torch.linalg.inv(rows.mT @ rows + prior)

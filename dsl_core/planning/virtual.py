@@ -26,11 +26,12 @@ from dsl_core.planning.views import View
 from dsl_core.reconstruction.column import Column, refine
 from dsl_core.reconstruction.dense_solver import solve_dense
 from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.first_orders import first_order_share
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import radiance_profiles, refine_by_profiles
+from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles, refine_by_profiles
 from dsl_core.reconstruction.spectra import COLOUR_ERROR, DEMOSAIC_SPREAD, DIRECT_ERROR, EDGE_PX, MODEL_ERROR
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra
-from dsl_core.reconstruction.spectral_system import ORDERS, Bands, band_halfwidth_px
+from dsl_core.reconstruction.spectral_system import ORDERS, Bands, band_halfwidth_px, direct_light
 from dsl_core.reconstruction.surface import default_window_px
 
 #: Column shift of the finite difference, px.
@@ -94,8 +95,7 @@ class VirtualPixels:
         _, self.slope_mm = triangulate(rig, self.pixels, self.column)
         self.model = correspondence(rig)
         self.pitch_px = self._pitch_px()
-        grey = bool((self.profiles == self.profiles[..., :1]).all())
-        light = self.profiles[..., :1] if grey else self.profiles
+        light = one_if_grey(self.profiles)
         one = torch.zeros(1)
         #: Zero order as one sample of the mosaic sees it, and as the reconstruction models it.
         self.direct = BlurredProfiles(rig.projector_response, light, 0.0, one)
@@ -226,7 +226,10 @@ class _Run:
         if owner.lines is not None:
             column = refine(true.round(), radiance, std, owner.lines, response)
         else:
-            column = refine_by_profiles(true.round(), radiance, std, owner.profiles, response)
+            profiles = one_if_grey(owner.profiles)
+            share = first_order_share(owner.rig, profiles, owner.pixels, owner.column.float().round())
+            share = share.repeat_interleave(count, 0)
+            column = refine_by_profiles(true.round(), radiance, std, profiles, response, share)
         return column, (column.column_px - true).reshape(samples, count)
 
     def outcome(self) -> Outcome:
@@ -271,9 +274,9 @@ class _Run:
         spread = self.variance * self.factors + (MODEL_ERROR * self.noisy) ** 2
         if not owner.single:
             found = (owner.column.float()[:, None] + error_px).flatten()
-            near = [owner.modelled.at(found + shift).amax(1) for shift in (-1.0, 0.0, 1.0)]
-            lit = torch.stack(near).amax(0).reshape(*error_px.shape, 1, -1)
-            spread = spread + (DIRECT_ERROR * self._colour()[..., None] * lit) ** 2
+            colour = self._colour().flatten(0, 1).T
+            direct = direct_light(owner.modelled, owner.bands, found, colour)
+            spread = spread + (DIRECT_ERROR * direct.permute(2, 0, 1).reshape(spread.shape)) ** 2
         return torch.where(self.saturated, 0.0, 1 / spread)
 
     def _colour(self) -> Tensor:

@@ -13,10 +13,11 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import Column, dark_offset, refine
 from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.first_orders import first_order_share
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.merge import LineStack
-from dsl_core.reconstruction.pattern_column import refine_by_profiles
+from dsl_core.reconstruction.pattern_column import one_if_grey, refine_by_profiles
 from dsl_core.solve.many import Check, work_through
 
 CHUNK = 16384
@@ -115,8 +116,16 @@ class ColumnFinder:
         y = torch.as_tensor(stack.radiance.reshape(len(stack.radiance), -1)[:, where], device=self.device)
         std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, where], device=self.device)
         if self.lines is None:
-            return refine_by_profiles(start, y, std, self.profiles, response), torch.zeros_like(start)
+            return self._of_patterns(where, start, y, std), torch.zeros_like(start)
         return _on_lines(start, y, std, self.lines, response)
+
+    def _of_patterns(self, where: Indices | slice, start: Tensor, y: Tensor, std: Tensor) -> Column:
+        """Columns from any pattern set, with what the first orders of a grey surface add to its frames."""
+        assert self.profiles is not None
+        profiles = one_if_grey(self.profiles)
+        index = np.arange(where.start, where.stop) if isinstance(where, slice) else where
+        light = first_order_share(self.rig, profiles, torch.as_tensor(index, device=self.device), start)
+        return refine_by_profiles(start, y, std, profiles, self.rig.projector_response, light)
 
     def _of_white(self, where: Indices | slice, start: Tensor) -> Column:
         """What is known without any pattern but white."""

@@ -1,9 +1,10 @@
 """The projector column of a pixel from any set of column patterns, by its zero order.
 
 A pixel sees ``y_k = sum_l a_l g_lk(q)``: the patterns of the three LEDs, blurred, with halo, at its column.
-First orders, a few percent of that, are not modelled but allowed for. For each candidate column around
-the decoded one the amplitudes follow by non-negative weighted least squares with one unknown a LED, or
-one for all where patterns are grey; the best candidate and its neighbours give the column by a parabola.
+First orders, a few percent of that, are those of a grey surface; what a coloured one changes is allowed for.
+For each candidate column around the decoded one the amplitudes follow by non-negative weighted least squares
+with one unknown a LED, or one for all where patterns are grey; the best candidate and its neighbours give the
+column by a parabola.
 """
 
 from __future__ import annotations
@@ -36,28 +37,37 @@ def radiance_profiles(rig: Rig, plan: CapturePlan) -> NDArray[np.float64]:
     return (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
 
 
+def one_if_grey(profiles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Profiles (frames, width, LEDs) of one LED for all, where patterns are grey."""
+    return profiles[..., :1] if bool((profiles == profiles[..., :1]).all()) else profiles
+
+
 def refine_by_profiles(
     coarse_px: Tensor,
     radiance: Tensor,
     std: Tensor,
     profiles: NDArray[np.float64],
     response: ProjectorResponse,
+    first_orders: Tensor | None = None,
 ) -> Column:
     """Refine decoded columns (pixels,) from ``radiance`` and ``std`` (frames, pixels), DN per ms.
 
     ``profiles`` (frames, width, LEDs) are radiances relative to full drive. Where the fit fails, the decoded
     column stays with the deviation of a whole pixel, as for lines. The amplitude is that of white.
+    ``first_orders`` (pixels, LEDs, frames) are their light for an amplitude of one, see `first_order_share`;
+    neighbouring columns share it.
     """
-    grey = bool((profiles == profiles[..., :1]).all())
-    light = BlurredProfiles(response, profiles[..., :1] if grey else profiles, 0.0, radiance)
+    profiles = one_if_grey(profiles)
+    light = BlurredProfiles(response, profiles, 0.0, radiance)
     y, s = radiance.T, std.T.to(radiance)
     usable = torch.isfinite(s) & torch.isfinite(y)
     y = torch.where(usable, y, 0.0)
     # The brightest usable frame stands for the scale that a share of is granted as error.
     scale = y.amax(1, keepdim=True).clip(min=0)
     weight = torch.where(usable, 1 / (s**2 + (DIRECT_ERROR * scale) ** 2), 0.0)
+    beside = 0.0 if first_orders is None else first_orders
     shifts = torch.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX).to(coarse_px)
-    fits = [_fit(light.at(coarse_px + shift), y, weight) for shift in shifts]
+    fits = [_fit(light.at(coarse_px + shift) + beside, y, weight) for shift in shifts]
     cost = torch.stack([fit[0] for fit in fits])
     best = cost.argmin(0).clip(1, len(shifts) - 2)
     left, middle, right = (cost.gather(0, (best + i)[None])[0] for i in (-1, 0, 1))
@@ -65,7 +75,7 @@ def refine_by_profiles(
     move = (0.5 * (left - right) / (STEP_PX * curvature)).clip(-STEP_PX, STEP_PX)
     amplitudes = torch.stack([fit[1] for fit in fits])
     amplitude = amplitudes.gather(0, best[None])[0]
-    freedom = (weight > 0).sum(1) - (2 if grey else 4)
+    freedom = (weight > 0).sum(1) - (profiles.shape[2] + 1)
     chi_square = middle / freedom.clip(min=1)
     std_px = (2 / curvature * chi_square.clip(min=1)).sqrt()
     good = (freedom > 1) & (amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))

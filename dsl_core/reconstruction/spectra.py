@@ -16,17 +16,18 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Correspondence, Footprint, like
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
+from dsl_core.optics.image_formation import BlurredProfiles
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import halo_of_line
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import radiance_profiles
+from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral_system import (
     ORDERS,
     BandedAccumulator,
     Bands,
     dense_equations,
-    lit_by_zero_order,
+    direct_light,
 )
 from dsl_core.solve.banded import multiply
 from dsl_core.solve.many import Check, work_through
@@ -230,8 +231,9 @@ class SpectralReconstruction:
         # Demosaicing averages neighbours, which widens every line a little more.
         blur = float(np.hypot(response.blur_px, window.blur_px()))
         response = response.model_copy(update={"blur_px": blur})
-        lit = lit_by_zero_order(response, profiles, column)
-        weight = 1 / (1 / weight + (DIRECT_ERROR * colour[:, None] * lit) ** 2)
+        light = BlurredProfiles(response, one_if_grey(profiles), 0.0, column)
+        direct = direct_light(light, self.bands, column, colour)
+        weight = 1 / (1 / weight + (DIRECT_ERROR * direct) ** 2)
         width, height = self.plan.projector_size_px
         inside = {order: f.inside(width, height, margin_px=EDGE_PX) for order, f in traced.items()}
         samples = (weight > 0).sum((0, 1))

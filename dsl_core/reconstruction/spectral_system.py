@@ -260,13 +260,24 @@ def dense_equations(
     return weighted.mT @ flat, (weighted.mT @ y)[..., 0], (w * y * y).sum((1, 2))
 
 
-def lit_by_zero_order(
-    response: ProjectorResponse, profiles: NDArray[np.float64], column_px: Tensor
-) -> Tensor:
-    """Largest zero-order light within a column of each pixel's, (frames, pixels), any LED.
+def direct_light(light: BlurredProfiles, bands: Bands, column_px: Tensor, colour: Tensor) -> Tensor:
+    """Largest zero-order light within a column of each pixel's, (3, frames, pixels), DN per ms.
 
-    The edges of lines are where a small error of the column or the blur matters most.
+    The edges of lines are where a small error of the column or the blur matters most. ``colour`` (3, pixels)
+    is the zero order under white; grey patterns may be given as one LED.
     """
-    blurred = BlurredProfiles(response, profiles, 0.0, column_px)
-    near = torch.stack([blurred.at(column_px + shift).amax(1) for shift in (-1.0, 0.0, 1.0)])
-    return near.amax(0).T
+    lit = torch.stack([light.at(column_px + shift) for shift in (-1.0, 0.0, 1.0)]).amax(0)
+    parts = colour[:, None] if lit.shape[1] == 1 else _by_led(bands, colour)
+    return torch.einsum("clp,plf->cfp", parts, lit)
+
+
+def _by_led(bands: Bands, colour: Tensor) -> Tensor:
+    """Zero-order colour (3, pixels) as what each LED adds, (3, LEDs, pixels).
+
+    An LED that is dark at a pixel's column spoils none of its frames. Reflectance counts as constant over the
+    light of one LED.
+    """
+    white = like(bands.moments[0].sum(2), colour)
+    reflectance = (torch.linalg.pinv(white) @ colour).clip(min=0)
+    parts: Tensor = white[:, :, None] * reflectance
+    return parts

@@ -8,10 +8,17 @@ import torch
 
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, SpectralSet
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.image_formation import BlurredProfiles
+from dsl_core.planning.noise import own_channel
+from dsl_core.planning.views import plane_view
+from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.reconstruction.column import Column
+from dsl_core.reconstruction.first_orders import first_order_share
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import radiance_profiles, refine_by_profiles
+from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles, refine_by_profiles
+from dsl_core.reconstruction.spectral_system import Bands, direct_light
+from dsl_core.simulation.published_rig import published_rig
 from tests.cases.small_rig import small_rig
 
 WHITE = 300.0
@@ -75,3 +82,39 @@ def test_a_comb_in_three_colours_is_no_set_of_white_lines() -> None:
     comb = LineComb(width_px=5, step_px=3, period_px=96, shifts_px=(0, 32, 64))
     assert LineSet.of(CapturePlan(spectral=comb)) is None
     assert LineSet.of(CapturePlan(spectral=comb.model_copy(update={"shifts_px": (0, 0, 0)}))) is not None
+
+
+def test_first_orders_of_a_coloured_surface_move_columns_less_when_they_are_modelled() -> None:
+    """Lines in an order of their own put other first orders under their two edges."""
+    rig, random = published_rig(), random_columns()
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=random)
+    pixels = VirtualPixels(rig, plan, WavelengthGrid(step_nm=10), plane_view(rig, grid=(12, 4)))
+    ramp = np.tile(np.linspace(0.2, 0.6, pixels.bands.count), (len(pixels.pixels), 1, 1))
+    first, zero = pixels.signals(torch.as_tensor(ramp, dtype=torch.float32))
+    own = torch.as_tensor(own_channel(rig, pixels.view.pixels))
+    y = (first + zero)[torch.arange(len(own)), 0, own].T.contiguous()
+    profiles = one_if_grey(radiance_profiles(rig, plan))
+    start = pixels.column.float().round()
+    share = first_order_share(rig, profiles, pixels.pixels, start)
+    errors = []
+    for light in (None, share):
+        column = refine_by_profiles(
+            start, y, torch.full_like(y, 1e-3), profiles, rig.projector_response, light
+        )
+        errors.append(float((column.column_px - pixels.column).abs().median()))
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_an_led_that_is_dark_spoils_no_frame() -> None:
+    """Beside a comb of the red LED, what the green and blue zero order may get wrong stays out of it."""
+    rig = published_rig()
+    bands = Bands.of(rig, WavelengthGrid(step_nm=10))
+    plan = CapturePlan(
+        spectral=LineComb(width_px=6, step_px=4, period_px=96, shifts_px=(0, 32, 64)), code=GrayCode()
+    )
+    light = BlurredProfiles(rig.projector_response, radiance_profiles(rig, plan), 0.0, torch.zeros(1))
+    white = torch.as_tensor(bands.moments[0].sum((1, 2)), dtype=torch.float32)[:, None]
+    found = direct_light(light, bands, torch.tensor([2.5]), white)
+    red, blue = found[0, :, 0] / white[0], found[2, :, 0] / white[2]
+    assert float(red[0]) > 0.5
+    assert float(blue[0]) < 0.1
