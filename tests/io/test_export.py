@@ -13,6 +13,7 @@ from dsl_core.io.export import export, export_csv, export_envi, export_exr, expo
 from dsl_core.io.export.exr import linear_from_srgb
 from dsl_core.io.export.png import GREY, flags_picture
 from dsl_core.model.result import Flag, reasons
+from dsl_core.solve.many import never
 from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result
 
 SUFFIX = {"csv": ".csv", "envi": ".hdr", "exr": ".exr", "ply": ".ply", "png": ".png"}
@@ -203,8 +204,8 @@ def test_pictures_of_nothing_and_of_the_middle_band(tmp_path: Path) -> None:
 def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: str) -> None:
     exporter = formats()[name]
     if name == "csv":
-        exporter = lambda result, path, *, overwrite=False: export_csv(  # noqa: E731
-            result, path, overwrite=overwrite, pixels=[(0, 0)]
+        exporter = lambda result, path, *, overwrite=False, check=never: export_csv(  # noqa: E731
+            result, path, overwrite=overwrite, pixels=[(0, 0)], check=check
         )
     path = tmp_path / "new" / f"x{SUFFIX[name]}"
     files = exporter(small_result(), path)

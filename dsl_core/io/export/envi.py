@@ -1,4 +1,4 @@
-"""Spectral cube as ENVI (band sequential, float32, little endian), written by the `spectral` package.
+"""Spectral cube as ENVI (band sequential, float32, little endian); the `spectral` package writes the header.
 
 Pixels and bands without an answer hold the header's ``data ignore value``, because many readers of ENVI
 files do not expect NaN.
@@ -41,34 +41,37 @@ def export_envi(
     targets = [target for header in cubes.values() for target in (header, header.with_suffix(".img"))]
     with staged(targets, overwrite=overwrite) as drafts:
         for name, draft in zip(cubes, drafts[::2], strict=True):
-            check()
-            _write_cube(result, name, draft)
+            _write_cube(result, name, draft, check)
     return targets
 
 
-def _write_cube(result: xr.Dataset, name: str, header: Path) -> None:
+def _write_cube(result: xr.Dataset, name: str, header: Path, check: Check) -> None:
     from spectral.io import envi
 
-    cube = plane(result, name).copy()
-    cube[np.isnan(cube)] = IGNORE_VALUE
-    centres = wavelengths_nm(result)
+    cube, centres = plane(result, name), wavelengths_nm(result)
+    bands, lines, samples = cube.shape
     metadata = {
         "description": _description(result, name),
+        "samples": samples,
+        "lines": lines,
+        "bands": bands,
+        "header offset": 0,
+        "file type": "ENVI Standard",
+        "data type": 4,
+        "interleave": "bsq",
+        "byte order": 0,
         "wavelength": [f"{w:g}" for w in centres],
         "wavelength units": "Nanometers",
         "band names": [f"{name} {w:g} nm" for w in centres],
         "data ignore value": f"{IGNORE_VALUE:g}",
         "z plot titles": ["Wavelength (nm)", f"{name} (1)"],
     }
-    envi.save_image(
-        str(header),
-        np.moveaxis(cube, 0, -1),
-        dtype=np.float32,
-        interleave="bsq",
-        byteorder=0,
-        ext=".img",
-        metadata=metadata,
-    )
+    envi.write_envi_header(str(header), metadata)
+    # Band after band: a cube in one piece would keep every other thread waiting while it is copied.
+    with header.with_suffix(".img").open("wb") as file:
+        for band in cube:
+            check()
+            np.where(np.isnan(band), np.float32(IGNORE_VALUE), band).astype("<f4").tofile(file)
 
 
 def _description(result: xr.Dataset, name: str) -> str:
