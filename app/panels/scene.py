@@ -68,11 +68,15 @@ def gl_works() -> bool:
 
 def prepare_scene() -> None:
     """Import what a scene needs: seconds, in which a thread does not stop the window."""
+    import pyvista
     import pyvistaqt  # noqa: F401
 
     # What pyvista imports no sooner than when a scene is made, in the window's thread.
     import vtkmodules.vtkInteractionWidgets
     import vtkmodules.vtkViewsContext2D  # noqa: F401
+
+    # The first points of all look for more of pyvista than those that follow.
+    pyvista.PolyData(np.zeros((1, 3), np.float32))["colours"] = np.zeros((1, 3), np.uint8)
 
 
 def make_scene(moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> Scene:
