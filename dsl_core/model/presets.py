@@ -47,8 +47,9 @@ PRESETS: tuple[Preset, ...] = (
     Preset(
         "preview",
         "Preview",
-        "Sixteen combs of lines at one setting: a first look at depth and colours in ten seconds.",
-        _plan("preview", _COARSE_COMB, _DARK),
+        "Sixteen combs of lines at two short settings: a first look at depth and spectra in ten seconds.",
+        # One setting alone takes 8 s, but where it spares the zero order its first orders drown in noise.
+        _plan("preview", _COARSE_COMB, _setting(4, 0.2), _setting(6, 0.8)),
     ),
     Preset(
         "comb",

@@ -178,14 +178,14 @@ def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
 def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
     page, bench, _ = ready
     exposure, _ = page.plan.settings._rows[0]
-    exposure.setValue(60.0)
-    assert bench.state.plan.value.settings[0].exposure_ms == pytest.approx(4 * 1000 / 60)
-    assert exposure.value() == pytest.approx(66.7)
+    exposure.setValue(95.0)
+    assert bench.state.plan.value.settings[0].exposure_ms == pytest.approx(6 * 1000 / 60)
+    assert exposure.value() == pytest.approx(100.0)
     page.plan.settings._add()
-    assert len(page.plan.settings._rows) == 2
-    assert bench.state.plan.value.code_settings == (0, 1)
+    assert len(page.plan.settings._rows) == 3
+    assert bench.state.plan.value.code_settings == (0, 1, 2)
     page.plan.settings._remove(0)
-    assert len(bench.state.plan.value.settings) == 1
+    assert len(bench.state.plan.value.settings) == 2
 
 
 def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> None:
