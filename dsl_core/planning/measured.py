@@ -110,12 +110,12 @@ def _draw(axes: Axes, comparison: Comparison) -> None:
     line = [(m.point.seconds, m.error) for m in comparison.best]
     axes.plot(*zip(*line, strict=True), color="#cc3311", lw=1, label="none is better in both")
     marked = [(m.error, m.point.seconds, s) for s, m in comparison.published.items() if m.point.pixel_rmse]
-    for rank, (error, seconds, solver) in enumerate(sorted(marked)):
-        axes.scatter([seconds], [error], s=110, marker="*", color=COLOURS[solver], zorder=3)
+    for rank, (error, capture_s, solver) in enumerate(sorted(marked)):
+        axes.scatter([capture_s], [error], s=110, marker="*", color=COLOURS[solver], zorder=3)
         # Words in turn below and above their stars, so that those of neighbours stay apart.
         axes.annotate(
             f"published plan, {solver}",
-            (seconds, error),
+            (capture_s, error),
             (-8, 5 if rank % 2 else -11),
             textcoords="offset points",
             fontsize=7,
