@@ -72,7 +72,9 @@ def design(
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006
     calibration: CalibrationName = None,
-    steps: Annotated[int, typer.Option("--steps", help="Steps of the search.", min=1)] = 600,
+    orders: Annotated[
+        int, typer.Option("--orders", help="Orders tried of the best lines; more take longer.", min=1)
+    ] = 12,
     plan: Annotated[
         Path | None, typer.Option("--plan", help="Also write a plan with these patterns.")
     ] = None,
@@ -83,7 +85,6 @@ def design(
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
     from dsl_core.model.plan import CapturePlan, GrayCode
-    from dsl_core.planning.design import DesignOptions
     from dsl_core.planning.design import design as search
     from dsl_core.planning.designed import DesignedSet, packed, save_design
 
@@ -92,20 +93,24 @@ def design(
         known = _calibration(devices, calibration)
     base = CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False))
     with output.progress() as progress:
-        found = search(known, base, frames, options=DesignOptions(steps=steps), progress=progress)
+        found = search(known, base, frames, orders=orders, progress=progress)
     made = DesignedSet(
         name=f"designed {frames}",
         rig=known.name,
-        command=f"dsl-scan design {target.name} --frames {frames} --steps {steps}",
+        command=f"dsl-scan design {target.name} --frames {frames} --orders {orders}",
         frames=frames,
         width_px=found.levels.shape[1],
-        loss_start=found.loss_start,
-        loss=found.loss,
+        lines=found.lines.name,
+        comb_error=round(found.comb_error, 6),
+        error=round(found.error, 6),
         levels=packed(found.levels),
     )
     save_design(made, target, overwrite=force)
-    output.say(f"{frames} patterns lie in {target}; expected error {made.loss_start:.4f} -> {made.loss:.4f}.")
-    output.put(set=target, loss_start=made.loss_start, loss=made.loss)
+    output.say(
+        f"{frames} patterns lie in {target}: {made.lines}; expected error {made.error:.4f},"
+        f" of the best comb {made.comb_error:.4f}."
+    )
+    output.put(set=target, lines=made.lines, comb_error=made.comb_error, error=made.error)
     if plan is not None:
         save_plan(base.model_copy(update={"spectral": found.columns}), plan, overwrite=force)
         output.put(plan_file=plan)

@@ -1,83 +1,60 @@
-"""Pattern sets by design: levels of every column and LED that minimise the expected posterior error.
+"""Pattern sets by design: the lines and their order that a rig's own model expects the least error of.
 
-The model is the reconstruction's (see `virtual`), differentiable in the patterns: drive levels 0..1 become
-radiance by the projector's gamma, are blurred, and reach a sample through all orders. The noise is the
-bracket's, saturation included, so that the design learns to keep the bright zero order out of the way. The
-loss is the trace of the posterior covariance of band means, for random smooth reflectances at random places
-and depths, plus what spectra make of light that an uncertain column moves. Levels are rounded to what a
-projector of 8 bit can show.
+Every candidate is judged by the reconstruction's own estimators at virtual pixels (see `virtual`): noise of
+the bracket, saturation, columns and prior included. The pixels lie where first orders reach all bands, as
+elsewhere the prior decides whatever is shown; the spectra are random, from calm to narrow. The error of a
+set is the geometric mean of its errors over the spectra, so that none outweighs the others.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import CapturePlan, Columns, LineComb
+from dsl_core.model.plan import CapturePlan, Columns, LineComb, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.correspondence import correspondence, like, zero_order
-from dsl_core.optics.image_formation import BlurredProfiles
-from dsl_core.patterns.multiplexed import profiles
-from dsl_core.planning.noise import Bracket
-from dsl_core.planning.views import plane_view
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.planning.mixed_lines import MixedLines
+from dsl_core.planning.references import FINE_NM
+from dsl_core.planning.views import View, plane_view
+from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction import pattern_column
-from dsl_core.reconstruction.spectra import DIRECT_ERROR, EDGE_PX, MODEL_ERROR
-from dsl_core.reconstruction.spectral_solver import Prior, band_mean, roughness
-from dsl_core.reconstruction.spectral_system import Bands, band_halfwidth_px
-from dsl_core.solve import banded
+from dsl_core.solve.threads import one_kernel_thread
 
-#: Where samples lie: depths in mm, and samples across and down each plane.
-DEPTHS_MM, SAMPLES = (600.0, 700.0, 800.0), (10, 3)
-#: Deviation of second differences that posterior errors are taken under; of chart spectra at 5 nm.
-TAU = 0.012
-#: Deviation of a column that was not refined.
-UNREFINED_PX = 12**-0.5
-#: A bilinear mosaic's mean variance of a colour, relative to a sample's.
-DEMOSAIC = 0.5
-#: How softly a setting saturates in the search, as a share of full scale.
-SOFT = 0.02
-
-
-@dataclass(frozen=True)
-class DesignOptions:
-    """How to search: steps of Adam, samples and spectra a step, seed of the draws.
-
-    Gradients below ``floor`` move a level less than the learning rate, so that dark columns stay dark. A
-    ``grey`` set lights the three LEDs alike.
-    """
-
-    steps: int = 600
-    samples: int = 8
-    spectra: int = 2
-    learning_rate: float = 0.005
-    floor: float = 1e-5
-    grey: bool = True
-    seed: int = 1
+Floats = NDArray[np.float64]
+#: Where the pixels lie: depths as shares of the rig's range, and pixels across and down.
+DEPTHS, PLACES = (0.3, 0.8), (9, 2)
+#: Fewer pixels with all bands are not enough; then those without count as well.
+LEAST_PLACES = 4
+#: Sizes of cosines over wavelength of calm and of lively spectra, and how many are drawn of each.
+CALM = (1.3, 1.2, 0.8, 0.4, 0.15, 0.06, 0.02, 0.01)
+LIVELY = (1.5, 1.4, 1.1, 0.7, 0.4, 0.2, 0.1, 0.05)
+DRAWN, SPECTRA_SEED = (10, 7), 5
+#: Centres and deviation of narrow spectra, nm.
+PEAKS_NM, PEAK_STD_NM = (462.0, 538.0, 612.0), 6.0
+#: Runs of slots, as shares of the columns that a first order's spectrum covers, and widths of lines (px).
+RUNS, WIDTHS_PX = (0.5, 0.62, 0.75), (5, 6, 7, 9, 11)
+SPECTRUM_NM = (430.0, 690.0)
+#: How many kinds of lines are tried in further orders.
+FINALISTS = 3
 
 
 @dataclass(frozen=True)
 class Design:
-    """Levels (frames, width, 3), 8 bit, and the loss along the search."""
+    """The set chosen, and the expected errors of it and of the best comb of as many frames."""
 
+    lines: MixedLines
     levels: NDArray[np.uint8]
-    losses: tuple[float, ...]
-
-    @property
-    def loss_start(self) -> float:
-        """Mean loss of the first twentieth of the search."""
-        return float(np.mean(self.losses[: max(len(self.losses) // 20, 1)]))
-
-    @property
-    def loss(self) -> float:
-        """Mean loss of the last twentieth."""
-        return float(np.mean(self.losses[-max(len(self.losses) // 20, 1) :]))
+    error: float
+    comb: LineComb
+    comb_error: float
 
     @property
     def columns(self) -> Columns:
@@ -91,114 +68,56 @@ def columns_of(levels: NDArray[np.uint8]) -> Columns:
     return Columns(levels=tuple(tuple(tuple(rgb) for rgb in frame) for frame in shares.tolist()))
 
 
-def starting_comb(frames: int) -> LineComb:
-    """The comb that a search of ``frames`` patterns starts from; raises `PlanError`.
+class Judge:
+    """Expected errors of pattern sets on a rig, with the settings of a plan."""
 
-    Among combs of 16, 32 and 64 frames these were predicted to be best, or nearly, on the published rig: the
-    two edges of their lines fall on different columns.
-    """
-    if not 8 <= frames <= 160:
-        raise PlanError(f"A set of {frames} patterns cannot be designed; choose 8 to 160.")
-    step = 2 if frames >= 48 else 4
-    return LineComb(width_px=5 if step == 2 else 6, step_px=step, period_px=step * frames)
-
-
-class Samples:
-    """Linear maps from columns to light at samples of several planes."""
-
-    def __init__(self, rig: Rig, plan: CapturePlan, grid: WavelengthGrid) -> None:
-        self.rig, self.bands, self.bracket = rig, Bands.of(rig, grid), Bracket.of(rig, plan)
-        width = rig.projector.width_px
-        eye = np.eye(width)[..., None]
-        first, zero, near, slope, shading = [], [], [], [], []
-        for depth_mm in DEPTHS_MM:
-            view = plane_view(rig, depth_mm, SAMPLES)
-            pixels, depth = torch.as_tensor(view.pixels), torch.as_tensor(view.depth_mm)
-            column = zero_order(rig, pixels, depth)[0].float()
-            direct = BlurredProfiles(rig.projector_response, eye, 0.0, column)
-            at = [direct.at(column + shift)[:, 0] for shift in (-1.0, -0.1, 0.0, 0.1, 1.0)]
-            zero.append(at[2])
-            near.append(torch.stack([at[0], at[2], at[4]], 1))
-            slope.append((at[3] - at[1]) / 0.2)
-            shading.append(torch.as_tensor(view.shading, dtype=torch.float32))
-            orders = [self._order(order, pixels, depth, eye) for order in self.bands.orders]
-            first.append(torch.stack(orders, 1))
-        self.first, self.zero, self.near, self.slope, self.shading = (
-            torch.cat(parts) for parts in (first, zero, near, slope, shading)
+    def __init__(self, rig: Rig, plan: CapturePlan, grid: WavelengthGrid | None = None) -> None:
+        self.rig, self.grid = rig, grid or WavelengthGrid()
+        self.plan = plan.model_copy(
+            update={
+                "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
+                "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
+            }
         )
-        self.moments = torch.stack([like(self.bands.moments[m], self.zero) for m in self.bands.orders])
-        self.moments_zero = like(self.bands.moments[0], self.zero)
+        self.spectra = training_spectra()
+        self.view = self._places()
 
-    def _order(self, order: int, pixels: Tensor, depth: Tensor, eye: NDArray[np.float64]) -> Tensor:
-        """Light of each band through an order per column of the projector, (samples, bands, width)."""
-        traced = correspondence(self.rig).trace(pixels, depth, order, self.bands.centroids_nm[order])
-        columns = traced.columns.float()
-        lens = self.rig.projector
-        inside = traced.inside(lens.width_px, lens.height_px, margin_px=EDGE_PX)
-        half = band_halfwidth_px(columns, self.bands.step_nm, self.bands.centres_nm)
-        blurred = BlurredProfiles(self.rig.projector_response, eye, half, columns)
-        rows = [blurred.at(c)[:, 0] * i[:, None] for c, i in zip(columns, inside, strict=True)]
-        return torch.stack(rows, 1)
+    def _places(self) -> View:
+        low, high = self.rig.depth_range_mm
+        views = [plane_view(self.rig, low + share * (high - low), PLACES) for share in DEPTHS]
+        some = [_part(view, self._complete(view)) for view in views]
+        if sum(len(view.pixels) for view in some) >= LEAST_PLACES:
+            views = some
+        first = views[0]
+        for view in views[1:]:
+            first = replace(
+                first,
+                pixels=np.concatenate([first.pixels, view.pixels]),
+                depth_mm=np.concatenate([first.depth_mm, view.depth_mm]),
+                shading=np.concatenate([first.shading, view.shading]),
+                incidence_tan=np.concatenate([first.incidence_tan, view.incidence_tan]),
+            )
+        return first
 
-    def loss(self, radiance: Tensor, at: Tensor, reflectance: Tensor, prior: Tensor, means: Tensor) -> Tensor:
-        """Expected squared error of band means at samples ``at`` for reflectances (samples, n, bands).
+    def _complete(self, view: View) -> NDArray[np.bool_]:
+        """Whether first orders reach every band at the samples of a view."""
+        nm, lens = self.grid.centres_nm, self.rig.projector
+        pixels, depth = torch.as_tensor(view.pixels), torch.as_tensor(view.depth_mm)
+        trace = correspondence(self.rig).trace
+        reached = [trace(pixels, depth, m, nm).inside(lens.width_px, lens.height_px) for m in (1, -1)]
+        return np.asarray((reached[0] | reached[1]).all(0).numpy())
 
-        ``radiance`` is (width, frames, LEDs), relative to full drive.
-        """
-        first = self._first_orders(radiance, at)
-        zero = torch.einsum("sx,xfl->sfl", self.zero[at], radiance)
-        direct = torch.einsum("sfl,clj->scfj", zero, self.moments_zero) * self.shading[at, None, None, None]
-        whole = first + direct
-        y = torch.einsum("scfj,snj->sncf", whole, reflectance)
-        colour = (
-            torch.einsum("clj,snj->sncl", self.moments_zero, reflectance) * self.shading[at, None, None, None]
-        )
-        lit = torch.einsum("snx,xfl->snfl", self.near[at], radiance).amax(1)
-        dazzle = torch.einsum("sncl,sfl->sncf", colour, lit)
-        variance = DEMOSAIC * self._variance(y) + (MODEL_ERROR * y) ** 2
-        variance = variance + (DIRECT_ERROR * dazzle) ** 2
-        root = variance.rsqrt()
-        rows = (whole[:, None] * root[..., None]).flatten(2, 3)
-        inverse = torch.linalg.inv(rows.mT @ rows + prior)
-        spread = torch.einsum("ij,snjk,ik->sni", means, inverse, means)[..., self.bands.reported].mean(-1)
-        # A wrong column moves the light of all orders, which the spectrum answers.
-        slope = torch.einsum("sx,xfl->sfl", self.slope[at], radiance)
-        moved = torch.einsum("sncl,sfl->sncf", colour, slope)
-        drawn = self._first_orders(torch.gradient(radiance, dim=0)[0], at)
-        moved = ((moved + torch.einsum("scfj,snj->sncf", drawn, reflectance)) * root).flatten(2, 3)
-        answer = means @ inverse @ (rows.mT @ moved[..., None])
-        per_px = answer[..., self.bands.reported, 0].square().mean(-1)
-        loss: Tensor = spread + per_px * self._column_variance(slope, zero, colour, y)
-        return loss
-
-    def _first_orders(self, radiance: Tensor, at: Tensor) -> Tensor:
-        """Operator of the first orders, (samples, channels, frames, bands)."""
-        light = torch.einsum("smjx,xfl->smjfl", self.first[at], radiance)
-        return torch.einsum("smjfl,mclj->scfj", light, self.moments) * self.shading[at, None, None, None]
-
-    def _column_variance(self, slope: Tensor, zero: Tensor, colour: Tensor, y: Tensor) -> Tensor:
-        """Variance of the refined column (px^2), mean over the colours of the mosaic, (samples, spectra).
-
-        Amplitude and column are fitted together, as `pattern_column` does; what the amplitude explains of a
-        shift tells nothing of the column. Grey patterns have one amplitude.
-        """
-        white = colour.sum(-1)[..., None]
-        change = torch.einsum("sncl,sfl->sncf", colour, slope)
-        level = torch.einsum("sncl,sfl->sncf", colour, zero)
-        weight = 1 / (self._variance(y) + (pattern_column.DIRECT_ERROR * white) ** 2)
-        both, square = (weight * change * level).sum(-1), (weight * level**2).sum(-1)
-        known = (weight * change**2).sum(-1) - both**2 / square.clip(min=1e-9)
-        return (1 / (known + UNREFINED_PX**-2)).mean(2)
-
-    def _variance(self, radiance: Tensor) -> Tensor:
-        """As `Bracket.variance`, with settings that saturate smoothly."""
-        sensor = self.bracket.sensor
-        limit, total = 0.98 * sensor.full_scale_dn - sensor.black_level_dn, torch.full_like(radiance, 1e-9)
-        for gain in self.bracket.gains_ms:
-            signal = (radiance * gain).clip(min=0)
-            usable = torch.sigmoid((limit - signal) / (SOFT * sensor.full_scale_dn))
-            total = total + usable * gain**2 / (self.bracket.floor + signal / sensor.electrons_per_dn)
-        return 1 / total
+    def error(self, spectral: SpectralSet) -> float:
+        """Expected error of a set, in reflectance: geometric mean over the spectra."""
+        plan = self.plan.model_copy(update={"spectral": spectral})
+        with one_kernel_thread():
+            pixels = VirtualPixels(self.rig, plan, self.grid, self.view)
+            at = pixels.bands.centres_nm
+            rows = np.stack([np.interp(at, FINE_NM, row) for row in self.spectra])
+            nodes = np.tile(rows, (len(self.view.pixels), 1, 1))
+            found = pixels.run(nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))
+        squares = ((found.mean - found.truth) ** 2).mean((0, 1))
+        return float(np.exp(0.5 * np.log(squares).mean()))
 
 
 def design(
@@ -207,55 +126,94 @@ def design(
     frames: int,
     *,
     grid: WavelengthGrid | None = None,
-    options: DesignOptions | None = None,
+    orders: int = 12,
     progress: Progress | None = None,
 ) -> Design:
     """Search ``frames`` patterns for a rig and the settings of a plan; raises `PlanError`.
 
-    The answer depends on the rig, the settings and the options alone.
+    Every kind of line is tried in one order, the best ones in ``orders`` of them. The answer depends on the
+    rig, the settings and the numbers alone.
     """
-    options, progress = options or DesignOptions(), progress or NoProgress()
-    grid = grid or WavelengthGrid()
-    samples = Samples(rig, plan, grid)
-    start = torch.as_tensor(profiles(starting_comb(frames), rig.projector.width_px))
-    # Radiance is searched, not level: at dark columns the gradient of a level vanishes.
-    radiance = start.permute(1, 0, 2).contiguous().requires_grad_()
-    prior, means = _prior(samples.bands.count)
-    draw = torch.Generator().manual_seed(options.seed)
-    adam = torch.optim.Adam([radiance], lr=options.learning_rate, betas=(0.9, 0.99), eps=options.floor)
-    decay = torch.optim.lr_scheduler.CosineAnnealingLR(adam, options.steps, options.learning_rate / 20)
-    losses = []
-    for step in range(options.steps):
-        at = torch.randint(len(samples.zero), (options.samples,), generator=draw)
-        spectra = random_reflectances((options.samples, options.spectra), samples.bands, draw)
-        loss = samples.loss(radiance, at, spectra, prior, means).sqrt().mean()
-        adam.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        adam.step()
-        decay.step()
-        with torch.no_grad():
-            if options.grey:
-                radiance.copy_(radiance.mean(2, keepdim=True).expand_as(radiance))
-            radiance.clip_(0, 1)
-        losses.append(float(loss.detach()))
-        progress.report("design", step + 1, options.steps)
-    shown = radiance.detach().permute(1, 0, 2).numpy() ** (1 / rig.projector_response.gamma)
-    return Design(np.round(255 * shown).astype(np.uint8), tuple(losses))
+    if not 8 <= frames <= 160:
+        raise PlanError(f"A set of {frames} patterns cannot be designed; choose 8 to 160.")
+    if orders < 1:
+        raise PlanError(f"A design needs at least one order of its lines, not {orders}.")
+    progress, judge = progress or NoProgress(), Judge(rig, plan, grid)
+    kinds, combs = list(_kinds(rig, frames)), list(_combs(rig, frames))
+    if not kinds:
+        raise PlanError(f"No lines of {frames} patterns fit the projector of rig {rig.name!r}. Ask for more.")
+    total = len(combs) + len(kinds) + FINALISTS * (orders - 1)
+    count = iter(range(1, total + 1))
+
+    def judged(sets: Iterable[LineComb | MixedLines]) -> list[tuple[float, LineComb | MixedLines]]:
+        found = []
+        for each in sets:
+            found.append((judge.error(_spectral(each, rig)), each))
+            progress.report("design", next(count), total)
+        return sorted(found, key=lambda pair: pair[0])
+
+    comb_error, comb = judged(combs)[0]
+    first = judged(kinds)
+    more = [
+        replace(cast(MixedLines, kind), seed=seed)
+        for _, kind in first[:FINALISTS]
+        for seed in range(2, orders + 1)
+    ]
+    error, lines = min([first[0], *judged(more)], key=lambda pair: pair[0])
+    chosen = cast(MixedLines, lines)
+    return Design(chosen, chosen.levels(rig.projector.width_px), error, cast(LineComb, comb), comb_error)
 
 
-def _prior(bands: int) -> tuple[Tensor, Tensor]:
-    """The solver's prior at one strength as a full matrix, and the matrix of band means."""
-    like_this = torch.zeros(1)
-    shape = banded.to_dense(roughness(bands, like_this)[..., None])[0]
-    eye = torch.eye(bands)
-    return shape * TAU**-2 + eye * Prior().level_std ** -2, band_mean(eye)
+def training_spectra() -> Floats:
+    """Reflectances on `FINE_NM` that designs are judged with, (spectra, wavelengths): 0.02 to 0.95."""
+    random = np.random.Generator(np.random.PCG64(SPECTRA_SEED))
+    x = (FINE_NM - FINE_NM[0]) / (FINE_NM[-1] - FINE_NM[0])
+    waves = np.stack([np.cos(np.pi * k * x) for k in range(len(CALM))])
+    rows = [0.8 * np.exp(-0.5 * ((FINE_NM - centre) / PEAK_STD_NM) ** 2) for centre in PEAKS_NM]
+    for size, count in zip((CALM, LIVELY), DRAWN, strict=True):
+        weights = random.standard_normal((count, len(size))) * size
+        rows += list(0.02 + 0.93 / (1 + np.exp(0.4 - weights @ waves)))
+    return np.stack(rows)
 
 
-def random_reflectances(count: tuple[int, int], bands: Bands, draw: torch.Generator) -> Tensor:
-    """Smooth reflectances (samples, n, bands), 0.02 to 0.95: a few cosines over wavelength in a sigmoid."""
-    nm = like(bands.centres_nm, torch.zeros(1))
-    x = (nm - nm[0]) / (nm[-1] - nm[0])
-    waves = torch.stack([torch.cos(np.pi * k * x) for k in range(8)])
-    size = torch.tensor([1.6, 1.5, 1.2, 0.9, 0.6, 0.4, 0.3, 0.2])
-    weights = torch.randn((*count, 8), generator=draw) * size
-    return 0.02 + 0.93 * torch.sigmoid(weights @ waves - 0.4)
+def _part(view: View, chosen: NDArray[np.bool_]) -> View:
+    return replace(
+        view,
+        pixels=view.pixels[chosen],
+        depth_mm=view.depth_mm[chosen],
+        shading=view.shading[chosen],
+        incidence_tan=view.incidence_tan[chosen],
+    )
+
+
+def _spectral(each: LineComb | MixedLines, rig: Rig) -> SpectralSet:
+    return each if isinstance(each, LineComb) else columns_of(each.levels(rig.projector.width_px))
+
+
+def _steps(rig: Rig, frames: int) -> list[int]:
+    """Steps of lines (px), at least one: runs as long as a part of a first order's spectrum."""
+    pixel = torch.tensor([int(rig.camera.cy_px) * rig.camera.width_px + int(rig.camera.cx_px)])
+    depth = torch.tensor([sum(rig.depth_range_mm) / 2], dtype=torch.float64)
+    columns = correspondence(rig).trace(pixel, depth, 1, np.array(SPECTRUM_NM)).columns
+    span = abs(float(columns[1, 0] - columns[0, 0]))
+    return sorted({max(round(share * span / frames), 1) for share in RUNS})
+
+
+def _kinds(rig: Rig, frames: int) -> Iterator[MixedLines]:
+    for step in _steps(rig, frames):
+        for width in WIDTHS_PX:
+            lines = MixedLines(frames, width, step, 1)
+            if step < width:
+                try:
+                    lines.order(3 * frames)
+                except PlanError:
+                    continue
+                yield lines
+
+
+def _combs(rig: Rig, frames: int) -> Iterator[LineComb]:
+    """Combs of as many frames, in the steps of mixed lines."""
+    for step in _steps(rig, frames):
+        for width in WIDTHS_PX:
+            if step < width < step * frames:
+                yield LineComb(width_px=width, step_px=step, period_px=step * frames)

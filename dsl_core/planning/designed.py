@@ -22,7 +22,10 @@ FOLDER = "patterns"
 
 
 class DesignedSet(Record):
-    """Levels of a designed set, 8 bit (frames, width, 3), zlib-packed in base64, and how it was made."""
+    """Levels of a designed set, 8 bit (frames, width, 3), zlib-packed in base64, and how it was made.
+
+    ``error`` and ``comb_error`` are what was expected of it and of the best comb of as many frames.
+    """
 
     schema_version: Literal[1] = 1
     name: str
@@ -30,8 +33,9 @@ class DesignedSet(Record):
     command: str
     frames: int
     width_px: int
-    loss_start: float
-    loss: float
+    lines: str = ""
+    comb_error: float
+    error: float
     levels: str
 
     @property

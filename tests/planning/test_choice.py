@@ -99,8 +99,8 @@ def test_a_designed_set_survives_its_file(tmp_path: Path) -> None:
         command="",
         frames=8,
         width_px=640,
-        loss_start=2,
-        loss=1,
+        comb_error=2,
+        error=1,
         levels=packed(levels),
     )
     path = save_design(made, tmp_path / "set.json")

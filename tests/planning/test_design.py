@@ -1,53 +1,85 @@
-"""Designed patterns: within what a projector shows, the same every time, and better by their own measure."""
+"""Designed patterns: lines that keep apart, the same every time, and better than combs by expected error."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import CapturePlan, LineComb
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.multiplexed import profiles
 from dsl_core.planning import design as module
-from dsl_core.planning.design import DesignOptions, design, starting_comb
+from dsl_core.planning.design import Judge, columns_of, design, training_spectra
+from dsl_core.planning.designed import designed_sets
+from dsl_core.planning.mixed_lines import DARK_PX, MixedLines
 from dsl_core.simulation.published_rig import published_rig
 
 GRID = WavelengthGrid(step_nm=10)
+PLAN = CapturePlan(code=GrayCode(rows=False))
 
 
-def test_a_short_search_lowers_the_loss_within_8_bit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "SAMPLES", (4, 1))
-    options = DesignOptions(steps=40, samples=4, learning_rate=0.02)
-    made = design(published_rig(), CapturePlan(), 8, grid=GRID, options=options)
-    assert made.levels.shape == (8, 640, 3)
-    assert np.array_equal(made.levels[..., 0], made.levels[..., 2])
-    assert np.mean(made.losses[-8:]) < np.mean(made.losses[:8])
+def test_every_run_of_slots_holds_each_frame_once_and_lines_keep_apart() -> None:
+    lines = MixedLines(frames=32, width_px=7, step_px=3, seed=3)
+    order = lines.order(256)
+    for start in range(0, 256, 32):
+        assert sorted(order[start : start + 32].tolist()) == list(range(32))
+    levels = lines.levels(640)
+    assert set(np.unique(levels)) == {0, 255}
+    assert np.array_equal(levels[..., 0], levels[..., 2])
+    for frame in levels[..., 0]:
+        edges = np.flatnonzero(np.diff(np.r_[0, frame > 0, 0].astype(int)))
+        starts, stops = edges[::2], edges[1::2]
+        assert (starts[1:] - stops[:-1]).min() >= DARK_PX
+        assert (stops - starts)[:-1].tolist() == [7] * (len(starts) - 1)
+
+
+def test_orders_follow_from_seeds_and_differ_from_each_other() -> None:
+    first, again, other = (MixedLines(16, 6, 4, seed).levels(640) for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_lines_that_cannot_keep_apart_are_refused() -> None:
+    with pytest.raises(PlanError, match="do not keep apart"):
+        MixedLines(frames=8, width_px=20, step_px=2, seed=1).order(64)
+    for frames in (4, 200):
+        with pytest.raises(PlanError, match="8 to 160"):
+            design(published_rig(), PLAN, frames)
+
+
+def test_a_design_is_expected_to_beat_the_best_comb_and_is_the_same_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "PLACES", (4, 1))
+    monkeypatch.setattr(module, "WIDTHS_PX", (6,))
+    monkeypatch.setattr(module, "RUNS", (0.5,))
+    made, again = (design(published_rig(), PLAN, 16, grid=GRID, orders=2) for _ in range(2))
+    assert np.array_equal(made.levels, again.levels)
+    assert made.error == again.error
+    assert made.error < 0.97 * made.comb_error
     shown = profiles(made.columns, 640)
     assert np.array_equal(np.round(255 * shown).astype(np.uint8), made.levels)
 
 
-def test_the_start_has_the_frames_asked_for() -> None:
-    for frames in (16, 32, 64):
-        assert len(profiles(starting_comb(frames), 640)) == frames
-    with pytest.raises(PlanError, match="8 to 160"):
-        starting_comb(4)
-
-
 def test_a_comb_that_finds_columns_coarsely_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "SAMPLES", (8, 1))
-    rig = published_rig()
-    samples = module.Samples(rig, CapturePlan(), GRID)
-    draw = torch.Generator().manual_seed(3)
-    at = torch.arange(len(samples.zero))
-    reflectance = module.random_reflectances((len(at), 2), samples.bands, draw)
-    prior, means = module._prior(samples.bands.count)
-    losses = []
-    for width_px in (6, 8):
-        comb = LineComb(width_px=width_px, step_px=4, period_px=64)
-        radiance = torch.as_tensor(profiles(comb, rig.projector.width_px)).permute(1, 0, 2)
-        loss = samples.loss(radiance.float(), at, reflectance, prior, means)
-        losses.append(float(loss.mean().sqrt()))
+    monkeypatch.setattr(module, "PLACES", (6, 1))
+    judge = Judge(published_rig(), PLAN, GRID)
+    errors = [judge.error(LineComb(width_px=w, step_px=4, period_px=64)) for w in (6, 8)]
     # Both edges of 8 columns lie on the same ones of every four, so that columns between them are not found.
-    assert losses[1] > 1.1 * losses[0]
+    assert errors[1] > 1.1 * errors[0]
+
+
+def test_spectra_of_designs_are_reflectances_from_calm_to_narrow() -> None:
+    spectra = training_spectra()
+    assert spectra.min() >= 0
+    assert spectra.max() <= 0.95
+    rough = np.abs(np.diff(spectra[:, ::5], 2, axis=1)).max(1)
+    assert rough.max() > 30 * rough.min()
+
+
+def test_sets_that_come_with_the_program_are_what_their_command_says() -> None:
+    for columns in designed_sets().values():
+        levels = np.round(255 * np.array(columns.levels)).astype(np.uint8)
+        assert columns_of(levels).levels == columns.levels
+        assert levels.shape[1:] == (640, 3)
