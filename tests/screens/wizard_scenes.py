@@ -11,6 +11,8 @@ from PySide6.QtWidgets import QLineEdit
 from app.panels.calibrate_page import CalibratePage
 from app.state.calibrate import ABOUT
 from app.state.wizard import Doing, WizardState
+from app.wizards.evidence_parts import ChartBox
+from app.wizards.selftest_evidence import READING
 from app.wizards.wizard import CalibrationWizard
 from dsl_core.io.campaign_folder import CampaignFolder
 from tests.cases.tiny_campaign import with_options
@@ -36,6 +38,18 @@ class Wizard:
         """Wait until nothing goes on."""
         self.stage.wait(lambda: self.state.doing.value is Doing.IDLE)
 
+    def drawn(self) -> None:
+        """Wait until the evidence is read and every chart has had its turn."""
+
+        def is_drawn() -> bool:
+            boxes = [box for box in self.window.findChildren(ChartBox) if box.isVisible()]
+            return not any(
+                box._draw or (box.sentence.isVisible() and box.sentence.text() == READING) for box in boxes
+            )
+
+        self.stage.settle()
+        self.stage.wait(is_drawn)
+
     def go_to(self, page: int) -> None:
         """Click a page in the list at the left."""
         self.window.steps.setCurrentRow(page)
@@ -53,6 +67,7 @@ def calibrated(name: str, stage: Stage) -> None:
     """A calibration that was accepted: its evidence, its settings, a look at a step, a capture anew."""
     wizard = Wizard(stage, name, stage.material.complete)
     wizard.idle()
+    wizard.drawn()
     stage.shoot("accepted")
     wizard.go_to(0)
     stage.shoot("settings")
@@ -78,6 +93,7 @@ def fresh(stage: Stage) -> None:
     stage.shoot("all")
     stage.wait(lambda: wizard.state.fit.value is not None)
     wizard.idle()
+    wizard.drawn()
     stage.shoot("judge")
     wizard.press("Accept")
     stage.wait(lambda: "The rig lies" in wizard.state.note.value)

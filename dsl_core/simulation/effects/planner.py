@@ -131,7 +131,7 @@ def _weighed(
     for effect in order:
         bound, most = bounds[effect.name], tolerance.of_bound(bounds[effect.name])
         if effect.needed:
-            reasons[effect.name] = (True, _sentence(f"{bound.reason}; it cannot be left out"))
+            reasons[effect.name] = (True, _sentence(f"{bound.reason}; cannot be left out"))
         elif most == 0:
             reasons[effect.name] = (False, _sentence(bound.reason))
         elif spent + most < tolerance.value:
