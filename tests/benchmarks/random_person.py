@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
+from PySide6.QtGui import QDrag
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QWidget
 
@@ -29,6 +30,8 @@ PAGES = ("rig", "calibrate", "scan", "results", "compare")
 #: How long a question may stand before it is given up, and how long a scan may take, s.
 QUESTION_S, PATIENCE_S = 0.4, 400.0
 PAUSE_S = 0.05
+#: When a drag that left the program is let go, ms.
+DROP_MS = 500
 
 
 class RandomPerson:
@@ -98,10 +101,15 @@ class RandomPerson:
         start, end = self._spot(self._top), self._spot(self._top)
         hit = self._top.childAt(start) or self._top
         kind = type(hit).__name__
+        # Marked text that is dragged waits for a button of the real mouse, which nobody lets go.
+        drop = QTimer()
+        drop.timeout.connect(QDrag.cancel)
+        drop.start(DROP_MS)
         QTest.mousePress(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, start))
         for step in (0.3, 0.7, 1.0):
             QTest.mouseMove(hit, hit.mapFrom(self._top, start + (end - start) * step))
         QTest.mouseRelease(hit, Qt.MouseButton.LeftButton, pos=hit.mapFrom(self._top, end))
+        drop.stop()
         return f"{start.x()},{start.y()} to {end.x()},{end.y()} {kind}"
 
     def _type(self) -> str:
