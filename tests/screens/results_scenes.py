@@ -69,6 +69,10 @@ def views(stage: Stage) -> None:
     for view in View:
         stage.window.do(view.value)
         stage.idle()
+        if view is View.CLOUD:
+            # Graphics begin in turns of their own.
+            stage.wait(lambda: page.scene.scene is not None)
+            stage.settle()
         stage.shoot(view.value.removeprefix("view_"))
     stage.window.do("view_quality")
     for quality in Quality:
