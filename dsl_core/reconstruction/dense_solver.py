@@ -30,7 +30,7 @@ def solve_dense(data: Tensor, right: Tensor, prior: Prior) -> Spectra:
         found = _solve(data, right, prior)
     except torch.linalg.LinAlgError:  # type: ignore[attr-defined]
         data = _semidefinite(data, prior)
-        found = _solve(data.double(), right.double(), prior)
+        found = _solve(data.double(), right.double(), prior).to(right.dtype)
     faint = too_faint(torch.diagonal(data, dim1=1, dim2=2).T, prior)
     if bool(faint.any()):
         found.put(faint, _solve(data[faint].double(), right[faint].double(), prior))

@@ -69,6 +69,11 @@ class Spectra:
             nodes, mean, std, share, torch.empty_like(like[0]), torch.zeros_like(like, dtype=torch.bool)
         )
 
+    def to(self, dtype: torch.dtype) -> Spectra:
+        """The same in another precision, masks as they are."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return Spectra(*(v.to(dtype) if v.is_floating_point() else v for v in values))
+
     def put(self, where: Tensor, other: Spectra) -> None:
         """Replace the pixels of a mask (pixels,) by other spectra."""
         for field in fields(self):

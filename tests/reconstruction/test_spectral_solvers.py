@@ -175,6 +175,7 @@ def test_what_bright_data_leave_open_stays_open_in_single_precision() -> None:
     found = solve_dense(data, right, loose)
     assert (found.nodes.reshape(3, 4, 3).mean(1) - torch.tensor([[0.2], [0.5], [0.7]])).abs().max() < 0.01
     assert found.std.min() > 0.05
+    assert found.nodes.dtype == torch.float32  # beside the results of tiles that needed no double
 
 
 def test_faint_pixels_are_solved_in_double_whoever_is_beside_them() -> None:
