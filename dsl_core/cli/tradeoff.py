@@ -74,7 +74,7 @@ def design(
     calibration: CalibrationName = None,
     orders: Annotated[
         int, typer.Option("--orders", help="Orders tried of the best lines; more take longer.", min=1)
-    ] = 12,
+    ] = 24,
     plan: Annotated[
         Path | None, typer.Option("--plan", help="Also write a plan with these patterns.")
     ] = None,

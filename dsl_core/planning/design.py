@@ -126,7 +126,7 @@ def design(
     frames: int,
     *,
     grid: WavelengthGrid | None = None,
-    orders: int = 12,
+    orders: int = 24,
     progress: Progress | None = None,
 ) -> Design:
     """Search ``frames`` patterns for a rig and the settings of a plan; raises `PlanError`.

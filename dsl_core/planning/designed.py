@@ -33,7 +33,7 @@ class DesignedSet(Record):
     command: str
     frames: int
     width_px: int
-    lines: str = ""
+    lines: str
     comb_error: float
     error: float
     levels: str

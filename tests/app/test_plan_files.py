@@ -27,7 +27,7 @@ def design(folder: Path, width_px: int = 640) -> Path:
     levels[np.arange(width_px) % 16, np.arange(width_px)] = 255
     made = DesignedSet(
         name="designed 16", rig="twin", command="dsl-scan design", frames=16, width_px=width_px,
-        comb_error=0.02, error=0.01, levels=packed(levels),
+        lines="lines", comb_error=0.02, error=0.01, levels=packed(levels),
     )  # fmt: skip
     return save_design(made, folder / "set.json")
 

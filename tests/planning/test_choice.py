@@ -99,6 +99,7 @@ def test_a_designed_set_survives_its_file(tmp_path: Path) -> None:
         command="",
         frames=8,
         width_px=640,
+        lines="lines",
         comb_error=2,
         error=1,
         levels=packed(levels),

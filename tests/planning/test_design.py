@@ -10,9 +10,10 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.multiplexed import profiles
 from dsl_core.planning import design as module
-from dsl_core.planning.design import Judge, columns_of, design, training_spectra
-from dsl_core.planning.designed import designed_sets
+from dsl_core.planning.design import Judge, design, training_spectra
+from dsl_core.planning.designed import designed_sets, load_design
 from dsl_core.planning.mixed_lines import DARK_PX, MixedLines
+from dsl_core.resources import resource_path
 from dsl_core.simulation.published_rig import published_rig
 
 GRID = WavelengthGrid(step_nm=10)
@@ -78,8 +79,11 @@ def test_spectra_of_designs_are_reflectances_from_calm_to_narrow() -> None:
     assert rough.max() > 30 * rough.min()
 
 
-def test_sets_that_come_with_the_program_are_what_their_command_says() -> None:
-    for columns in designed_sets().values():
-        levels = np.round(255 * np.array(columns.levels)).astype(np.uint8)
-        assert columns_of(levels).levels == columns.levels
-        assert levels.shape[1:] == (640, 3)
+def test_sets_that_come_with_the_program_are_the_lines_that_they_name() -> None:
+    """Orders follow from seeds by a random generator that must not change under shipped sets."""
+    found = {made.lines: made.array for made in map(load_design, resource_path("patterns").glob("*.json"))}
+    expected = (MixedLines(16, 6, 4, 10), MixedLines(32, 9, 2, 24), MixedLines(64, 9, 1, 2))
+    assert set(found) == {lines.name for lines in expected}
+    for lines in expected:
+        assert np.array_equal(found[lines.name], lines.levels(640))
+    assert [len(columns.levels) for columns in designed_sets().values()] == [16, 32, 64]

@@ -139,8 +139,8 @@ def designed(stage: Stage) -> None:
     levels = np.zeros((16, 640, 3), np.uint8)
     levels[np.arange(640) // 2 % 16, np.arange(640)] = 255
     made = DesignedSet(
-        name="designed 16", rig="twin", command="", frames=16, width_px=640, comb_error=0.02, error=0.01,
-        levels=packed(levels),
+        name="designed 16", rig="twin", command="", frames=16, width_px=640, lines="lines",
+        comb_error=0.02, error=0.01, levels=packed(levels),
     )  # fmt: skip
     stage.window.open_path(save_design(made, stage.folder / "set.json"))
     stage.wait(lambda: scan.state.plan.value.name == "designed 16")
