@@ -21,6 +21,7 @@ DISTRIBUTIONS = {
     "PySide6": "pyside6-essentials",
     "colour": "colour-science",
     "cv2": "opencv-contrib-python-headless",
+    "vtkmodules": "vtk",
 }
 # The desktop application is built on these; until its first window nothing imports them.
 OF_THE_APP = {"platformdirs", "pyside6-essentials", "pyqtgraph", "pyvista", "pyvistaqt", "superqt"}
