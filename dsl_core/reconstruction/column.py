@@ -49,8 +49,8 @@ def refine(
 
     ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
     saturated. Where the fit fails, the decoded column stays, with the deviation of a whole pixel,
-    ``1/sqrt(12)``, and the brightest frame near it for an amplitude; that one's deviation is infinite unless
-    all frames near it were measured.
+    ``1/sqrt(12)``. Its amplitude is that of the brightest frame near it, or of the fit to what is left where
+    frames are saturated, with an infinite deviation: less would make light of the zero order beside them.
     """
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
     q = coarse_px.clone()
@@ -71,12 +71,13 @@ def refine(
     std_px = torch.sqrt(chi_square.clip(min=1) / information)
     good = (used > 3) & (amplitude > 0) & (chi_square < MAX_CHI_SQUARE) & (std_px < 1 / math.sqrt(12))
     good &= ((q - coarse_px).abs() < MAX_SHIFT_PX) & torch.isfinite(q)
-    known = good | torch.isfinite(variance).all(0)
+    measured = torch.isfinite(variance).all(0)
+    otherwise = torch.where(measured, brightest, torch.maximum(amplitude, brightest))
     return Column(
         torch.where(good, q, coarse_px),
         torch.where(good, std_px, torch.full_like(q, 1 / math.sqrt(12))),
-        torch.where(good, amplitude, brightest),
-        torch.where(known, 1 / torch.sqrt(gg), torch.inf),
+        torch.where(good, amplitude, otherwise),
+        torch.where(good | measured, 1 / torch.sqrt(gg), torch.inf),
         good,
     )
 

@@ -192,3 +192,16 @@ def test_a_lonely_pixel_has_no_normal() -> None:
     surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.3), 5)
     assert np.isnan(surface.normals[:, 10, 10]).all()
     assert np.isfinite(surface.normals[:, 50, 50]).all()
+
+
+def test_a_saturated_line_is_as_bright_as_its_flanks_say() -> None:
+    column, amplitude, radiance, std = noisy(0.003)
+    bright = peaks(column, amplitude) > 0.2 * amplitude
+    radiance[bright], std[bright] = 0.0, torch.inf
+    found = refine(column.round(), radiance, std, LINES, RESPONSE)
+    unsure = ~found.refined
+    assert unsure.float().mean() > 0.1
+    # The brightest frame that was measured would have a fifth of it at most.
+    share = found.amplitude[unsure] / amplitude[unsure]
+    assert float(share.median()) > 0.4
+    assert torch.isinf(found.amplitude_std[unsure]).all()
