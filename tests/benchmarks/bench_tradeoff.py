@@ -1,8 +1,9 @@
 """Predicted against measured: many plans on small pieces of the twin, and what the model says of them.
 
 Run ``python -m tests.benchmarks.bench_tradeoff FOLDER [--quick] [--json FILE]`` from the repository's root.
-Points are kept in the folder, one file each: a run that was stopped goes on. Measured are the spectra of a
-Color Checker in two pieces of the picture; predicted are the same figures for pixels in these pieces.
+Points are kept in the folder, one file each: a run that was stopped goes on, and `bench_front` has the same.
+Measured are the spectra of a Color Checker in two pieces of the picture, by our solver; predicted are the
+same figures for pixels in these pieces.
 """
 
 from __future__ import annotations
@@ -14,13 +15,17 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
+from dsl_core.planning.binning import binned
 from dsl_core.planning.prediction import Prediction, predict
 from dsl_core.planning.sweep import Case, Point, run_sweep, write_csv
 from dsl_core.planning.trial import trial_view
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json
+from tests.benchmarks.front_cases import front_cases
 
 PERIOD_MS = 1000 / 60
 CLOSE = 0.20
@@ -54,18 +59,35 @@ def cases(quick: bool) -> list[Case]:
     return found[:4] if quick else found
 
 
+def all_cases(rig: Rig) -> list[Case]:
+    """These and all of the front's that are of the chart and by our solver, each once."""
+    ours = (case for case in front_cases(rig) if case.palette == "chart" and case.solver == "best")
+    once = {}
+    for case in (*cases(False), *ours):
+        plan = case.plan.model_copy(update={"name": ""})
+        once[plan.model_dump_json(), case.binning, case.step_nm] = case
+    return list(once.values())
+
+
+def _predict(rig: Rig, case: Case) -> Prediction:
+    view = trial_view(binned(rig, case.binning), references.chart())
+    grid = WavelengthGrid(step_nm=case.step_nm)
+    return predict(rig, case.plan, view, grid=grid, binning=case.binning, latency_ms=LATENCY_MS)
+
+
 def main() -> None:
     """Measure, predict, compare."""
     parser = options(__doc__)
     parser.add_argument("folder", type=Path)
     chosen = parser.parse_args()
-    rig, todo = published_rig(), cases(chosen.quick)
+    rig = published_rig()
+    todo = cases(chosen.quick) if chosen.quick else all_cases(rig)
     points = run_sweep(rig, todo, chosen.folder, LATENCY_MS, _Lines())
-    view = trial_view(rig, references.chart())
     predictions, seconds = [], []
+    _predict(rig, todo[0])  # loads what all predictions share
     for case in todo:
         start = time.perf_counter()
-        predictions.append(predict(rig, case.plan, view, latency_ms=LATENCY_MS))
+        predictions.append(_predict(rig, case))
         seconds.append(time.perf_counter() - start)
     write_csv(points, chosen.folder / "points.csv", overwrite=True)
     report(points, predictions, seconds)
