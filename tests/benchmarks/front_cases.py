@@ -114,13 +114,14 @@ def _knobs() -> Iterator[Case]:
 
 
 def designed_cases(rig: Rig, palette: str) -> list[Case]:
-    """The designed sets that come with the program, with the published settings."""
+    """The designed sets that come with the program, with the published settings; the largest with all."""
     width = rig.projector.width_px
-    return [
-        _case(name, columns, "published", PUBLISHED, palette)
-        for name, columns in designed_sets().items()
-        if len(columns.levels[0]) == width
-    ]
+    sets = {name: columns for name, columns in designed_sets().items() if len(columns.levels[0]) == width}
+    found = [_case(name, columns, "published", PUBLISHED, palette) for name, columns in sets.items()]
+    largest = max(sets, key=lambda name: len(sets[name].levels), default=None)
+    if largest is not None:
+        found += [_case(largest, sets[largest], *knob, palette) for knob in BRACKETS.items()]
+    return found
 
 
 def _case(name: str, spectral: SpectralSet, words: str, bracket: Bracket, palette: str) -> Case:
