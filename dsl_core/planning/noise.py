@@ -20,37 +20,47 @@ SATURATED = 0.98
 
 @dataclass(frozen=True)
 class Bracket:
-    """Gains (ms at full drive) and the sensor of a plan's settings; radiances are in DN per ms."""
+    """Gains (ms at full drive), exposures and the sensor of a plan's settings; radiances are in DN per ms.
+
+    ``black`` is the radiance of the projector's black, which no level dims: what a black frame holds of it is
+    taken off, its shot noise is not. Beside the first orders of a dark setting it is most of the light.
+    """
 
     gains_ms: tuple[float, ...]
+    exposures_ms: tuple[float, ...]
     sensor: Sensor
 
     @classmethod
     def of(cls, rig: Rig, plan: CapturePlan) -> Bracket:
         """The bracket of a plan on a rig."""
-        return cls(tuple(setting_gains_ms(plan.settings, rig.projector_response).tolist()), rig.sensor)
+        gains = setting_gains_ms(plan.settings, rig.projector_response).tolist()
+        return cls(tuple(gains), tuple(setting.exposure_ms for setting in plan.settings), rig.sensor)
 
-    @property
-    def floor(self) -> float:
-        """Variance of a raw value without light, DN^2: read noise and rounding."""
-        return self.sensor.read_noise_dn**2 + 1 / 12
+    def floors(self, black: Tensor) -> Tensor:
+        """Variance of a raw value of each setting's black frame, DN^2, (settings, ...)."""
+        return torch.stack([self._floor(black * exposure_ms) for exposure_ms in self.exposures_ms])
 
-    def information(self, radiance: Tensor) -> Tensor:
+    def _floor(self, black_dn: Tensor) -> Tensor:
+        """Read noise, rounding and the shot noise of black."""
+        return self.sensor.read_noise_dn**2 + 1 / 12 + black_dn / self.sensor.electrons_per_dn
+
+    def information(self, radiance: Tensor, black: Tensor) -> Tensor:
         """Inverse variance of each setting's own estimate, (settings, ...); zero where saturated."""
         limit = SATURATED * self.sensor.full_scale_dn - self.sensor.black_level_dn
         parts = []
-        for gain in self.gains_ms:
-            signal = (radiance * gain).clip(min=0)
-            parts.append((signal < limit) * gain**2 / (self.floor + signal / self.sensor.electrons_per_dn))
+        for gain, exposure_ms in zip(self.gains_ms, self.exposures_ms, strict=True):
+            signal, black_dn = (radiance * gain).clip(min=0), black * exposure_ms
+            variance = self._floor(black_dn) + signal / self.sensor.electrons_per_dn
+            parts.append((signal + black_dn < limit) * gain**2 / variance)
         return torch.stack(parts)
 
-    def variance(self, radiance: Tensor) -> Tensor:
+    def variance(self, radiance: Tensor, black: Tensor) -> Tensor:
         """Variance of the merged radiance, same shape; infinite where every setting is saturated."""
-        return 1 / self.information(radiance).sum(0)
+        return 1 / self.information(radiance, black).sum(0)
 
-    def black_weights(self, radiance: Tensor) -> Tensor:
+    def black_weights(self, radiance: Tensor, black: Tensor) -> Tensor:
         """How much a DN of each setting's black frame lowers the merged radiance, (settings, ...)."""
-        information = self.information(radiance)
+        information = self.information(radiance, black)
         share = information / information.sum(0).clip(min=1e-30)
         gains = torch.tensor(self.gains_ms).to(radiance)
         return share / gains.reshape(-1, *(1,) * radiance.ndim)

@@ -38,6 +38,9 @@ from dsl_core.reconstruction.surface import default_window_px
 STEP_PX = 0.2
 #: Virtual pixels lie up to this far from their sample's column where columns are refined, px.
 OFFSET_PX = 4.0
+#: Share of the error granted to the linear model that differs from pixel to pixel, of what noise-free scans
+#: of the twin's chart left (combs 9x2x64, 5x2x80 and 6x4x64); the rest is common to a patch.
+SCATTER = 0.25
 #: Frames whose light at a sample is below this share of the strongest take no part.
 DARK = 1e-4
 
@@ -186,20 +189,22 @@ class _Run:
         self.factors = factors[:, None, :, None]
         self.shading = owner.shading[:, None]
         clean = first + zero
-        spread = owner.bracket.variance(clean) * self.factors
+        #: Light of the projector's black, (samples, spectra, 3, 1).
+        self.black = rig.projector_response.black_fraction * self._white((0, *ORDERS))[..., None]
+        spread = owner.bracket.variance(clean, self.black) * self.factors
         self.saturated = ~torch.isfinite(spread)
         noise = self._normal(clean.shape) * torch.where(self.saturated, 0.0, spread).sqrt()
         self.noisy = clean + noise + self._black(clean)
-        self.variance = owner.bracket.variance(self.noisy)
+        self.variance = owner.bracket.variance(self.noisy, self.black)
 
     def _normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
         return torch.randn(shape, generator=self.random)
 
     def _black(self, clean: Tensor) -> Tensor:
         """Noise of the black frames: common to all frames of a pixel."""
-        weights = self.owner.bracket.black_weights(clean)
-        shape = (len(weights), *clean.shape[:3], 1)
-        return -(weights * self._normal(shape) * (self.owner.bracket.floor * self.factors).sqrt()).sum(0)
+        bracket = self.owner.bracket
+        weights, floors = bracket.black_weights(clean, self.black), bracket.floors(self.black)
+        return -(weights * self._normal(floors.shape) * (floors * self.factors).sqrt()).sum(0)
 
     def _columns(self) -> tuple[Column, Tensor]:
         """Refined columns of all virtual pixels from their own samples of the mosaic, and their errors.
@@ -218,10 +223,11 @@ class _Run:
         zero = torch.einsum("nlf,nl->nf", light, leds.flatten(0, 1)).reshape(samples, count, frames)
         index = own[:, None, None, None].expand(-1, count, 1, frames)
         clean = self.first.gather(2, index)[:, :, 0] + zero
-        spread = owner.bracket.variance(clean)
+        black = self.black.gather(2, index[..., :1])[:, :, 0]
+        spread = owner.bracket.variance(clean, black)
         sigma = torch.where(torch.isfinite(spread), spread, 0.0).sqrt()
         y = clean + self._normal(clean.shape) * sigma
-        std = owner.bracket.variance(y).sqrt()
+        std = owner.bracket.variance(y, black).sqrt()
         radiance, std = (v.reshape(-1, frames).T.contiguous() for v in (y, std))
         if owner.lines is not None:
             column = refine(true.round(), radiance, std, owner.lines, response)
@@ -236,8 +242,8 @@ class _Run:
         owner = self.owner
         column, error_px = self._columns()
         depth_error = error_px.double() * owner.slope_mm[:, None]
-        # What the reconstruction grants its linear model as error is drawn as well.
-        base = self.noisy + MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
+        # Of what the reconstruction grants its linear model as error, what scatters is drawn as well.
+        base = self.noisy + SCATTER * MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
         clean = self.first + self.zero
         if owner.single:
             # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
@@ -274,16 +280,10 @@ class _Run:
         spread = self.variance * self.factors + (MODEL_ERROR * self.noisy) ** 2
         if not owner.single:
             found = (owner.column.float()[:, None] + error_px).flatten()
-            colour = self._colour().flatten(0, 1).T
+            colour = self._white((0,)).flatten(0, 1).T
             direct = direct_light(owner.modelled, owner.bands, found, colour)
             spread = spread + (DIRECT_ERROR * direct.permute(2, 0, 1).reshape(spread.shape)) ** 2
         return torch.where(self.saturated, 0.0, 1 / spread)
-
-    def _colour(self) -> Tensor:
-        """Zero-order colour under white, (samples, spectra, 3)."""
-        moments = like(self.owner.bands.moments[0].sum(1), self.first)
-        reflectance = self.nodes
-        return torch.einsum("cj,srj->src", moments, reflectance) * self.shading[..., None]
 
     def _solve(
         self, weight: Tensor, noisy: Tensor, clean: Tensor, error_px: Tensor, spread: Tensor
@@ -324,7 +324,7 @@ class _Run:
         reached = torch.stack(list(owner.inside.values())).any(0).all(0)
         if bool(reached.all()):
             return matrix, right, quiet
-        colour = self._colour()
+        colour = self._white((0,))
         variance = spread[..., None] ** 2 * self.factors[..., 0]
         root = (~reached).float()[:, None, None] / (variance + (COLOUR_ERROR * colour) ** 2).sqrt()
         moments = like(owner.bands.moments[0].sum(1), matrix)
@@ -359,19 +359,20 @@ class _Run:
         from dsl_core.reconstruction.geometry import LIT_SIGMAS
 
         owner = self.owner
-        own = torch.as_tensor(own_channel(owner.rig, owner.view.pixels))
-        direct, first = (
-            torch.einsum("sj,srj->sr", self._white_moments(orders)[own], self.nodes) * self.shading
-            for orders in ((0,), ORDERS)
+        own = torch.as_tensor(own_channel(owner.rig, owner.view.pixels))[:, None, None]
+        direct, first, black = (
+            white.gather(2, own.expand(-1, white.shape[1], 1))[..., 0]
+            for white in (self._white((0,)), self._white(ORDERS), self.black[..., 0])
         )
-        noise = owner.bracket.variance(direct).sqrt()
+        noise = owner.bracket.variance(direct, black).sqrt()
         to_edge = 0.5 - (column_px - column_px.round()).abs()
         darker = torch.special.ndtr(-to_edge / owner.rig.projector_response.blur_px)
-        unsure = ~torch.isfinite(owner.bracket.variance(direct * darker + first / 2))
+        unsure = ~torch.isfinite(owner.bracket.variance(direct * darker + first / 2, black))
         lit: Tensor = ((direct > LIT_SIGMAS * noise) | ~torch.isfinite(noise)) & (refined | ~unsure)
         return lit
 
-    def _white_moments(self, orders: tuple[int, ...]) -> Tensor:
-        """Response to white through some orders, (3, bands)."""
+    def _white(self, orders: tuple[int, ...]) -> Tensor:
+        """Signal under white through some orders, (samples, spectra, 3), DN per ms."""
         moments = sum(self.owner.bands.moments[order].sum(1) for order in orders)
-        return like(np.asarray(moments), self.nodes)
+        white = torch.einsum("cj,srj->src", like(np.asarray(moments), self.nodes), self.nodes)
+        return white * self.shading[..., None]

@@ -14,18 +14,21 @@ from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, setting_gains_ms
 from tests.cases.small_rig import small_rig
 
 
+@pytest.mark.parametrize("black_light", [0.0, 0.4])
 @pytest.mark.parametrize("radiance", [0.0, 0.5, 8.0, 60.0])
-def test_variance_is_that_of_the_merger(radiance: float) -> None:
+def test_variance_is_that_of_the_merger(radiance: float, black_light: float) -> None:
     rig, plan = small_rig(), CapturePlan()
     gains = setting_gains_ms(plan.settings, rig.projector_response)
-    black = np.full((4, 4), rig.sensor.black_level_dn, np.float32)
-    blacks = [BlackFrame(black, np.zeros_like(black)) for _ in gains]
+    levels = [rig.sensor.black_level_dn + black_light * setting.exposure_ms for setting in plan.settings]
+    blacks = [np.full((4, 4), level, np.float32) for level in levels]
     raws = [
         np.clip(np.rint(black + gain * radiance), 0, rig.sensor.full_scale_dn).astype(np.uint16)
-        for gain in gains
+        for black, gain in zip(blacks, gains, strict=True)
     ]
-    merged = HdrMerger(gains, blacks, rig.sensor).merge(raws)
-    expected = float(Bracket.of(rig, plan).variance(torch.tensor([radiance]))[0])
+    merger = HdrMerger(gains, [BlackFrame(black, np.zeros_like(black)) for black in blacks], rig.sensor)
+    merged = merger.merge(raws)
+    bracket = Bracket.of(rig, plan)
+    expected = float(bracket.variance(torch.tensor([radiance]), torch.tensor([black_light]))[0])
     assert expected == pytest.approx(float(merged.variance[0, 0]), rel=0.05)
 
 
@@ -33,7 +36,7 @@ def test_saturation_everywhere_is_infinite_variance() -> None:
     bracket = Bracket.of(
         small_rig(), CapturePlan(settings=(Setting(exposure_ms=100, level=1),), code_settings=(0,))
     )
-    assert torch.isinf(bracket.variance(torch.tensor([1000.0]))).all()
+    assert torch.isinf(bracket.variance(torch.tensor([1000.0]), torch.zeros(1))).all()
 
 
 def test_factors_are_those_of_demosaicing() -> None:
