@@ -83,8 +83,11 @@ class VirtualPixels:
         *,
         prior: Prior | None = None,
         surface_window_px: int | None = None,
+        scatter: float = SCATTER,
         seed: int = 0,
     ) -> None:
+        """``scatter`` is the share of the granted model error that differs from pixel to pixel."""
+        self.scatter = scatter
         self.rig, self.plan, self.grid, self.view = rig, plan, grid, view
         self.prior, self.seed = prior or Prior().at_step(grid.step_nm), seed
         self.shading = torch.as_tensor(view.shading, dtype=torch.float32)
@@ -243,7 +246,7 @@ class _Run:
         column, error_px = self._columns()
         depth_error = error_px.double() * owner.slope_mm[:, None]
         # Of what the reconstruction grants its linear model as error, what scatters is drawn as well.
-        base = self.noisy + SCATTER * MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
+        base = self.noisy + owner.scatter * MODEL_ERROR * self.noisy * self._normal(self.noisy.shape)
         clean = self.first + self.zero
         if owner.single:
             # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
