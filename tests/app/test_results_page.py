@@ -389,8 +389,8 @@ def test_a_result_that_is_closed_leaves_no_copy_behind(bench: Bench, qtbot: QtBo
     assert result() is None
 
 
-@pytest.mark.gl
-def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) -> None:
+def _cloud(bench: Bench, qtbot: QtBot) -> GlScene:
+    """The 3D view with its first points."""
     if not gl_works():
         pytest.skip("no OpenGL here")
     bench.control.show(View.CLOUD)
@@ -398,6 +398,12 @@ def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) 
     scene = bench.page.scene.scene
     assert isinstance(scene, GlScene)
     qtbot.waitUntil(lambda: scene.shown > 0)
+    return scene
+
+
+@pytest.mark.gl
+def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) -> None:
+    scene = _cloud(bench, qtbot)
     widget = scene.widget
     middle = QPoint(widget.width() // 2, widget.height() // 2)
     move(widget, middle)
@@ -417,13 +423,7 @@ def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) 
 
 @pytest.mark.gl
 def test_who_turns_the_cloud_is_not_slowed_down_by_what_moved_before(bench: Bench, qtbot: QtBot) -> None:
-    if not gl_works():
-        pytest.skip("no OpenGL here")
-    bench.control.show(View.CLOUD)
-    qtbot.waitUntil(lambda: bench.page.scene.scene is not None)
-    scene = bench.page.scene.scene
-    assert isinstance(scene, GlScene)
-    qtbot.waitUntil(lambda: scene.shown > 0)
+    scene = _cloud(bench, qtbot)
     middle = scene.widget.rect().center()
     scene.show_marker(np.array([0, 0, 700], np.float32), "#ff0000")
     QTest.mousePress(scene.widget, Qt.MouseButton.LeftButton, pos=middle)

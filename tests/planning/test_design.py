@@ -58,7 +58,7 @@ def test_a_design_is_expected_to_beat_the_best_comb_and_is_the_same_again(
     made, again = (design(published_rig(), PLAN, 16, grid=GRID, orders=2) for _ in range(2))
     assert np.array_equal(made.levels, again.levels)
     assert made.error == again.error
-    assert made.error < made.comb_error
+    assert made.error < 0.97 * made.comb_error
     shown = profiles(made.columns, 640)
     assert np.array_equal(np.round(255 * shown).astype(np.uint8), made.levels)
 
