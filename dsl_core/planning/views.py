@@ -113,13 +113,12 @@ def _spread(usable: NDArray[np.bool_], grid: tuple[int, int]) -> NDArray[np.int6
     across, down = min(grid[0], width), min(grid[1], height)
     x = np.linspace(RIM, 1 - RIM, across) * (width - 1)
     y = np.linspace(RIM, 1 - RIM, down) * (height - 1) if down > 1 else np.array([(height - 1) / 2])
-    candidates = np.argwhere(usable)
     phases = {(a, b): np.argwhere(usable[a::2, b::2]) * 2 + (a, b) for a in (0, 1) for b in (0, 1)}
     chosen = []
     for j, top in enumerate(y):
         for i, left in enumerate(x):
             near = phases[(i // 2 + j) % 2, i % 2]
-            near = near if len(near) else candidates
+            near = near if len(near) else np.argwhere(usable)
             best = near[np.argmin(((near - (top, left)) ** 2).sum(1))]
             chosen.append(best[0] * width + best[1])
     return np.unique(np.asarray(chosen, np.int64))

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from app.application import keep_house
+from app.controllers.scan import ScanController
 from app.jobs.warm_up import WarmUp
 from app.panels.compare_page import ComparePage
 from app.panels.results_page import ResultsPage
@@ -120,14 +121,19 @@ class WindowJobs:
 
     # Scan ------------------------------------------------------------------------------------------
 
-    def _scan(self) -> None:
-        with self._job("connect"):
-            self.stage.connect(SCAN_RIG)
+    def _scan_page(self) -> tuple[ScanPage, ScanController]:
         page = self.stage.window.open_page("scan")
         assert isinstance(page, ScanPage)
         self.stage.idle()
-        control, state = self.stage.composition._scans, page._state
+        control = self.stage.composition._scans
         assert control is not None
+        return page, control
+
+    def _scan(self) -> None:
+        with self._job("connect"):
+            self.stage.connect(SCAN_RIG)
+        page, control = self._scan_page()
+        state = page._state
         state.then_reconstruct.set(False)
         control.plans.choose_preset("reference")
         control.start()
@@ -146,11 +152,8 @@ class WindowJobs:
     def _plan(self) -> None:
         """Predict for plans that are dragged about, then weigh effects while a person chooses."""
         self.stage.connect(SCAN_RIG)
-        page = self.stage.window.open_page("scan")
-        assert isinstance(page, ScanPage)
-        self.stage.idle()
-        control, forecast = self.stage.composition._scans, page.forecast
-        assert control is not None
+        page, control = self._scan_page()
+        forecast = page.forecast
         page.middle.setCurrentWidget(forecast)
         control.plans.choose_preset("reference")
         forecast._commands.begin()  # type: ignore[attr-defined]
