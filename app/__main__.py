@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not has_screen(sys.platform, os.environ):
         print(NO_SCREEN, file=sys.stderr)
         return 2
-    # pyvistaqt and superqt ask which Qt to use before anything of ours is imported by them.
+    # superqt asks which Qt to use before anything of ours is imported by them.
     os.environ.setdefault("QT_API", "pyside6")
     from PySide6.QtCore import QTimer
 

@@ -47,7 +47,7 @@ STEPS = (
     "matplotlib.figure",
     "colour",
     "pyvista",
-    "pyvistaqt",
+    "pyvista.plotting",
 )
 #: Rest between two steps, s.
 REST_S = 0.05

@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 Points = NDArray[np.float32]
 #: Points drawn while the view turns.
-COARSE = 30_000
-#: A picture at rest may take so long, s: whoever works on meanwhile must not notice it. Steps that add less
-#: than a share of what is there are not worth it.
-SLOW_S, LEAST_STEP = 0.03, 0.25
-#: Points that graphics take in before one picture: a hundred thousand would stop the window.
-LARGEST_STEP = 40_000
+COARSE = 60_000
+#: A picture at rest may take so long, s: who begins to turn the view waits for it. Steps that add less than a
+#: share of what is there are not worth it.
+SLOW_S, LEAST_STEP = 0.1, 0.25
 POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 6
 #: Pixels of a view that a cloud covers, about; points that are few are drawn larger, so that it is no veil.
 COVERED_PX = 200_000
@@ -33,7 +31,7 @@ class Cloud:
         self._colours: NDArray[np.uint8] = np.empty((0, 3), np.uint8)
         self._parts: dict[str, NDArray[np.int32]] = {}
         self._order = np.empty(0, np.int32)
-        self._is_coarse = False
+        self.is_coarse = False
 
     def show(self, points: Points, colours: NDArray[np.uint8]) -> bool:
         """Show a cloud; True when it is another than before, and not only of other colours."""
@@ -43,7 +41,7 @@ class Cloud:
             first, *others = self._parts
             self._drop(others)
             self._meshes[first]["colours"] = colours[self._parts[first]]
-            self.be_coarse(self._is_coarse)
+            self.be_coarse(self.is_coarse)
             return False
         self._drop(list(self._parts))
         self._points = points
@@ -64,7 +62,7 @@ class Cloud:
         room = int(self.shown * min(SLOW_S / max(frame_s, 1e-4) - 1, 1.0))
         if left == 0 or room < min(left, LEAST_STEP * self.shown):
             return False
-        self._add(min(room, left, LARGEST_STEP))
+        self._add(min(room, left))
         return True
 
     def _add(self, count: int) -> None:
@@ -73,7 +71,7 @@ class Cloud:
         self._parts[name] = index
         self.shown += len(index)
         self._put(name, self._points[index], self._colours[index], POINT_PX)
-        self.be_coarse(self._is_coarse)
+        self.be_coarse(self.is_coarse)
 
     def _put(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: int) -> None:
         import pyvista
@@ -110,7 +108,7 @@ class Cloud:
 
     def be_coarse(self, coarse: bool) -> None:
         """Show the first part alone, or all of them; the fewer points, the larger."""
-        self._is_coarse = coarse
+        self.is_coarse = coarse
         size_px = point_size(min(COARSE, self.shown) if coarse else self.shown)
         for number, name in enumerate(self._parts):
             actor = self._actors[name]

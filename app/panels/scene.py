@@ -1,30 +1,37 @@
-"""Points in space behind a small protocol: by VTK where there is OpenGL, else as a picture or a sentence.
-
-pyvista and its Qt window are imported here and in `cloud` alone, when a cloud is first looked at.
-"""
+"""Points in space behind a small protocol: by VTK where it can draw, else as a picture and a sentence."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QPointF, QTimer
-from PySide6.QtGui import QGuiApplication, QMouseEvent, QOffscreenSurface, QOpenGLContext
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QResizeEvent,
+    QWheelEvent,
+)
 from PySide6.QtWidgets import QWidget
 
-from app.panels.cloud import Cloud, Points
+from app.panels.artist import Artist, MouseButton, Picture, graphics_work
+from app.panels.cloud import Points
 from app.panels.still_scene import StillScene
+from app.widgets.arrow_keys import arrow_step
 
-#: How long after the last move the whole cloud comes back, ms.
-SETTLE_MS = 250
-#: How long the window may do other things between two steps in which a cloud grows, ms.
-GROW_MS = 30
-#: Pictures between two steps: one prepares what is new, the next one tells how long a picture takes.
-PICTURES = 2
+#: A notch of a mouse's wheel, in the unit that Qt counts in.
+NOTCH = 120
+_BUTTONS: dict[Qt.MouseButton, MouseButton] = {
+    Qt.MouseButton.LeftButton: "Left",
+    Qt.MouseButton.MiddleButton: "Middle",
+    Qt.MouseButton.RightButton: "Right",
+}
 
 
 class Scene(Protocol):
@@ -45,213 +52,178 @@ class Scene(Protocol):
         """The colour behind the cloud."""
 
     def projection(self) -> NDArray[np.float64]:
-        """The 4 x 4 matrix from points to normalised screen coordinates."""
+        """The 4 x 4 matrix from points to normalised screen coordinates, of what is to be seen."""
 
     def reset(self) -> None:
         """Look from where the camera stood."""
 
     def close(self) -> None:
-        """Let go of the graphics context."""
+        """Let go of the graphics."""
 
 
-@cache
-def gl_works() -> bool:
-    """Whether Qt can draw by OpenGL here: tried, not guessed; the first time takes a while."""
-    if QGuiApplication.platformName() in ("offscreen", "minimal"):
-        return False
-    surface, context = QOffscreenSurface(), QOpenGLContext()
-    surface.create()
-    works = context.create() and context.makeCurrent(surface)
-    context.doneCurrent()
-    return bool(works)
+def prepare_scene() -> bool:
+    """Import what a scene needs, for a second or so in any thread; False where nothing can draw one."""
+    import pyvista.plotting
 
-
-def prepare_scene() -> None:
-    """Import what a scene needs: seconds, in which a thread does not stop the window."""
-    import pyvista
-    import pyvistaqt  # noqa: F401
-
-    # What pyvista imports no sooner than when a scene is made, in the window's thread.
+    # What pyvista imports no sooner than when a scene is made.
     import vtkmodules.vtkInteractionWidgets
     import vtkmodules.vtkViewsContext2D  # noqa: F401
 
     # The first points of all look for more of pyvista than those that follow.
     pyvista.PolyData(np.zeros((1, 3), np.float32))["colours"] = np.zeros((1, 3), np.uint8)
+    return graphics_work()
 
 
-def make_scene(moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> Scene:
-    """The best scene that works here; ``moved`` hears of new views, ``mouse`` may take mouse events."""
-    return GlScene(moved, mouse) if gl_works() else StillScene()
+def make_scene(is_drawn: bool, moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> Scene:
+    """A scene that can be turned where one can be drawn.
+
+    ``moved`` hears of new views, ``mouse`` may take events of the mouse, which then turn nothing.
+    """
+    return TurnedScene(moved, mouse) if is_drawn else StillScene()
 
 
-class _Watch(QObject):
-    """Hands mouse events of a widget to a function, which may keep them, and tells of its size."""
+class SceneWidget(QWidget):
+    """Shows the pictures of an `Artist` and hands it what mouse, wheel and keys ask for."""
 
-    def __init__(
-        self, take: Callable[[QMouseEvent], bool], resized: Callable[[], object], parent: QObject
-    ) -> None:
-        super().__init__(parent)
-        self._take, self._resized = take, resized
-
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Offer every mouse event; tell of a new size."""
-        if event.type() == QEvent.Type.Resize:
-            self._resized()
-        return isinstance(event, QMouseEvent) and self._take(event)
-
-
-class GlScene:
-    """A scene by VTK in an OpenGL widget; coarse while it turns or the marker moves."""
+    _drawn = Signal()
 
     def __init__(self, moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> None:
-        from pyvistaqt import QtInteractor
+        super().__init__()
+        self._moved, self._mouse = moved, mouse
+        self.image, self._pixels = QImage(), np.empty(0, np.uint8)
+        self._background = QColor()
+        self.projection = np.zeros((4, 4))
+        self.setAccessibleName("Point cloud")
+        self.setAccessibleDescription("Arrow keys turn it, plus and minus zoom, Home looks as the camera did")
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self._drawn.connect(self._take)
+        self.artist = Artist(self._drawn.emit)
 
-        # It renders when asked: neither every 200 ms nor with four samples a pixel.
-        interactor: Any = QtInteractor
-        self._plotter: Any = interactor(None, auto_update=False, multi_samples=0)
-        # Not even when a view is set up: the next update does it, once.
-        self._plotter.suppress_rendering = True
-        self.widget: QWidget = self._plotter
-        self.widget.setAccessibleName("Point cloud")
-        self._cloud, self._moved = Cloud(self._plotter), moved
-        self._is_untouched, self._is_held = True, False
-        self._watch = _Watch(mouse, self._resized, self.widget)
-        self.widget.installEventFilter(self._watch)
-        self.widget.setMouseTracking(True)
-        self._plotter.render_window.AddObserver("StartEvent", lambda *_: self._begin())
-        self._plotter.frameSwapped.connect(self._drawn)
-        style = self._plotter.iren.interactor.GetInteractorStyle()
-        style.AddObserver("StartInteractionEvent", lambda *_: self._touched())
-        style.AddObserver("EndInteractionEvent", lambda *_: self._let_go())
-        self._timer = QTimer(self.widget)
-        self._timer.setSingleShot(True)
-        self._timer.setInterval(SETTLE_MS)
-        self._timer.timeout.connect(self._rest)
-        self._grower = QTimer(self.widget)
-        self._grower.setSingleShot(True)
-        self._grower.setInterval(GROW_MS)
-        self._grower.timeout.connect(self._plotter.update)
-        #: Pictures wanted until the cloud grows, whether it ever will, when the picture at hand was begun.
-        self._wanted = 0
-        self._is_grown = False
-        self._begun: float | None = None
-        #: What to show in the next turn; at first after a picture, which is slow enough when it is empty.
-        self._waiting: tuple[Points, NDArray[np.uint8]] | None = None
-        self._is_ready = False
-
-    def _touched(self) -> None:
-        self._is_untouched, self._is_held = False, True
-        self._be_coarse()
-
-    def _let_go(self) -> None:
-        self._is_held = False
-        self._rest()
-
-    def _be_coarse(self) -> None:
-        self._wanted = 0
-        self._cloud.be_coarse(True)
-
-    def _resized(self) -> None:
-        # Until a person turns the view, it fits the cloud into whatever size the layout settles on.
-        if self._is_untouched:
-            self._cloud.reset(self.widget.width(), self.widget.height())
-
-    def _rest(self) -> None:
-        if self._is_held:
-            # A marker that was moved just before, or new colours, must not slow down who turns the view.
-            self._plotter.update()
+    def _take(self) -> None:
+        picture = self.artist.take()
+        if picture is None:
             return
-        self._cloud.be_coarse(False)
-        self._wanted = 0 if self._is_grown else PICTURES
-        self._plotter.update()
-        self._moved()
+        self._show(picture)
+        if not np.array_equal(picture.projection, self.projection):
+            self.projection = picture.projection
+            self._moved()
+
+    def _show(self, picture: Picture) -> None:
+        height, width = picture.pixels.shape[:2]
+        # The image only looks at the bytes, which therefore stay.
+        self._pixels = picture.pixels
+        self.image = QImage(self._pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+        self.image.setDevicePixelRatio(self.devicePixelRatioF())
+        self.update()
+
+    def set_background(self, colour: str) -> None:
+        """The colour behind the cloud, and where there is no picture yet."""
+        self._background = QColor(colour)
+        self.artist.set_background(colour)
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Show the latest picture."""
+        painter = QPainter(self)
+        painter.fillRect(event.rect(), self._background)
+        painter.drawImage(0, 0, self.image)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Ask for pictures of the new size."""
+        self.artist.resize(*self._px(QPointF(self.width(), self.height())))
+
+    def _px(self, at: QPointF) -> tuple[int, int]:
+        ratio = self.devicePixelRatioF()
+        return round(at.x() * ratio), round(at.y() * ratio)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Turn, move or zoom from here, unless somebody else takes the event."""
+        button = _BUTTONS.get(event.button())
+        if not self._mouse(event) and button is not None:
+            self.artist.press(button, self._px(event.position()), *_held(event))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Go on."""
+        if not self._mouse(event) and event.buttons():
+            self.artist.move(self._px(event.position()), *_held(event))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Let go."""
+        button = _BUTTONS.get(event.button())
+        if not self._mouse(event) and button is not None:
+            self.artist.release(button, self._px(event.position()))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom."""
+        self.artist.zoom(event.angleDelta().y() / NOTCH)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Turn and zoom by keys."""
+        step = arrow_step(event)
+        if step is not None:
+            self.artist.turn(step[0], -step[1])
+        elif event.key() in (Qt.Key.Key_Plus, Qt.Key.Key_Equal, Qt.Key.Key_Minus):
+            self.artist.zoom(-1.0 if event.key() == Qt.Key.Key_Minus else 1.0)
+        elif event.key() == Qt.Key.Key_Home:
+            self.artist.reset()
+        else:
+            super().keyPressEvent(event)
+
+
+def _held(event: QMouseEvent) -> tuple[bool, bool]:
+    keys = event.modifiers()
+    return bool(keys & Qt.KeyboardModifier.ShiftModifier), bool(keys & Qt.KeyboardModifier.ControlModifier)
+
+
+class TurnedScene:
+    """A scene that is drawn in a thread of its own and can be turned; coarse while it turns."""
+
+    def __init__(self, moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> None:
+        self.widget: Any = SceneWidget(moved, mouse)
+        self._artist: Artist = self.widget.artist
 
     @property
     def shown(self) -> int:
         """How many points are drawn at rest."""
-        return self._cloud.shown
+        return self._artist.shown
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether all that was asked for is drawn, with as many points as this machine draws in time."""
+        return self._artist.is_at_rest
 
     def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
         """Show points with their colours, as many as this machine draws in time."""
-        # Colours were made just now: taking them in is a turn of its own, and the picture another.
-        self._waiting = points, colours
-        if self._is_ready:
-            QTimer.singleShot(GROW_MS, self.widget, self._show_waiting)
-
-    def _make_ready(self) -> None:
-        if self._is_ready:
-            return
-        self._is_ready = True
-        self._plotter.add_axes(interactive=False, color="#808080")
-        QTimer.singleShot(GROW_MS, self.widget, self._show_waiting)
-
-    def _show_waiting(self) -> None:
-        waiting, self._waiting = self._waiting, None
-        if waiting is None:
-            self._plotter.update()
-            return
-        self.widget.setUpdatesEnabled(False)
-        QTimer.singleShot(GROW_MS, self.widget, lambda: self.widget.setUpdatesEnabled(True))
-        if self._cloud.show(*waiting):
-            self.reset()
-        self._is_grown = False
-        self._rest()
-
-    def _begin(self) -> None:
-        self._begun = time.perf_counter()
-
-    def _drawn(self) -> None:
-        """A picture is on the screen: after the last one wanted, add to the cloud if that was quick."""
-        if self._begun is None:
-            return
-        seconds, self._begun = time.perf_counter() - self._begun, None
-        if not self._is_ready:
-            QTimer.singleShot(GROW_MS, self.widget, self._make_ready)
-            return
-        if self._wanted == 0:
-            return
-        self._wanted -= 1
-        if self._wanted == 0:
-            self._is_grown = not self._cloud.grow(seconds)
-            self._wanted = 0 if self._is_grown else PICTURES
-        if self._wanted:
-            self._grower.start()
+        self._artist.show(points, colours)
 
     def show_marker(self, point: Points | None, colour: str) -> None:
         """Mark a point; the cloud is coarse until it rests."""
         rgb = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8)[None]
         points = np.empty((0, 3), np.float32) if point is None else point[None]
-        self._cloud.mark("marker", points, rgb, 14)
-        self._be_coarse()
-        self._timer.start()
-        self._plotter.update()
+        self._artist.mark("marker", points, rgb, 14, moves=True)
 
     def show_pins(self, points: Points, colours: NDArray[np.uint8]) -> None:
         """Mark some points for good."""
-        self._cloud.mark("pins", points, colours, 10)
-        self._plotter.update()
+        self._artist.mark("pins", points, colours, 10)
 
     def set_background(self, colour: str) -> None:
         """The colour behind the cloud."""
-        self._plotter.set_background(colour)
-        self._plotter.update()
+        self.widget.set_background(colour)
 
     def projection(self) -> NDArray[np.float64]:
-        """The 4 x 4 matrix from points to normalised screen coordinates."""
-        return self._cloud.projection(self.widget.width(), self.widget.height())
+        """The 4 x 4 matrix from points to normalised screen coordinates, of what is to be seen."""
+        projection: NDArray[np.float64] = self.widget.projection
+        return projection
 
     def reset(self) -> None:
         """Look from where the camera stood."""
-        self._is_untouched = True
-        self._cloud.reset(self.widget.width(), self.widget.height())
-        self._moved()
-        self._plotter.update()
+        self._artist.reset()
 
     def close(self) -> None:
-        """Let go of the graphics context."""
-        self._timer.stop()
-        self._grower.stop()
-        self._plotter.close()
+        """End the thread that draws."""
+        self._artist.close()
 
 
 def normalised(position: QPointF, widget: QWidget) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.jobs.base import Job, JobRunner
 from app.panels.result_layers import Layers, rgb_of
-from app.panels.scene import Scene, gl_works, make_scene, normalised, prepare_scene
+from app.panels.scene import Scene, make_scene, normalised, prepare_scene
 from app.state.results import Pixel, ResultsState, Tool, View
 from app.theme import DARK, Theme
 from app.widgets.forms import label
@@ -21,7 +21,7 @@ from dsl_core.evaluation.regions import inside_outline
 
 #: Points among which the one under the moving mouse is looked for; a click looks at all.
 HOVER_POINTS = 60_000
-#: Between two steps in which a scene is made, ms.
+#: Between two steps in which a scene is filled, ms.
 STEP_MS = 20
 
 
@@ -82,26 +82,12 @@ class ScenePanel(QWidget):
             )
         self._new_result()
 
-    def _make(self, _: None) -> None:
-        # Step by step, between which the window comes round: graphics are slow to begin.
-        gl_works()
-        QTimer.singleShot(STEP_MS, self, lambda: self._insert(make_scene(self._view_moved, self._mouse)))
-
-    def _insert(self, scene: Scene) -> None:
-        def insert() -> None:
-            # First the window changes to graphics; only then is there a first picture.
-            scene.widget.setUpdatesEnabled(False)
-            self._box.insertWidget(0, scene.widget, 1)
-            QTimer.singleShot(STEP_MS, self, show)
-
-        def show() -> None:
-            scene.widget.setUpdatesEnabled(True)
-            scene.set_background(self._theme.base)
-            self.scene = scene
-            # The widget gets its size, and with it the view, when the event loop comes round.
-            QTimer.singleShot(STEP_MS, self, self._new_result)
-
-        QTimer.singleShot(STEP_MS, self, insert)
+    def _make(self, is_drawn: bool) -> None:
+        self.scene = scene = make_scene(is_drawn, self._view_moved, self._mouse)
+        scene.set_background(self._theme.base)
+        self._box.insertWidget(0, scene.widget, 1)
+        # The widget gets its size, and with it the view, when the event loop comes round.
+        QTimer.singleShot(STEP_MS, self, self._new_result)
 
     def _new_result(self) -> None:
         result = self._state.result.value
@@ -166,7 +152,7 @@ class ScenePanel(QWidget):
         self._hint.setText(
             "Draw around points with the left button."
             if lasso
-            else "Drag turns, Shift+drag moves, wheel zooms."
+            else "Drag turns, Shift+drag moves, wheel zooms; arrow keys turn, + and − zoom."
         )
 
     # Mouse -----------------------------------------------------------------------------------------
@@ -253,7 +239,7 @@ class ScenePanel(QWidget):
             self._show_pins()
 
     def release(self) -> None:
-        """Let go of the graphics context."""
+        """Let go of the graphics."""
         if self.scene is not None:
             self.scene.close()
             self.scene = None

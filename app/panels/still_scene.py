@@ -15,8 +15,8 @@ class StillScene:
     """Without OpenGL: a picture of the cloud, seen a little from the side, where even that can be made."""
 
     SENTENCE = (
-        "This display has no OpenGL, so the cloud cannot be turned here. Export it as PLY to turn it"
-        " elsewhere."
+        "No OpenGL was found to draw with, so the cloud cannot be turned here. Export it as PLY to turn it"
+        " elsewhere, or install a graphics driver."
     )
 
     def __init__(self) -> None:

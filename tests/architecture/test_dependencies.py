@@ -24,7 +24,7 @@ DISTRIBUTIONS = {
     "vtkmodules": "vtk",
 }
 # The desktop application is built on these; until its first window nothing imports them.
-OF_THE_APP = {"platformdirs", "pyside6-essentials", "pyqtgraph", "pyvista", "pyvistaqt", "superqt"}
+OF_THE_APP = {"platformdirs", "pyside6-essentials", "pyqtgraph", "pyvista", "superqt"}
 GPL = {"plyfile", "pylablib", "pylablib-lightweight", "thorlabs-apt-device", "pyqt5", "pyqt6"}
 
 

@@ -128,8 +128,9 @@ def _print_answers(
         [name, f"{clock:.0f} ms", f"{cpu:.0f} ms", limits[name]] for name, (clock, cpu) in answers.items()
     ]
     rows += [[f"cancel: {name}", f"{seconds:.2f} s", "", "2 s"] for name, seconds in cancel_s.items()]
-    rows.append(["cloud turned", f"{frames[0]:.0f} frames/s", f"{frames[1]:.0f} frames/s", "15 frames/s"])
-    rows.append(["cloud at rest again", "", f"{1000 * frames[2]:.0f} ms", f"{WORST_MS:.0f} ms"])
+    rows.append(["cloud turned", f"{frames[0]:.0f} pictures/s", "", "15 pictures/s"])
+    rows.append(["cloud turned, longest wait for a picture", f"{frames[1]:.0f} ms", "", ""])
+    rows.append(["cloud whole again after that", f"{frames[2]:.0f} ms", "", ""])
     grown, own = memory
     rows.append(["memory of a result", f"{grown:.0f} MB", f"{grown / own:.2f} × {own:.0f} MB", "1.5 ×"])
     print(f"\nAnswers, load average {os.getloadavg()[0]:.1f}")

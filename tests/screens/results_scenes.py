@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QTabWidget
 
 from app.panels.export_dialog import ExportDialog
 from app.panels.results_page import ResultsPage
+from app.panels.scene import TurnedScene
 from app.state.results import Quality, ResultsState, Seek, View
 from tests.screens.stage import Stage
 
@@ -70,14 +71,22 @@ def views(stage: Stage) -> None:
         stage.window.do(view.value)
         stage.idle()
         if view is View.CLOUD:
-            # Graphics begin in turns of their own.
-            stage.wait(lambda: page.scene.scene is not None)
-            stage.settle()
+            _wait_for_cloud(stage, page)
         stage.shoot(view.value.removeprefix("view_"))
     stage.window.do("view_quality")
     for quality in Quality:
         state.quality.set(quality)
         stage.shoot(f"quality-{quality.name.lower().replace('_', '-')}")
+
+
+def _wait_for_cloud(stage: Stage, page: ResultsPage) -> None:
+    """The cloud is drawn in a thread of its own."""
+    stage.wait(lambda: page.scene.scene is not None)
+    scene = page.scene.scene
+    assert isinstance(scene, TurnedScene)
+    # It is filled one turn later.
+    stage.settle()
+    stage.wait(lambda: scene.is_at_rest)
 
 
 def marks(stage: Stage) -> None:
@@ -87,7 +96,7 @@ def marks(stage: Stage) -> None:
     state.selected.set(state.marks.value[0].key)
     stage.shoot("compared")
     stage.window.do("view_cloud")
-    stage.idle()
+    _wait_for_cloud(stage, page)
     stage.shoot("cloud")
     page.marks.remove_selected()
     stage.shoot("undo")
