@@ -168,7 +168,6 @@ class Composition(QObject):
         from app.controllers.forecast import ForecastController
         from app.controllers.scan import ScanController
         from app.controllers.scan_words import fresh_target
-        from app.panels.effects_panel import EffectsPanel
         from app.panels.forecast_panel import ForecastPanel
         from app.panels.scan_page import ScanPage
         from app.state.effects import EffectsState
@@ -204,7 +203,8 @@ class Composition(QObject):
             state,
             controller,
             ForecastPanel(foreseen, forecast),
-            EffectsPanel(rendered, effects),
+            rendered,
+            effects,
             window.open_path,
         )
         page.apply_theme(window.theme)

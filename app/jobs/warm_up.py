@@ -26,6 +26,8 @@ STEPS = (
     "zarr",
     "dsl_core.pipeline",
     "app.controllers.scan",
+    "app.controllers.forecast",
+    "app.controllers.effects",
     "app.panels.scan_page",
     "app.controllers.results",
     "app.panels.results_page",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -16,6 +17,7 @@ from app.panels.compare_view import CompareView
 from app.state.compare import CompareState, Pair, Side
 from app.theme import Theme
 from app.widgets.forms import label, set_role
+from app.widgets.late import Late
 from app.widgets.page import PageWidget
 
 NOTHING = (
@@ -41,12 +43,27 @@ class ComparePage(PageWidget):
         self.report = _button("Write &report…", "Figures and pictures of A against the truth as an HTML page")
         self.hint = label(NOTHING, "muted")
         self.hint.setWordWrap(True)
-        self.view = CompareView(state)
+        self._view = Late(self._make_view)
         self.bar = CompareBar(state, commands)
-        self.figures = CompareFigures(state)
+        self._figures = Late(lambda: CompareFigures(state))
         self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
+
+    @property
+    def view(self) -> CompareView:
+        """The three pictures, made when somebody looks."""
+        return self._view.part
+
+    @property
+    def figures(self) -> CompareFigures:
+        """Spectra and figures, made when somebody looks."""
+        return self._figures.part
+
+    def _make_view(self) -> CompareView:
+        made = CompareView(self._state)
+        made.pointed.connect(self._commands.point_at)
+        return made
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -62,11 +79,11 @@ class ComparePage(PageWidget):
         above = QWidget()
         upper = QVBoxLayout(above)
         upper.setContentsMargins(0, 0, 0, 0)
-        upper.addWidget(self.view, 1)
+        upper.addWidget(self._view, 1)
         upper.addWidget(self.bar)
         self.parts = QSplitter(Qt.Orientation.Vertical)
         self.parts.setChildrenCollapsible(False)
-        for i, (widget, stretch) in enumerate(((above, 5), (self.figures, 4))):
+        for i, (widget, stretch) in enumerate(((above, 5), (self._figures, 4))):
             self.parts.addWidget(widget)
             self.parts.setStretchFactor(i, stretch)
         column = QVBoxLayout(self)
@@ -81,11 +98,8 @@ class ComparePage(PageWidget):
         self.truth.clicked.connect(commands.use_truth)
         self.swap.clicked.connect(commands.swap)
         self.report.clicked.connect(self._choose_report)
-        self.view.pointed.connect(commands.point_at)
         self._stops = [
-            *self.view.stops,
             *self.bar.stops,
-            *self.figures.stops,
             state.first.follow(lambda side: self._show_side(0, side)),
             state.second.follow(lambda side: self._show_side(1, side)),
             state.pair.follow(self._show_pair),
@@ -160,12 +174,13 @@ class ComparePage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        self.view.apply_theme(theme)
-        self.figures.apply_theme(theme)
+        self._view.apply_theme(theme)
+        self._figures.apply_theme(theme)
 
     def release(self) -> None:
         """Follow nothing more."""
-        for stop in self._stops:
+        late = [part.stops for part in (self._view.made, self._figures.made) if part is not None]
+        for stop in (*self._stops, *chain.from_iterable(late)):
             stop()
 
 

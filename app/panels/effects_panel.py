@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.state.effects import EffectRow, EffectsState, EffectsView, Wanted
-from app.state.evented import Value
 from app.theme import DARK, Theme
 from app.widgets.forms import ChoiceBox, NumberBox, label
 from app.widgets.read_table import RIGHT, ReadTable, cell
@@ -114,11 +113,6 @@ class EffectsPanel(QWidget):
         """Weigh the effects when somebody looks."""
         super().showEvent(event)
         self._commands.look_again()
-
-    @property
-    def offered(self) -> Value[bool]:
-        """Whether the rig is simulated."""
-        return self._state.offered
 
     # Ask -------------------------------------------------------------------------------------------
 
@@ -230,7 +224,6 @@ class EffectsPanel(QWidget):
         """Follow nothing more."""
         for stop in self.stops:
             stop()
-        self._commands.close()
 
 
 def number(value: float) -> str:

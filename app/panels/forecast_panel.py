@@ -22,6 +22,7 @@ from app.panels.operating_curve import OperatingCurve
 from app.state.forecast import ForecastState, Foreseen, identity
 from app.theme import Theme
 from app.widgets.forms import ChoiceBox, NumberBox, label
+from app.widgets.late import Late
 from app.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
 #: How often news of the predictions is fetched, ms.
@@ -60,12 +61,12 @@ class ForecastPanel(QWidget):
         super().__init__()
         self._state, self._commands = state, commands
         self._pointed: Foreseen | None = None
-        self.curve = OperatingCurve()
+        self._is_fixed = False
+        self.curve = Late(self._make_curve)
         self.scene = ChoiceBox("Scene", "For what is predicted: a chart, or the scene of the last result")
         self.scene.addItems(("for a chart", "for the last scan"))
         self.scene.setEnabled(False)
-        for box in (self.scene, self.curve.figure):
-            box.be_narrow(100)
+        self.scene.be_narrow(100)
         self.table = _table()
         self.wish = ChoiceBox("Wish", "What is given: the time at hand, or the error that is good enough")
         self.wish.addItem("Time at most", BUDGET)
@@ -87,7 +88,6 @@ class ForecastPanel(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        self.curve.head.addWidget(self.scene)
         wish = QHBoxLayout()
         for widget in (self.wish, self.budget, self.error, self.ask):
             wish.addWidget(widget)
@@ -103,8 +103,6 @@ class ForecastPanel(QWidget):
 
     def _connect(self) -> None:
         state = self._state
-        self.curve.chosen.connect(self._commands.choose)
-        self.curve.pointed.connect(self._point)
         self.scene.activated.connect(self._look)
         self.wish.currentIndexChanged.connect(lambda _: self._show_wish())
         self.ask.clicked.connect(self._ask)
@@ -147,12 +145,26 @@ class ForecastPanel(QWidget):
         self._answer.setText(text)
         self._answer.setVisible(bool(text))
 
+    def _make_curve(self) -> OperatingCurve:
+        made = OperatingCurve()
+        made.figure.be_narrow(100)
+        made.head.addWidget(self.scene)
+        made.chosen.connect(self._commands.choose)
+        made.pointed.connect(self._point)
+        made.fix(self._is_fixed)
+        self._draw(made)
+        return made
+
+    def _draw(self, curve: OperatingCurve) -> None:
+        curve.show_points(self._state.points.value, self._state.current.value)
+
     def _point(self, point: Foreseen | None) -> None:
         self._pointed = point
         self._show_figures()
 
     def _show_points(self) -> None:
-        self.curve.show_points(self._state.points.value, self._state.current.value)
+        if self.curve.made is not None:
+            self._draw(self.curve.made)
         self._show_figures()
         self._show_note()
 
@@ -211,7 +223,9 @@ class ForecastPanel(QWidget):
 
     def fix(self, fixed: bool) -> None:
         """Let nothing be chosen while a scan is under way."""
-        self.curve.fix(fixed)
+        self._is_fixed = fixed
+        if self.curve.made is not None:
+            self.curve.made.fix(fixed)
         self.ask.setEnabled(not fixed and bool(self._state.points.value))
 
     def apply_theme(self, theme: Theme) -> None:

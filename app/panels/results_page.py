@@ -33,6 +33,7 @@ from app.state.results import ResultsState, View
 from app.theme import DARK, Theme
 from app.widgets.forms import label
 from app.widgets.help_window import set_help
+from app.widgets.late import Late
 from app.widgets.page import PageWidget
 from app.widgets.welcome import Welcome
 from dsl_core.inspection import IntensityGraph
@@ -60,26 +61,47 @@ class ResultsPage(PageWidget):
         )
         self.bar = ViewBar(state, commands)
         set_help(self.bar, "numbers#views")
-        self.image = ResultImage(state)
-        set_help(self.image, "numbers#under-the-picture")
+        self._image = Late(self._make_image)
+        set_help(self._image, "numbers#under-the-picture")
         self.scene = ScenePanel(state, runner)
         self.readout = Readout(state)
         set_help(self.readout, "hard-cases")
-        self.spectra = SpectrumPanel(state)
-        self.spectra.setObjectName("spectra")
-        set_help(self.spectra, "numbers#spectra")
+        self._spectra = Late(lambda: SpectrumPanel(state))
+        self._spectra.setObjectName("spectra")
+        set_help(self._spectra, "numbers#spectra")
         self.marks = MarksPanel(state, commands.marks)
         set_help(self.marks, "numbers#pins-regions-references")
         self.search = SearchPanel(state, commands)
         set_help(self.search, "numbers#look-for")
         self._graph: IntensityWindow | None = None
         self._theme = DARK
-        self._panels = (self.image, self.scene, self.spectra, self.marks)
+        self._panels = (self._image, self.scene, self._spectra, self.marks)
         self.stack = QStackedWidget()
         self._open, self._export = QPushButton("Open…"), QPushButton("Export…")
         self._inspect = QPushButton("Intensity graph")
         self._lay_out()
         self._connect()
+
+    # Made when there is something to show ----------------------------------------------------------
+
+    @property
+    def image(self) -> ResultImage:
+        """The picture."""
+        return self._image.part
+
+    @property
+    def spectra(self) -> SpectrumPanel:
+        """The spectra under the cursor and of what is marked."""
+        return self._spectra.part
+
+    def _make_image(self) -> ResultImage:
+        commands, made = self._commands, ResultImage(self._state)
+        made.pointed.connect(commands.point_at)
+        made.pinned.connect(commands.marks.pin)
+        made.outlined.connect(commands.marks.add_outline)
+        made.moved.connect(commands.move_cursor)
+        made.deleted.connect(self.marks.remove_selected)
+        return made
 
     # Lay out ---------------------------------------------------------------------------------------
 
@@ -125,7 +147,7 @@ class ResultsPage(PageWidget):
     def _content(self) -> QWidget:
         self.pictures = QSplitter(Qt.Orientation.Horizontal)
         self.pictures.setObjectName("result-pictures")
-        self.pictures.addWidget(self.image)
+        self.pictures.addWidget(self._image)
         self.pictures.addWidget(self.scene)
         self.pictures.setStretchFactor(0, 1)
         self.pictures.setStretchFactor(1, 2)
@@ -141,7 +163,7 @@ class ResultsPage(PageWidget):
         tabs.addTab(self.marks, "Pins, regions, references")
         tabs.addTab(self.search, "Look for")
         right = QSplitter(Qt.Orientation.Vertical)
-        right.addWidget(self.spectra)
+        right.addWidget(self._spectra)
         right.addWidget(tabs)
         right.setStretchFactor(0, 3)
         right.setStretchFactor(1, 2)
@@ -164,11 +186,6 @@ class ResultsPage(PageWidget):
         self._inspect.clicked.connect(self.inspect)
         state.graph.changed.connect(self._show_graph)
         self.reconstruct.clicked.connect(commands.reconstruct)
-        self.image.pointed.connect(commands.point_at)
-        self.image.pinned.connect(commands.marks.pin)
-        self.image.outlined.connect(commands.marks.add_outline)
-        self.image.moved.connect(commands.move_cursor)
-        self.image.deleted.connect(self.marks.remove_selected)
         self.scene.pointed.connect(commands.point_at)
         self.scene.pinned.connect(commands.marks.pin)
         self.scene.outlined.connect(commands.marks.add_pixels)

@@ -12,22 +12,24 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QScrollArea,
-    QSplitter,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
-from app.panels.effects_panel import EffectsPanel
+from app.panels.effects_panel import EffectsCommands, EffectsPanel
 from app.panels.forecast_panel import ForecastPanel
+from app.panels.operating_curve import OperatingCurve
 from app.panels.plan_editor import PlanEditor
 from app.panels.scan_commands import ScanCommands
 from app.panels.scan_run import CalibrationBox, RunBox, TargetBox
-from app.panels.scan_view import FramePicture, GraphPlot
+from app.panels.scan_view import ScanView
+from app.state.effects import EffectsState
 from app.state.scan import Phase, ScanState
 from app.theme import Theme
 from app.widgets.banner import Banner
 from app.widgets.help_window import set_help
+from app.widgets.late import Late
 from app.widgets.page import PageWidget
 
 #: How often news of the scan is fetched, ms: ten pictures a second look alive.
@@ -44,7 +46,8 @@ class ScanPage(PageWidget):
         state: ScanState,
         commands: ScanCommands,
         forecast: ForecastPanel,
-        effects: EffectsPanel,
+        rendered: EffectsState,
+        effects: EffectsCommands,
         open_result: Callable[[Path], object],
     ) -> None:
         super().__init__()
@@ -58,13 +61,13 @@ class ScanPage(PageWidget):
         for box in (self.plan.preset, self.plan.code, self.plan.patterns):
             box.be_narrow()
         set_help(self.plan, "scanning#the-plan")
-        self.forecast, self.curve = forecast, forecast.curve
+        self.forecast = forecast
         set_help(self.forecast, "accuracy-against-time")
-        self.effects = effects
+        # Tabs behind the first are made when somebody looks.
+        self.view = Late(lambda: ScanView(state, commands))
+        self.effects = Late(lambda: EffectsPanel(rendered, effects))
         set_help(self.effects, "effects-of-the-twin")
-        self.picture, self.graph = FramePicture(), GraphPlot()
-        set_help(self.picture, "scanning#while-it-runs")
-        set_help(self.graph, "reading-an-intensity-graph")
+        self._rendered, self._effects = rendered, effects
         self.calibration = CalibrationBox(state, commands)
         set_help(self.calibration, "calibrating#using-a-calibration")
         self.target, self.run = TargetBox(state, commands), RunBox(state, commands)
@@ -78,13 +81,12 @@ class ScanPage(PageWidget):
         self._lay_out()
         self._connect()
 
+    @property
+    def curve(self) -> OperatingCurve:
+        """Accuracy against time."""
+        return self.forecast.curve.part
+
     def _lay_out(self) -> None:
-        self.view = QSplitter(Qt.Orientation.Vertical)
-        self.view.setChildrenCollapsible(False)
-        for widget, stretch in ((self.picture, 5), (self.graph, 4)):
-            widget.setMinimumHeight(120)
-            self.view.addWidget(widget)
-            self.view.setStretchFactor(self.view.count() - 1, stretch)
         self.middle = QTabWidget()
         self.middle.setDocumentMode(True)
         self.middle.tabBar().setDrawBase(False)
@@ -110,7 +112,6 @@ class ScanPage(PageWidget):
         self.plan.plan_changed.connect(self._change_plan)
         self.plan.open_wanted.connect(self._open_plan)
         self.plan.save_wanted.connect(self._save_plan)
-        self.picture.pointed.connect(commands.point_at)
         self._stops = [
             *self.calibration.stops,
             *self.target.stops,
@@ -120,11 +121,8 @@ class ScanPage(PageWidget):
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.phase.follow(self._show_phase),
             state.trouble.follow(self.banner.say),
-            state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
-            state.cursor.follow(self.picture.show_cursor),
-            state.graph.follow(self.graph.show_graph),
             state.result.connect(self._show_result),
-            self.effects.offered.follow(self._offer_effects),
+            self._rendered.offered.follow(self._offer_effects),
         ]
 
     def _change_plan(self, plan: object) -> None:
@@ -187,7 +185,7 @@ class ScanPage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        for part in (self.forecast, self.picture, self.graph, self.effects):
+        for part in (self.forecast, self.view, self.effects):
             part.apply_theme(theme)
 
     def release(self) -> None:
@@ -196,7 +194,10 @@ class ScanPage(PageWidget):
         for stop in self._stops:
             stop()
         self.forecast.release()
-        self.effects.release()
+        for part in (self.view.made, self.effects.made):
+            if part is not None:
+                part.release()
+        self._effects.close()
         self._commands.close()
 
 

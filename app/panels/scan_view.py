@@ -8,12 +8,14 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
-from app.state.scan import LivePicture
+from app.panels.scan_commands import ScanCommands
+from app.state.scan import LivePicture, ScanState
 from app.theme import Theme
 from app.widgets.arrow_keys import arrow_step
 from app.widgets.forms import label
+from app.widgets.help_window import set_help
 from app.widgets.plots import calm_plot, theme_plots
 from dsl_core.capture.growth import IntensityGraph
 from dsl_core.model.plan import CapturePlan, Shot
@@ -102,6 +104,37 @@ class FramePicture(QWidget):
         """Take the colours of a theme."""
         self.view.setBackground(theme.base)
         self._mark.setPen(pg.mkPen("#ffffff", width=2))
+
+
+class ScanView(QSplitter):
+    """The last frame above the graph of a pixel; follows a `ScanState`."""
+
+    def __init__(self, state: ScanState, commands: ScanCommands) -> None:
+        super().__init__(Qt.Orientation.Vertical)
+        self.picture, self.graph = FramePicture(), GraphPlot()
+        set_help(self.picture, "scanning#while-it-runs")
+        set_help(self.graph, "reading-an-intensity-graph")
+        self.setChildrenCollapsible(False)
+        for widget, stretch in ((self.picture, 5), (self.graph, 4)):
+            widget.setMinimumHeight(120)
+            self.addWidget(widget)
+            self.setStretchFactor(self.count() - 1, stretch)
+        self.picture.pointed.connect(commands.point_at)
+        self._stops = [
+            state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
+            state.cursor.follow(self.picture.show_cursor),
+            state.graph.follow(self.graph.show_graph),
+        ]
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.picture.apply_theme(theme)
+        self.graph.apply_theme(theme)
+
+    def release(self) -> None:
+        """Follow nothing more."""
+        for stop in self._stops:
+            stop()
 
 
 class GraphPlot(QWidget):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QObject, Qt, QThreadPool, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
 from PySide6.QtGui import QColor, QFont, QShowEvent
 from PySide6.QtWidgets import (
     QLabel,
@@ -25,12 +25,11 @@ from app.theme import DARK, Theme
 from app.widgets.forms import label
 from app.widgets.plots import calm_plot, theme_plots
 from app.widgets.read_table import LEFT, RIGHT, ReadTable, cell
+from app.widgets.turns import take_turn
 
 Floats = NDArray[np.floating[Any]]
 #: A name of the legend with its colour (``#rrggbb``) and the sign that stands for it.
 Key = tuple[str, str, str]
-#: Between two boxes that are drawn, ms: the window comes round meanwhile.
-TURN_MS = 30
 LINE, DOT, BAR = "━", "●", "■"
 
 
@@ -110,22 +109,20 @@ class ChartBox(QWidget):
         self._draw_soon()
 
     def _draw_soon(self) -> None:
-        """Let the first box that waits take its turn; others follow when that is over, however long it is."""
-        boxes = self.window().findChildren(ChartBox) or [self]
-        waiting = [box for box in boxes if box.isVisible() and box._draw]
-        if waiting and not any(box._is_next for box in waiting):
-            waiting[0]._is_next = True
-            QTimer.singleShot(TURN_MS, waiting[0], waiting[0]._take_turn)
+        if self._draw is not None and not self._is_next:
+            self._is_next = True
+            take_turn(self, self._take_turn)
 
     def _take_turn(self) -> None:
         self._is_next = False
-        if self.isVisible():
-            # Making a plot takes as long as drawing on it: a turn each.
-            if self._plot is None and self._draw is not None:
-                self._make_plot()
-            else:
-                self._draw_now()
-        self._draw_soon()
+        if not self.isVisible():
+            return
+        # Making a plot takes as long as drawing on it: a turn each.
+        if self._plot is None and self._draw is not None:
+            self._make_plot()
+            self._draw_soon()
+        else:
+            self._draw_now()
 
     def _draw_now(self) -> None:
         draw, self._draw = self._draw, None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
 
@@ -10,8 +10,8 @@ from app.state.wizard import Doing, Fit, WizardState
 from app.theme import DARK, Theme
 from app.widgets.figures_table import FiguresTable
 from app.widgets.forms import label, set_role
+from app.widgets.turns import take_turn
 from app.wizards.evidence import Evidence, make_evidence
-from app.wizards.evidence_parts import TURN_MS
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.figure import failures
 
@@ -82,7 +82,15 @@ class FitPage(QWidget):
         self._show_due_soon()
 
     def _show_due_soon(self) -> None:
-        QTimer.singleShot(TURN_MS, self, self._show_due)
+        take_turn(self, self._take_turn)
+
+    def _take_turn(self) -> None:
+        # Making evidence takes as long as filling it: a turn each.
+        if self._due is not None and self._evidence is None:
+            self._make_evidence()
+            self._show_due_soon()
+        else:
+            self._show_due()
 
     def _show_due(self) -> None:
         fit, self._due = self._due, None

@@ -12,8 +12,9 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QTableWidget, QT
 from pytestqt.qtbot import QtBot
 
 from app.state.wizard import Fit, WizardState
+from app.widgets.turns import TURN_MS
 from app.wizards.evidence import PlainEvidence, make_evidence
-from app.wizards.evidence_parts import TURN_MS, Aside, ChartBox, NumberTable, with_spread
+from app.wizards.evidence_parts import Aside, ChartBox, NumberTable, with_spread
 from app.wizards.fit_page import FitPage
 from dsl_core.campaign.recipes import recipe_names
 from dsl_core.campaign.session import CalibrationSession

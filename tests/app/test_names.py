@@ -33,6 +33,7 @@ from app.main_window import MainWindow
 from app.panels.campaign_box import NewCampaignDialog
 from app.panels.export_dialog import ExportDialog
 from app.panels.results_page import ResultsPage
+from app.widgets.late import Late
 from app.widgets.toasts import Toast
 from tests.app.small_result import write_small_result
 
@@ -90,6 +91,8 @@ def is_standard(widget: QWidget) -> bool:
 
 def complaints(root: QWidget) -> list[str]:
     found = []
+    for room in root.findChildren(Late):
+        _ = room.part
     for widget in operable(root):
         interface = QAccessible.queryAccessibleInterface(widget)
         name = interface.text(QAccessible.Text.Name) if interface is not None else ""

@@ -33,6 +33,7 @@ from app.panels.still_scene import still_picture
 from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Tool, View
 from app.theme import DARK as DARK_THEME
 from app.theme import LIGHT
+from app.widgets.late import Late
 from app.widgets.page import PageWidget
 from app.widgets.spectrum_curve import split_by_share
 from app.widgets.welcome import Welcome
@@ -103,6 +104,7 @@ def bench(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
     made.window.show()
     qtbot.waitExposed(made.window)
     made.window.open_path(write_small_result(tmp_path))
+    qtbot.waitUntil(lambda: all(room.made is not None for room in made.page.findChildren(Late)))
     QTest.qWait(20)
     yield made
     made.window.close()

@@ -13,7 +13,6 @@ from pytestqt.qtbot import QtBot
 from app.controllers.effects import EffectsController
 from app.controllers.forecast import ForecastController
 from app.jobs.qt_runner import QtRunner
-from app.panels.effects_panel import EffectsPanel
 from app.panels.forecast_panel import ForecastPanel
 from app.panels.scan_page import ScanPage
 from app.state.effects import EffectsState
@@ -44,7 +43,8 @@ def ready(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
         bench.state,
         bench.scans,
         ForecastPanel(expected, forecast),
-        EffectsPanel(rendered, effects),
+        rendered,
+        effects,
         opened.append,
     )
     qtbot.addWidget(page)
@@ -199,10 +199,10 @@ def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:
     page, bench, _ = ready
     click(page.run.start)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
-    QTest.keyClick(page.picture, Qt.Key.Key_Right)
-    QTest.keyClick(page.picture, Qt.Key.Key_Down)
+    QTest.keyClick(page.view.part.picture, Qt.Key.Key_Right)
+    QTest.keyClick(page.view.part.picture, Qt.Key.Key_Down)
     assert bench.state.cursor.value == (36, 28)
-    assert "Intensity graph at 36, 28" in page.graph._title.text()
+    assert "Intensity graph at 36, 28" in page.view.part.graph._title.text()
 
 
 @pytest.fixture

@@ -93,8 +93,9 @@ class WindowJobs:
 
     def _start(self) -> None:
         campaign = self.stage.copied(self.stage.material.complete)
-        with self._job("start and connect"):
-            self.stage.open(library=True, campaign=campaign)
+        # How long the window takes to the screen is a figure of its own.
+        self.stage.open(library=True, campaign=campaign)
+        with self._job("connect at the start"):
             keep_house(self.stage.window)
             self.stage.composition.start(self.stage.window)
             self._warm_up.start()
@@ -169,7 +170,7 @@ class WindowJobs:
         page.middle.setCurrentWidget(page.effects)
         with self._job("weigh effects"):
             for i in range(DRAGS):
-                page.effects.choice.setCurrentIndex(i % page.effects.choice.count())
+                page.effects.part.choice.setCurrentIndex(i % page.effects.part.choice.count())
                 self._live_for(DRAG_S)
             self.stage.idle()
         page.middle.setCurrentWidget(page.view)
