@@ -5,8 +5,12 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from app.main_window import MainWindow
 
 NO_SCREEN = (
     "There is no screen to open the window on: neither DISPLAY nor WAYLAND_DISPLAY is set. Log in at a"
@@ -23,10 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     # superqt asks which Qt to use before anything of ours is imported by them.
     os.environ.setdefault("QT_API", "pyside6")
-    from PySide6.QtCore import QTimer
-
     from app.application import ExceptionHook, keep_house, make_application, make_window
-    from app.composition import Composition, Wish
+    from app.composition import IMPORTS, Composition, Wish
     from app.jobs.warm_up import WarmUp
     from app.state.rig import RigChoice
 
@@ -38,18 +40,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         composition.pages,
         theme=wanted.theme,
         commands=composition.commands,
-        page_waits=True,
+        imports=IMPORTS,
     )
     keep_house(window)
     hook = ExceptionHook(window.toasts)
     hook.install()
-    window.show()
-    composition.start(window)
     warm_up = WarmUp()
-    QTimer.singleShot(0, warm_up.start)
+    _at_the_first_page(window, lambda: composition.start(window), warm_up.start)
+    window.show()
     code = application.exec()
     warm_up.stop()
     return code
+
+
+def _at_the_first_page(window: MainWindow, *acts: Callable[[], object]) -> None:
+    def opened(_: str) -> None:
+        window.opened.disconnect(opened)
+        for act in acts:
+            act()
+
+    window.opened.connect(opened)
 
 
 def has_screen(platform: str, environment: Mapping[str, str]) -> bool:

@@ -6,7 +6,7 @@ import builtins
 import logging
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Literal
@@ -15,8 +15,10 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
+from app.jobs.base import Job
 from app.jobs.housekeeping import LOOK_MS, Housekeeper, share_heaps
 from app.jobs.qt_runner import QtRunner
+from app.jobs.warm_up import import_early
 from app.main_window import Command, MainWindow, PageMaker
 from app.paged_window import Parts
 from app.panels.log import LogRecords
@@ -90,12 +92,12 @@ def make_window(
     folder: Path | None = None,
     theme: Literal["system", "light", "dark"] | None = None,
     commands: dict[str, Command] | None = None,
-    page_waits: bool = False,
+    imports: Mapping[str, Sequence[str]] | None = None,
 ) -> MainWindow:
     """The window with its settings of a folder (default: the system's); told troubles become toasts.
 
-    ``theme`` overrides that of the settings. The page that was open last is there at once, or, if it
-    ``page_waits``, after the first paint, so that the window is on screen before plots are imported.
+    ``theme`` overrides that of the settings. The page that was open last is there at once, or, where
+    ``imports`` says what pages need, after the first paint and once a thread has imported that.
     """
     path = (folder or settings_folder()) / "settings.json"
     settings, trouble = load_settings(path)
@@ -109,13 +111,24 @@ def make_window(
     parts.runner.setParent(window)
     window.setWindowIcon(app_icon(window.theme))
     settings.page = settings.page if settings.page in pages else next(iter(pages))
-    if page_waits:
-        window.painted.connect(lambda: window.open_page(window.page))
-    else:
+    if imports is None:
         window.open_page(settings.page)
+    else:
+        window.painted.connect(lambda: _open_imported(window, imports[window.page]))
     if trouble:
         window.toasts.tell("warning", trouble)
     return window
+
+
+def _open_imported(window: MainWindow, modules: Sequence[str]) -> None:
+    """Open the page once a thread has imported what it needs, or another one that was chosen meanwhile."""
+
+    def show(_: object) -> None:
+        window.open_page(window.page)
+
+    # What cannot be imported fails again while the page is made, where a person is told.
+    job = Job("Open the page", lambda progress: import_early(modules), show, show, is_minor=True)
+    window.parts.runner.submit(job)
 
 
 class ExceptionHook(QObject):

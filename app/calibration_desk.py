@@ -7,13 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.controllers.rig import RigController
 from app.main_window import MainWindow
 from app.state.calibrate import ABOUT, CampaignFacts
 from app.widgets.page import PageWidget
 
 if TYPE_CHECKING:
     from app.controllers.calibrate import CalibrateController
+    from app.controllers.rig import RigController
     from app.controllers.scan import ScanController
     from app.controllers.wizard import WizardController
     from app.state.wizard import WizardState

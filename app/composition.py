@@ -10,21 +10,36 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QTimer
 
 from app.calibration_desk import CalibrationDesk, calibration_commands
-from app.controllers.rig import RigController
 from app.main_window import Command, MainWindow, PageMaker
-from app.projector_screens import ProjectorScreens
-from app.projector_window import ScreenProjector
-from app.session_desk import SessionDesk
 from app.settings import data_folder
 from app.state.rig import Link, RigChoice, RigState
 from app.widgets.page import PageWidget
 
 if TYPE_CHECKING:
     from app.controllers.demo import DemoController
+    from app.controllers.rig import RigController
     from app.controllers.scan import ScanController
+    from app.projector_screens import ProjectorScreens
+    from app.session_desk import SessionDesk
     from app.state.scan import ScanState
 
 
+#: What the window does behind any page.
+_SHARED = ("app.controllers.rig", "app.projector_screens", "app.session_desk")
+#: What pages are made of; imported by a thread where one is opened first of all.
+IMPORTS = {
+    "rig": (*_SHARED, "dsl_core.devices.registry", "app.panels.rig_page"),
+    "calibrate": (*_SHARED, "app.controllers.calibrate", "app.panels.calibrate_page"),
+    "scan": (
+        *_SHARED,
+        "app.controllers.scan",
+        "app.controllers.forecast",
+        "app.controllers.effects",
+        "app.panels.scan_page",
+    ),
+    "results": (*_SHARED, "app.controllers.results", "app.panels.results_page"),
+    "compare": (*_SHARED, "app.controllers.compare", "app.panels.compare_page"),
+}
 #: How long the window is on screen before the rig is asked for, ms.
 CONNECT_AFTER_MS = 200
 
@@ -99,6 +114,10 @@ class Composition(QObject):
     def rig(self, window: MainWindow) -> RigController:
         """The one rig of the application."""
         if self._rig is None:
+            from app.controllers.rig import RigController
+            from app.projector_screens import ProjectorScreens
+            from app.projector_window import ScreenProjector
+
             settings = window.parts.settings
             remembered = RigChoice(settings.rig, tuple(settings.rig_options.items()))
             state = RigState(self._wish.rig or remembered)
@@ -132,6 +151,8 @@ class Composition(QObject):
     def session(self, window: MainWindow) -> SessionDesk:
         """What keeps the session of the window."""
         if self._session is None:
+            from app.session_desk import SessionDesk
+
             self._session = SessionDesk(window)
         return self._session
 

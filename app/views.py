@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from app.state.rig import RigChoice
-from dsl_core.patterns.trial_pictures import PictureKind
+
+if TYPE_CHECKING:
+    from dsl_core.patterns.trial_pictures import PictureKind
 
 Level = Literal["info", "warning", "error"]
 

@@ -49,7 +49,8 @@ class IntensityGraph:
 
 def find_session(result: ResultArrays) -> Path:
     """The scan beside a result that it was made of; raises `StoreError` when it is not there."""
-    from dsl_core.io.session_manifest import MANIFEST_NAME, read_manifest
+    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io.session_manifest import read_manifest
 
     captured = result.attributes.get("captured")
     for folder in sorted(result.path.parent.glob("*.dsl")):

@@ -6,8 +6,7 @@ import json
 from enum import Enum
 from pathlib import Path
 
-from dsl_core.io.campaign_folder import CAMPAIGN_NAME
-from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.

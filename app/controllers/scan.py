@@ -208,7 +208,7 @@ class ScanController:
 
     def open(self, path: Path) -> bool:
         """Plan what a file says, or offer to go on with an interrupted scan; False for anything else."""
-        from dsl_core.io.session_manifest import MANIFEST_NAME
+        from dsl_core.io.file_names import MANIFEST_NAME
 
         if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
             self.plans.open_plan(path)
@@ -226,8 +226,8 @@ class ScanController:
 
     def _remember(self, folder: Path) -> bool:
         """Offer to go on with a session that lacks frames; False when there is nothing to go on with."""
+        from dsl_core.io.file_names import MANIFEST_NAME
         from dsl_core.io.session import SessionReader
-        from dsl_core.io.session_manifest import MANIFEST_NAME
 
         if not (folder / MANIFEST_NAME).is_file():
             return False

@@ -11,7 +11,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import DslError, PlanError
 from dsl_core.io.estimate import estimate
-from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.multiplexed import profile_count

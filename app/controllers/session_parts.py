@@ -16,8 +16,8 @@ from app.state.evented import Value
 from app.state.results import Quality, ResultsState, View
 from app.state.scan import CalibrationChoice, ScanState, preset_of
 from app.state.session import ComparePart, ResultsPart, ScanPart
+from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.result_arrays import ResultArrays
-from dsl_core.io.session_manifest import MANIFEST_NAME
 from dsl_core.model.presets import on_cycles
 
 E = TypeVar("E", bound=Enum)

@@ -53,8 +53,8 @@ STEPS = (
 )
 #: Rest between two steps, s.
 REST_S = 0.05
-#: The bulk of torch: while the system loads it by itself, Python's lock is free.
-_BULK = {"torch": "lib/libtorch_cpu.so"}
+#: The bulk of some packages: while the system loads it by itself, Python's lock is free.
+_BULK = {"torch": "lib/libtorch_cpu.so", "cv2": "cv2.abi3.so"}
 
 
 class WarmUp:
@@ -90,6 +90,12 @@ class WarmUp:
                 _log.debug("%s could not be imported early: %s", name, error)
 
 
+def import_early(names: Sequence[str]) -> None:
+    """Import modules in a thread that nobody waits for."""
+    for name in names:
+        _import(name)
+
+
 def _import(name: str) -> None:
     if name in sys.modules:
         return
@@ -110,8 +116,8 @@ def _load_bulk(name: str) -> None:
     found = importlib.util.find_spec(name) if name in _BULK and sys.platform == "linux" else None
     if found is None or found.origin is None:
         return
-    path = Path(found.origin).parent / _BULK[name]
     load = ctypes.CDLL(None).dlopen  # unlike ctypes.CDLL(path), a function that is called frees the lock
     load.restype = ctypes.c_void_p
+    path = Path(found.origin).parent / _BULK[name]
     if path.is_file():
         load(str(path).encode(), os.RTLD_NOW | os.RTLD_GLOBAL)

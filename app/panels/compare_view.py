@@ -37,10 +37,8 @@ class CompareView(QWidget):
         self.boxes = [pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False) for _ in range(3)]
         self.images = [pg.ImageItem(axisOrder="row-major") for _ in range(3)]
         self.crosses = [pg.TargetItem(size=13, movable=False) for _ in range(3)]
-        self.scale, self.difference = (
-            pg.ColorBarItem(interactive=False, width=12, colorMap=colour_map(name))
-            for name in (DEPTH, DIFFERENCE)
-        )
+        #: The scale of both pictures and that of their difference, once there is a pair: slow to make.
+        self.bars: tuple[Any, ...] = ()
         self._lay_out()
         self._mouse = pg.SignalProxy(self.canvas.scene().sigMouseMoved, rateLimit=60, slot=self._hover)
         self.stops = [
@@ -61,8 +59,6 @@ class CompareView(QWidget):
             if i:
                 self.boxes[i].setXLink(self.boxes[0])
                 self.boxes[i].setYLink(self.boxes[0])
-        self.canvas.addItem(self.scale, 1, 2)
-        self.canvas.addItem(self.difference, 1, 4)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.canvas)
@@ -90,12 +86,23 @@ class CompareView(QWidget):
     def _new_pair(self, pair: Pair | None) -> None:
         for item in self.images:
             item.clear()
-        for bar in (self.scale, self.difference):
+        if pair is not None and not self.bars:
+            self._make_bars()
+        for bar in self.bars:
             bar.setVisible(pair is not None)
         self._title(pair)
         if pair is not None:
             self.paint()
             self.boxes[0].autoRange(padding=0.01, items=[self.images[0]])
+
+    def _make_bars(self) -> None:
+        self.bars = tuple(
+            pg.ColorBarItem(interactive=False, width=12, colorMap=colour_map(name))
+            for name in (DEPTH, DIFFERENCE)
+        )
+        for bar, place in zip(self.bars, (2, 4), strict=True):
+            self.canvas.addItem(bar, 1, place)
+        self._theme_bars()
 
     def _title(self, pair: Pair | None) -> None:
         names = ("", "", "") if pair is None else (f"A  {pair.first.name}", f"B  {pair.second.name}", "A − B")
@@ -118,12 +125,13 @@ class CompareView(QWidget):
         self._paint(0, first, levels, table)
         self._paint(1, second, levels, table)
         self._paint(2, gap, (-reach, reach), colour_map(DIFFERENCE).getLookupTable(nPts=256))
-        self.scale.setColorMap(colour_map(colours))
-        self.scale.setLevels(levels)
-        self.difference.setLevels((-reach, reach))
+        scale, difference = self.bars
+        scale.setColorMap(colour_map(colours))
+        scale.setLevels(levels)
+        difference.setLevels((-reach, reach))
         depth = state.shown.value is Shown.DEPTH
         words = ("Depth (mm)", "Difference (mm)") if depth else ("Reflectance", "Difference of reflectance")
-        for bar, text in zip((self.scale, self.difference), words, strict=True):
+        for bar, text in zip(self.bars, words, strict=True):
             bar.setLabel("left", text, color=self._theme.muted)
 
     def _paint(self, i: int, image: Any, levels: tuple[float, float], table: Any) -> None:
@@ -143,12 +151,16 @@ class CompareView(QWidget):
         self.canvas.setBackground(theme.base)
         for cross in self.crosses:
             cross.setPen(pg.mkPen(theme.accent, width=2))
-        for bar in (self.scale, self.difference):
+        self._theme_bars()
+        self._title(self._state.pair.value)
+        self.paint()
+
+    def _theme_bars(self) -> None:
+        theme = self._theme
+        for bar in self.bars:
             for side in ("left", "right"):
                 bar.getAxis(side).setTextPen(theme.text)
                 bar.getAxis(side).setPen(theme.line)
-        self._title(self._state.pair.value)
-        self.paint()
 
 
 def common_levels(first: Any, second: Any, shown: Shown) -> tuple[float, float]:

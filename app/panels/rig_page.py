@@ -22,6 +22,7 @@ from app.theme import Theme
 from app.views import RigCommands
 from app.widgets.forms import ChoiceBox, NumberBox, label, set_role
 from app.widgets.help_window import set_help
+from app.widgets.late import Late
 from app.widgets.page import PageWidget
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 
@@ -41,9 +42,9 @@ class RigPage(PageWidget):
         super().__init__()
         self._state, self._commands = state, commands
         self._stops: list[Callable[[], None]] = []
-        self.live = LiveView()
-        self.live.setObjectName("live-view")
-        set_help(self.live, "rig#live-picture")
+        self._live = Late(self._make_live)
+        self._live.setObjectName("live-view")
+        set_help(self._live, "rig#live-picture")
         self.projector = ProjectorPanel()
         set_help(self.projector, "rig#projector")
         self._rig = ChoiceBox("Rig", "The rig to connect")
@@ -83,6 +84,17 @@ class RigPage(PageWidget):
         self._lay_out()
         self._connect()
 
+    @property
+    def live(self) -> LiveView:
+        """What the camera sees."""
+        return self._live.part
+
+    def _make_live(self) -> LiveView:
+        state, made = self._state, LiveView()
+        made.set_camera(state.camera)
+        self._stops += [state.frame.follow(made.show_frame), state.counts.follow(made.show_counts)]
+        return made
+
     def _lay_out(self) -> None:
         devices = QGroupBox("Devices")
         form = QFormLayout(devices)
@@ -110,7 +122,7 @@ class RigPage(PageWidget):
             column.addStretch(1)
         row = QHBoxLayout(self)
         row.addWidget(left)
-        row.addWidget(self.live, 1)
+        row.addWidget(self._live, 1)
         row.addWidget(right)
 
     def _connect(self) -> None:
@@ -120,15 +132,13 @@ class RigPage(PageWidget):
         self._exposure.valueChanged.connect(commands.set_exposure)
         self.auto.clicked.connect(lambda: commands.expose_automatically(self.live.region))
         self.projector.wanted.connect(commands.show)
-        self._stops = [
+        self._stops += [
             state.choice.follow(self._show_choice),
             state.link.follow(self._show_link),
             state.devices.follow(self._show_devices),
             state.trouble.follow(self._show_trouble),
             state.live.follow(self._show_live),
-            state.frame.follow(self.live.show_frame),
             state.exposure_ms.follow(self._show_exposure),
-            state.counts.follow(self.live.show_counts),
             state.is_exposing.follow(lambda _: self._show_auto()),
         ]
 
@@ -159,7 +169,8 @@ class RigPage(PageWidget):
         camera, projector = self._state.camera, self._state.projector
         self._camera_text.setText("–" if camera is None else _describe(camera))
         self._projector_text.setText("–" if projector is None else _describe(projector))
-        self.live.set_camera(camera)
+        if self._live.made is not None:
+            self._live.made.set_camera(camera)
         self.projector.set_projector(projector)
         self._live_button.setEnabled(devices is not None)
         self.selftest.setEnabled(devices is not None)
@@ -199,7 +210,7 @@ class RigPage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        self.live.apply_theme(theme)
+        self._live.apply_theme(theme)
 
     def release(self) -> None:
         """Stop looking and let the devices go."""

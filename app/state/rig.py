@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from app.state.evented import Value
-from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
-from dsl_core.model.frames import Frame
+
+if TYPE_CHECKING:
+    # The window comes up before numpy.
+    from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
+    from dsl_core.model.frames import Frame
 
 
 class Link(Enum):

@@ -9,7 +9,7 @@ from pathlib import Path
 from dsl_core.campaign.recipe import Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DslError
-from dsl_core.io.session_manifest import MANIFEST_NAME
+from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.session_reader import SessionReader
 from dsl_core.model.plan import CapturePlan
 from dsl_core.progress import Progress

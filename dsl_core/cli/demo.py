@@ -60,8 +60,9 @@ def demo(
 
 def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
     """The first of the name and its numbered neighbours that is free, or holds this demo unfinished."""
+    from dsl_core.io.file_names import MANIFEST_NAME
     from dsl_core.io.origin import rig_notes
-    from dsl_core.io.session_manifest import MANIFEST_NAME, read_manifest
+    from dsl_core.io.session_manifest import read_manifest
 
     for number in itertools.count(1):
         folder = wanted if number == 1 else wanted.with_name(f"{wanted.name}-{number}")

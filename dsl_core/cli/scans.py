@@ -109,8 +109,8 @@ def scan(
     """Capture a plan; every frame is safe on disk before the next is taken."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
+    from dsl_core.io.file_names import MANIFEST_NAME
     from dsl_core.io.origin import rig_notes
-    from dsl_core.io.session_manifest import MANIFEST_NAME
 
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)
     choice = PlanChoice(plan, code, lines, comb, setting).build()

@@ -23,10 +23,10 @@ from pydantic import Field, ValidationError
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import write_atomic
+from dsl_core.io.file_names import CAMPAIGN_NAME
 from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.base import Record
 
-CAMPAIGN_NAME = "campaign.json"
 R = TypeVar("R", bound=Record)
 
 

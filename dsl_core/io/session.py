@@ -23,10 +23,10 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import remove_partials
 from dsl_core.io.capture_log import CaptureLog, LogEntry
+from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.frame_store import checksum
 from dsl_core.io.session_lock import SessionLock
 from dsl_core.io.session_manifest import (
-    MANIFEST_NAME,
     Manifest,
     describe_scan,
     read_manifest,

@@ -84,9 +84,10 @@ def test_the_window_comes_round_between_two_turns(qtbot: QtBot) -> None:
 def test_whose_window_is_gone_loses_the_turn_and_others_do_not(qtbot: QtBot) -> None:
     page, gone, taken = QWidget(), QWidget(), list[str]()
     qtbot.addWidget(page)
-    QVBoxLayout(page).addWidget(gone)
+    column = QVBoxLayout(page)
+    column.addWidget(gone)
     take_turn(gone, lambda: taken.append("gone"))
     take_turn(page, lambda: taken.append("page"))
-    page.layout().removeWidget(gone)
+    column.removeWidget(gone)
     gone.deleteLater()
     qtbot.waitUntil(lambda: taken == ["page"])

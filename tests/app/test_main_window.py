@@ -148,7 +148,8 @@ def test_only_work_that_somebody_would_miss_keeps_the_window_open(
 
 
 def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -> None:
-    made = make_window({"rig": lambda window: Page(window, "rig")}, tmp_path, page_waits=True)
+    imports = {"rig": ("json", "there.is.no.such.module")}
+    made = make_window({"rig": lambda window: Page(window, "rig")}, tmp_path, imports=imports)
     qtbot.addWidget(made)
     made.show()
     assert made.stack.count() == 0

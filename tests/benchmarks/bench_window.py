@@ -125,7 +125,8 @@ def _print_answers(
 ) -> None:
     limits = {"window on screen": "1500 ms", "cursor to spectrum": "20 ms", "change of band": "20 ms"}
     rows = [
-        [name, f"{clock:.0f} ms", f"{cpu:.0f} ms", limits[name]] for name, (clock, cpu) in answers.items()
+        [name, f"{clock:.0f} ms", f"{cpu:.0f} ms", limits.get(name, "")]
+        for name, (clock, cpu) in answers.items()
     ]
     rows += [[f"cancel: {name}", f"{seconds:.2f} s", "", "2 s"] for name, seconds in cancel_s.items()]
     rows.append(["cloud turned", f"{frames[0]:.0f} pictures/s", "", "15 pictures/s"])

@@ -94,12 +94,15 @@ class WindowJobs:
     def _start(self) -> None:
         campaign = self.stage.copied(self.stage.material.complete)
         # How long the window takes to the screen is a figure of its own.
-        self.stage.open(library=True, campaign=campaign)
+        self.stage.open(library=True, page_waits=True, campaign=campaign)
+        window = self.stage.window
+        with self._job("first page"):
+            keep_house(window)
+            self._wait(lambda: window.stack.count() > 0)
         with self._job("connect at the start"):
-            keep_house(self.stage.window)
-            self.stage.composition.start(self.stage.window)
+            self.stage.composition.start(window)
             self._warm_up.start()
-            rig = self.stage.composition.rig(self.stage.window)
+            rig = self.stage.composition.rig(window)
             self._wait(lambda: rig.state.link.value is Link.OPEN)
         with self._job("at rest after the start"):
             self._wait(lambda: self._warm_up.is_over)

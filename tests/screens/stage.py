@@ -16,7 +16,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog, QPushButton, QWidget
 
 from app.application import make_window
-from app.composition import Composition, Wish
+from app.composition import IMPORTS, Composition, Wish
 from app.main_window import MainWindow
 from app.settings import HOME_VARIABLE
 from app.state.rig import Link, RigChoice
@@ -41,8 +41,11 @@ class Stage:
 
     # Open and close --------------------------------------------------------------------------------
 
-    def open(self, library: bool = False, **settings: object) -> None:
-        """Open the window as it comes up with these settings, with or without calibrations kept."""
+    def open(self, library: bool = False, page_waits: bool = False, **settings: object) -> None:
+        """Open the window as it comes up with these settings, with or without calibrations kept.
+
+        Its page is there at once, unless it ``page_waits`` for the first paint, as for a person.
+        """
         home = self.folder / "home"
         if library:
             shutil.copytree(self.material.home, home, dirs_exist_ok=True)
@@ -55,7 +58,11 @@ class Stage:
             path.write_text(json.dumps({"tour_seen": True, **told, **settings}, default=str))
         self.composition = Composition(Wish())
         self.window = make_window(
-            self.composition.pages, home, self._look.theme, commands=self.composition.commands
+            self.composition.pages,
+            home,
+            self._look.theme,
+            commands=self.composition.commands,
+            imports=IMPORTS if page_waits else None,
         )
         QCursor.setPos(QGuiApplication.primaryScreen().geometry().bottomRight())
         self.window.show()
