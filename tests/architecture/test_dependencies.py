@@ -21,6 +21,8 @@ DISTRIBUTIONS = {
     "PySide6": "pyside6-essentials",
     "colour": "colour-science",
     "cv2": "opencv-contrib-python-headless",
+    # The part of PySide that knows which objects are still alive.
+    "shiboken6": "pyside6-essentials",
     "vtkmodules": "vtk",
 }
 # The desktop application is built on these; until its first window nothing imports them.
