@@ -10,8 +10,10 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.multiplexed import profiles
 from dsl_core.planning import design as module
-from dsl_core.planning.design import Judge, design, training_spectra
+from dsl_core.planning import judge as judging
+from dsl_core.planning.design import design
 from dsl_core.planning.designed import designed_sets, load_design
+from dsl_core.planning.judge import Judge, training_spectra
 from dsl_core.planning.mixed_lines import DARK_PX, MixedLines
 from dsl_core.resources import resource_path
 from dsl_core.simulation.published_rig import published_rig
@@ -52,7 +54,7 @@ def test_lines_that_cannot_keep_apart_are_refused() -> None:
 def test_a_design_is_expected_to_beat_the_best_comb_and_is_the_same_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "PLACES", (4, 1))
+    monkeypatch.setattr(judging, "PLACES", (4, 1))
     monkeypatch.setattr(module, "WIDTHS_PX", (6,))
     monkeypatch.setattr(module, "RUNS", (0.5,))
     made, again = (design(published_rig(), PLAN, 16, grid=GRID, orders=2) for _ in range(2))
@@ -64,7 +66,7 @@ def test_a_design_is_expected_to_beat_the_best_comb_and_is_the_same_again(
 
 
 def test_a_comb_that_finds_columns_coarsely_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "PLACES", (6, 1))
+    monkeypatch.setattr(judging, "PLACES", (6, 1))
     judge = Judge(published_rig(), PLAN, GRID)
     errors = [judge.error(LineComb(width_px=w, step_px=4, period_px=64)) for w in (6, 8)]
     # Both edges of 8 columns lie on the same ones of every four, so that columns between them are not found.
