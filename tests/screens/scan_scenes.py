@@ -163,7 +163,7 @@ def effects(stage: Stage) -> None:
     stage.open()
     scan = planned_scan(stage)
     panel = scan.page.effects.part
-    scan.page.middle.setCurrentWidget(panel)
+    scan.page.middle.setCurrentWidget(scan.page.effects)
     stage.wait(lambda: panel.table.rowCount() > 0)
     stage.idle()
     stage.shoot()
