@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
+from PySide6.QtCore import QSize
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.theme import DARK, Theme
 from app.widgets.turns import take_turn
 
+#: What pictures and plots ask for, too.
+ROOM = QSize(256, 192)
 P = TypeVar("P", bound=QWidget)
 
 
@@ -38,6 +41,10 @@ class Late(QWidget, Generic[P]):
             self._column.addWidget(self.made)
             self.setFocusProxy(self.made)
         return self.made
+
+    def sizeHint(self) -> QSize:
+        """The room that a part will want, as far as that is known: splitters share it out before."""
+        return super().sizeHint() if self.made is not None else ROOM
 
     def showEvent(self, event: QShowEvent) -> None:
         """Make the part soon."""
