@@ -203,7 +203,7 @@ class Artist:
         begun = time.perf_counter()
         self._plotter.render_window.Render()
         self._picture_s, self.shown = time.perf_counter() - begun, self._cloud.shown
-        picture = Picture(self._pixels(), self._cloud.projection(*self._size))
+        picture = Picture(self._pixels(), self._cloud.projection())
         with self._lock:
             is_taken, self._picture = self._picture is None, picture
         if is_taken:
@@ -240,13 +240,14 @@ class Artist:
     def _resize(self, width: int, height: int) -> None:
         self._size = width, height
         self._plotter.window_size = [width, height]
+        self._cloud.resize(width, height)
         # Until a person turns the view, it fits the cloud into whatever size the layout settles on.
         if self._is_untouched:
             self._reset()
 
     def _reset(self) -> None:
         self._is_untouched = True
-        self._cloud.reset(*self._size)
+        self._cloud.reset()
 
     def _at(self, at: tuple[int, int], shift: bool = False, control: bool = False) -> None:
         self._mouse.SetEventInformationFlipY(*at, control, shift, chr(0), 0, None)

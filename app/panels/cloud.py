@@ -14,9 +14,9 @@ COARSE = 60_000
 #: A picture at rest may take so long, s: who begins to turn the view waits for it. Steps that add less than a
 #: share of what is there are not worth it.
 SLOW_S, LEAST_STEP = 0.1, 0.25
-POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 6
-#: Pixels of a view that a cloud covers, about; points that are few are drawn larger, so that it is no veil.
-COVERED_PX = 200_000
+POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 10
+#: What a cloud covers of a view, about; points that are few are drawn larger, so that it is no veil.
+COVERED = 0.6
 
 
 class Cloud:
@@ -32,6 +32,7 @@ class Cloud:
         self._parts: dict[str, NDArray[np.int32]] = {}
         self._order = np.empty(0, np.int32)
         self.is_coarse = False
+        self._size = 640, 480
 
     def show(self, points: Points, colours: NDArray[np.uint8]) -> bool:
         """Show a cloud; True when it is another than before, and not only of other colours."""
@@ -106,20 +107,27 @@ class Cloud:
         else:
             self._put(name, near, colours, size_px)
 
+    def resize(self, width: int, height: int) -> None:
+        """Draw points as large as a view of this size, px, calls for."""
+        self._size = width, height
+        self.be_coarse(self.is_coarse)
+
     def be_coarse(self, coarse: bool) -> None:
         """Show the first part alone, or all of them; the fewer points, the larger."""
         self.is_coarse = coarse
-        size_px = point_size(min(COARSE, self.shown) if coarse else self.shown)
+        width, height = self._size
+        size_px = point_size(min(COARSE, self.shown) if coarse else self.shown, width * height)
         for number, name in enumerate(self._parts):
             actor = self._actors[name]
             actor.SetVisibility(number == 0 or not coarse)
             actor.GetProperty().SetPointSize(min(size_px, COARSE_PX) if self.shown > COARSE else size_px)
 
-    def reset(self, width: int, height: int) -> None:
-        """Look along the camera's axis, as the picture does, so that all fits into a window's size."""
+    def reset(self) -> None:
+        """Look along the camera's axis, as the picture does, so that all fits into the view."""
         if self._points is None or len(self._order) == 0:
             return
         low, high = np.percentile(self._points[self._order[:COARSE]], (0.5, 99.5), axis=0)
+        width, height = self._size
         centre, span = (low + high) / 2, (high - low) / 2
         camera = self.plotter.camera
         camera.position, camera.up, camera.focal_point = (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), tuple(centre)
@@ -127,16 +135,17 @@ class Cloud:
         camera.view_angle = float(np.degrees(2 * np.arctan2(reach, low[2])))
         self.plotter.reset_camera_clipping_range()
 
-    def projection(self, width: int, height: int) -> NDArray[np.float64]:
+    def projection(self) -> NDArray[np.float64]:
         """From points to normalised screen coordinates, 4 x 4."""
+        width, height = self._size
         matrix = self.plotter.camera.GetCompositeProjectionTransformMatrix(width / max(height, 1), -1, 1)
         return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
 
 
-def point_size(count: int) -> int:
-    """Size of the points of a cloud, px.
+def point_size(count: int, view_px: int) -> int:
+    """Size of the points of a cloud in a view of so many pixels, px.
 
-    >>> point_size(500_000), point_size(14_000), point_size(100)
-    (2, 4, 6)
+    >>> point_size(500_000, 300_000), point_size(14_000, 300_000), point_size(100, 300_000)
+    (2, 4, 10)
     """
-    return min(max(round(math.sqrt(COVERED_PX / max(count, 1))), POINT_PX), LARGEST_PX)
+    return min(max(round(math.sqrt(COVERED * view_px / max(count, 1))), POINT_PX), LARGEST_PX)

@@ -202,11 +202,14 @@ class TurnedScene:
         """Mark a point; the cloud is coarse until it rests."""
         rgb = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8)[None]
         points = np.empty((0, 3), np.float32) if point is None else point[None]
-        self._artist.mark("marker", points, rgb, 14, moves=True)
+        self._artist.mark("marker", points, rgb, self._px(14), moves=True)
 
     def show_pins(self, points: Points, colours: NDArray[np.uint8]) -> None:
         """Mark some points for good."""
-        self._artist.mark("pins", points, colours, 10)
+        self._artist.mark("pins", points, colours, self._px(10))
+
+    def _px(self, size: int) -> int:
+        return int(round(size * self.widget.devicePixelRatioF()))
 
     def set_background(self, colour: str) -> None:
         """The colour behind the cloud."""
