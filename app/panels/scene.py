@@ -209,7 +209,8 @@ class TurnedScene:
         self._artist.mark("pins", points, colours, self._px(10))
 
     def _px(self, size: int) -> int:
-        return int(round(size * self.widget.devicePixelRatioF()))
+        ratio: float = self.widget.devicePixelRatioF()
+        return round(size * ratio)
 
     def set_background(self, colour: str) -> None:
         """The colour behind the cloud."""
