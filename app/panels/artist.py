@@ -48,8 +48,11 @@ def graphics_work() -> bool:
         # Without a display server in between, whose library dislikes threads.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     import vtkmodules.vtkRenderingOpenGL2  # noqa: F401
+    from vtkmodules.vtkCommonCore import vtkLogger
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
+    # What it tries in vain is no news for the console.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     # VTK tries what it knows one after the other, but takes the last one unseen.
     name: str = vtkRenderWindow().GetClassName()
     return name != "vtkOSOpenGLRenderWindow" or ctypes.util.find_library("OSMesa") is not None
