@@ -177,6 +177,8 @@ class Artist:
     def _end(self) -> None:
         self._is_over = True
         self._plotter.close()
+        # Graphics are let go in the thread that they belong to.
+        del self._plotter, self._cloud, self._mouse
 
     def _wait(self) -> list[Act]:
         """All that waits; nothing where it is time to add to the cloud unasked."""
