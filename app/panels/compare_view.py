@@ -15,6 +15,7 @@ from app.state.compare import CompareState, Pair, Shown
 from app.state.results import Pixel
 from app.theme import DARK, Theme
 from app.widgets.arrow_keys import arrow_step, moved_within
+from app.widgets.turns import take_turn
 
 #: Differences: white is none, blue below, red above; lightness changes evenly.
 DIFFERENCE = "CET-D1A"
@@ -87,15 +88,20 @@ class CompareView(QWidget):
         for item in self.images:
             item.clear()
         if pair is not None and not self.bars:
-            self._make_bars()
+            take_turn(self, self._make_bars)
         for bar in self.bars:
             bar.setVisible(pair is not None)
         self._title(pair)
         if pair is not None:
-            self.paint()
-            self.boxes[0].autoRange(padding=0.01, items=[self.images[0]])
+            self._paint_whole()
+
+    def _paint_whole(self) -> None:
+        self.paint()
+        self.boxes[0].autoRange(padding=0.01, items=[self.images[0]])
 
     def _make_bars(self) -> None:
+        if self.bars or self._state.pair.value is None:
+            return
         self.bars = tuple(
             pg.ColorBarItem(interactive=False, width=12, colorMap=colour_map(name))
             for name in (DEPTH, DIFFERENCE)
@@ -103,6 +109,7 @@ class CompareView(QWidget):
         for bar, place in zip(self.bars, (2, 4), strict=True):
             self.canvas.addItem(bar, 1, place)
         self._theme_bars()
+        self._paint_whole()
 
     def _title(self, pair: Pair | None) -> None:
         names = ("", "", "") if pair is None else (f"A  {pair.first.name}", f"B  {pair.second.name}", "A − B")
@@ -125,11 +132,15 @@ class CompareView(QWidget):
         self._paint(0, first, levels, table)
         self._paint(1, second, levels, table)
         self._paint(2, gap, (-reach, reach), colour_map(DIFFERENCE).getLookupTable(nPts=256))
+        if self.bars:
+            self._show_scales(levels, reach, colours)
+
+    def _show_scales(self, levels: tuple[float, float], reach: float, colours: str) -> None:
         scale, difference = self.bars
         scale.setColorMap(colour_map(colours))
         scale.setLevels(levels)
         difference.setLevels((-reach, reach))
-        depth = state.shown.value is Shown.DEPTH
+        depth = self._state.shown.value is Shown.DEPTH
         words = ("Depth (mm)", "Difference (mm)") if depth else ("Reflectance", "Difference of reflectance")
         for bar, text in zip(self.bars, words, strict=True):
             bar.setLabel("left", text, color=self._theme.muted)

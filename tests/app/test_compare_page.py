@@ -67,6 +67,8 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     shapes = [item.image.shape for item in page.view.images]
     assert shapes == [(48, 64)] * 3
     assert tuple(page.view.images[0].levels) == tuple(page.view.images[1].levels)
+    qtbot.waitUntil(lambda: len(page.view.bars) == 2)
+    assert page.view.bars[0].levels() == pytest.approx(page.view.images[0].levels, rel=1e-3)
     low, high = page.view.images[2].levels
     assert low == -high
     QTest.keyClick(page.view, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
