@@ -20,8 +20,9 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
-from app.panels.artist import Artist, MouseButton, Picture, graphics_work
+from app.panels.artist import Artist
 from app.panels.cloud import Points
+from app.panels.easel import MouseButton, Picture, graphics_work
 from app.panels.still_scene import StillScene
 from app.widgets.arrow_keys import arrow_step
 

@@ -23,7 +23,8 @@ from app.controllers.results import ResultsController
 from app.jobs.base import InlineRunner
 from app.main_window import MainWindow
 from app.panels import scene_panel
-from app.panels.artist import SETTLE_S, graphics_work
+from app.panels.artist import SETTLE_S
+from app.panels.easel import graphics_work
 from app.panels.export_dialog import ExportDialog
 from app.panels.intensity_window import ticks
 from app.panels.mark_figures import figures_of
@@ -494,9 +495,9 @@ def test_who_turns_the_cloud_is_not_slowed_down_by_what_moves(bench: Bench, qtbo
     scene.show_marker(point + 1, "#ff0000")
     # Unlike QTest.qWait, this lets other threads run.
     qtbot.wait(int(2000 * SETTLE_S))
-    assert scene._artist._cloud.is_coarse
+    assert scene._artist._easel.cloud.is_coarse
     QTest.mouseRelease(scene.widget, Qt.MouseButton.LeftButton, pos=middle)
-    qtbot.waitUntil(lambda: not scene._artist._cloud.is_coarse)
+    qtbot.waitUntil(lambda: not scene._artist._easel.cloud.is_coarse)
 
 
 def test_the_thread_that_draws_ends_with_the_window(bench: Bench, qtbot: QtBot) -> None:

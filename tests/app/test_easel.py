@@ -5,7 +5,7 @@ import ctypes.util
 import pytest
 import vtkmodules.vtkRenderingCore
 
-from app.panels.artist import graphics_work
+from app.panels.easel import graphics_work
 
 
 @pytest.mark.parametrize(
