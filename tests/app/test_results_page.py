@@ -22,7 +22,7 @@ from app.application import make_window
 from app.controllers.results import ResultsController
 from app.jobs.base import InlineRunner
 from app.main_window import MainWindow
-from app.panels import scene_panel
+from app.panels import cloud, scene_panel
 from app.panels.artist import SETTLE_S
 from app.panels.easel import graphics_work
 from app.panels.export_dialog import ExportDialog
@@ -482,9 +482,23 @@ def test_the_view_is_turned_and_looks_as_the_camera_again(bench: Bench, qtbot: Q
 
 def test_pictures_follow_the_size_of_the_window(bench: Bench, qtbot: QtBot) -> None:
     scene = _cloud(bench, qtbot)
-    bench.window.resize(1500, 900)
+    # A sliver: who has not turned the view sees all of the cloud in it.
+    bench.page.pictures.setSizes([600, 90])
     qtbot.waitUntil(lambda: scene.is_at_rest and scene.widget.image.width() == scene.widget.width())
     assert scene.widget.image.height() == scene.widget.height()
+    for pixel in ((0, 0), (35, 23)):
+        assert scene.widget.rect().contains(_place(bench, scene, pixel))
+
+
+def test_a_large_cloud_grows_to_its_last_point(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # However slow the machine.
+    monkeypatch.setattr(cloud, "SLOW_S", 100.0)
+    scene = _cloud(bench, qtbot)
+    points = np.random.default_rng(0).normal((0, 0, 700), 20, (cloud.COARSE + 9, 3)).astype(np.float32)
+    scene.show_cloud(points, np.zeros((len(points), 3), np.uint8))
+    qtbot.waitUntil(lambda: scene.is_at_rest and scene.shown == len(points))
 
 
 def test_who_turns_the_cloud_is_not_slowed_down_by_what_moves(bench: Bench, qtbot: QtBot) -> None:
