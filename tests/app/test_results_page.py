@@ -483,8 +483,8 @@ def test_the_view_is_turned_and_looks_as_the_camera_again(bench: Bench, qtbot: Q
 def test_pictures_follow_the_size_of_the_window(bench: Bench, qtbot: QtBot) -> None:
     scene = _cloud(bench, qtbot)
     # A sliver: who has not turned the view sees all of the cloud in it.
-    bench.page.pictures.setSizes([600, 90])
-    qtbot.waitUntil(lambda: scene.is_at_rest and scene.widget.image.width() == scene.widget.width())
+    scene.widget.setFixedWidth(90)
+    qtbot.waitUntil(lambda: scene.is_at_rest and scene.widget.image.width() == 90)
     assert scene.widget.image.height() == scene.widget.height()
     for pixel in ((0, 0), (35, 23)):
         assert scene.widget.rect().contains(_place(bench, scene, pixel))
