@@ -18,6 +18,7 @@ from app.composition import Composition, Wish
 from app.main_window import MainWindow
 from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
+from app.widgets.late import Late
 
 RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "112x72")))
 NEVER = ("quit", "report_bundle")
@@ -187,6 +188,8 @@ class RandomPerson:
                     actions[key].trigger()
                     self._live(0.3)
                     self.rest()
+        for room in self.window.findChildren(Late):
+            _ = room.part
 
     def rest(self, cancel: bool = True) -> None:
         """Leave all dialogs and let everything come to its end."""

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -63,6 +64,7 @@ def _soak(minutes: float, seed: int, theme: str) -> int:
         person = RandomPerson(Path(home), theme, random.Random(seed))
         keep_house(person.window)
         rounds: list[tuple[float, ...]] = []
+        kinds: list[Counter[str]] = []
         limit = time.monotonic() + 60 * minutes
         head = ["round", "widgets", "objects", "threads", "files", "MB", "actions", "load"]
         print("".join(f"{word:>10}" for word in head), flush=True)
@@ -78,6 +80,7 @@ def _soak(minutes: float, seed: int, theme: str) -> int:
                         break
                 person.rest()
                 rounds.append(_count(application))
+                kinds.append(Counter(type(widget).__name__ for widget in application.allWidgets()))
                 print("".join(f"{word:>10}" for word in _row(len(rounds), rounds[-1], person)), flush=True)
                 wrong = errors.told or _growth(rounds)
         except Exception as error:
@@ -87,6 +90,8 @@ def _soak(minutes: float, seed: int, theme: str) -> int:
             person.close()
         wrong = wrong or errors.told
     if wrong:
+        more = (kinds[-1] - kinds[min(WARM_ROUNDS, len(kinds) - 1)]).most_common(8) if kinds else ()
+        print("more widgets than in the beginning:", ", ".join(f"{name} {count}" for name, count in more))
         print(f"\nseed {seed}: {wrong}\nlast actions: {', '.join(person.done[-12:])}")
         return 1
     judged = "nothing grew" if _is_long_enough(rounds) else "too few rounds to say whether anything grew"
