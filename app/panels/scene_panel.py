@@ -75,12 +75,26 @@ class ScenePanel(QWidget):
         """Make the scene, or bring it up to date."""
         super().showEvent(event)
         if self.scene is None and not self._is_preparing:
-            self._is_preparing = True
-            self._hint.setText("Preparing the 3D view …")
-            self._runner.submit(
-                Job("Prepare the 3D view", lambda progress: prepare_scene(), self._make, is_minor=True)
-            )
+            self._prepare()
         self._new_result()
+
+    def _prepare(self) -> None:
+        self._is_preparing = True
+        self._hint.setText("Preparing the 3D view …")
+        self._runner.submit(
+            Job(
+                "Prepare the 3D view",
+                lambda progress: prepare_scene(),
+                self._make,
+                lambda error: self._give_up(f"The 3D view could not be prepared: {error}"),
+                lambda: self._give_up("The 3D view was cancelled. Leave it and come back to have it."),
+                is_minor=True,
+            )
+        )
+
+    def _give_up(self, sentence: str) -> None:
+        self._is_preparing = False
+        self._hint.setText(sentence)
 
     def _make(self, is_drawn: bool) -> None:
         self.scene = scene = make_scene(is_drawn, self._view_moved, self._mouse)

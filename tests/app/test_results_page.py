@@ -39,6 +39,7 @@ from app.widgets.late import Late
 from app.widgets.page import PageWidget
 from app.widgets.spectrum_curve import split_by_share
 from app.widgets.welcome import Welcome
+from dsl_core.errors import Cancelled
 from dsl_core.evaluation.distance import on_screen
 from dsl_core.inspection import IntensityGraph
 from tests.app.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
@@ -427,6 +428,34 @@ def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) 
     QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, pos=middle + QPoint(-60, 60))
     qtbot.waitUntil(lambda: len(bench.marks) == 2)
     assert bench.marks[1].runs
+
+
+def test_a_3d_view_that_was_cancelled_comes_when_it_is_wanted_again(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(tmp_path)
+    qtbot.addWidget(bench.window)
+    bench.window.show()
+    bench.window.open_path(write_small_result(tmp_path))
+    tries: list[None] = []
+
+    def prepare() -> bool:
+        tries.append(None)
+        if len(tries) == 1:
+            raise Cancelled
+        if len(tries) == 2:
+            raise ImportError("no vtk")
+        return False
+
+    monkeypatch.setattr(scene_panel, "prepare_scene", prepare)
+    panel = bench.page.scene
+    for words in ("was cancelled", "could not be prepared: no vtk"):
+        bench.control.show(View.CLOUD)
+        qtbot.waitUntil(lambda words=words: words in panel._hint.text())  # type: ignore[misc]
+        bench.control.show(View.COLOUR)
+    bench.control.show(View.CLOUD)
+    qtbot.waitUntil(lambda: panel.scene is not None)
+    bench.window.close()
 
 
 def _place(bench: Bench, scene: TurnedScene, pixel: Pixel) -> QPoint:

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog,
 from app.application import ExceptionHook, make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
+from app.panels.results_page import ResultsPage
 from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
 from app.widgets.late import Late
@@ -166,7 +167,8 @@ class RandomPerson:
         state.then_reconstruct.set(True)
         self.done.append("scan")
         control.start()
-        if self._dice.random() < 0.2:
+        # Of the first one everything is looked at.
+        if self.scans and self._dice.random() < 0.2:
             self._live(self._dice.uniform(0.2, 2.0))
             control.cancel()
         self._wait(lambda: not state.phase.value.is_busy)
@@ -179,6 +181,9 @@ class RandomPerson:
         """Do every action once, so that windows made when they are first wanted are there."""
         actions = self.window.actions_by_key
         left = set(actions) - {*NEVER, "live_demo", "calibrate_everything"}
+        results = self.window.page_of("results")
+        assert isinstance(results, ResultsPage)
+        results._commands.point_at((20, 20))
         for page in PAGES:
             for key in sorted(left):
                 self.window.open_page(page)
@@ -187,6 +192,8 @@ class RandomPerson:
                     self.done.append(f"first {key}")
                     actions[key].trigger()
                     self._live(0.3)
+                    if key == "view_cloud":
+                        self._wait(lambda: results.scene.scene is not None)
                     self.rest()
         for room in self.window.findChildren(Late):
             _ = room.part
