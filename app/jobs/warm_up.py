@@ -50,6 +50,9 @@ STEPS = (
     "colour",
     "pyvista",
     "pyvista.plotting",
+    "vtkmodules.vtkInteractionWidgets",
+    "vtkmodules.vtkViewsContext2D",
+    "vtkmodules.vtkInteractionStyle",
 )
 #: Rest between two steps, s.
 REST_S = 0.05
