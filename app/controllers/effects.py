@@ -38,7 +38,7 @@ class EffectsController:
         self.state, self._scan, self._rig, self._runner, self._notifier = state, scan, rig, runner, notifier
         self._asked = (Wanted.USUAL.value, ONE_DN)
         self._turn = 0
-        self._stop = rig.state.devices.follow(self._take_rig)
+        self._stops = [rig.state.devices.follow(self._take_rig), rig.state.link.follow(self._take_link)]
 
     def _take_rig(self, devices: DeviceRig | None) -> None:
         options = dict(self._rig.state.choice.value.options)
@@ -51,6 +51,11 @@ class EffectsController:
         state.in_use.set(options.get(EFFECTS, Wanted.USUAL.value))
         state.tolerance.set(ONE_DN if world is None else world.tolerance)
         self._asked = (state.in_use.value, state.tolerance.value)
+
+    def _take_link(self, link: Link) -> None:
+        # A rig that was asked for may not have come.
+        if link is Link.CLOSED and self._rig.state.devices.value is None:
+            self.state.offered.set(False)
 
     def look(self, choice: str, tolerance: Tolerance) -> None:
         """Show what a choice renders, and what the rest would change and cost."""
@@ -99,7 +104,8 @@ class EffectsController:
 
     def close(self) -> None:
         """Follow the rig no more."""
-        self._stop()
+        for stop in self._stops:
+            stop()
 
 
 def _world_of(devices: DeviceRig | None) -> World | None:

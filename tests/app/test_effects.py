@@ -102,6 +102,14 @@ def test_a_choice_that_makes_no_sense_is_told(control: EffectsController, bench:
     assert "no effect 'magic'" in bench.notifier.told[-1][1]
 
 
+def test_a_rig_that_does_not_come_offers_nothing(control: EffectsController, bench: ScanBench) -> None:
+    seen = [control.state.offered.value]
+    for choice in (RigChoice("twin", (*TWIN.options, ("size", "huge"))), TWIN):
+        bench.rig.connect(choice)
+        seen.append(control.state.offered.value)
+    assert seen == [True, False, True]
+
+
 def test_without_a_simulated_rig_nothing_is_offered(control: EffectsController, bench: ScanBench) -> None:
     assert control.state.offered.value
     bench.rig.disconnect()
