@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QImage,
@@ -133,6 +133,15 @@ class SceneWidget(QWidget):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Ask for pictures of the new size."""
+        self._ask_for_size()
+
+    def event(self, event: QEvent) -> bool:
+        """Ask for pictures of the new size when the window goes to a screen of another scaling, too."""
+        if event.type() is QEvent.Type.DevicePixelRatioChange:
+            self._ask_for_size()
+        return super().event(event)
+
+    def _ask_for_size(self) -> None:
         self.artist.resize(*self._px(QPointF(self.width(), self.height())))
 
     def _px(self, at: QPointF) -> tuple[int, int]:

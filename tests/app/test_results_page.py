@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QImage, QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
@@ -517,6 +517,17 @@ def test_pictures_follow_the_size_of_the_window(bench: Bench, qtbot: QtBot) -> N
     assert scene.widget.image.height() == scene.widget.height()
     for pixel in ((0, 0), (35, 23)):
         assert scene.widget.rect().contains(_place(bench, scene, pixel))
+
+
+def test_pictures_are_as_fine_as_the_screen(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = _cloud(bench, qtbot)
+    monkeypatch.setattr(scene.widget, "devicePixelRatioF", lambda: 1.5)
+    QApplication.sendEvent(scene.widget, QEvent(QEvent.Type.DevicePixelRatioChange))
+    width = round(1.5 * scene.widget.width())
+    qtbot.waitUntil(lambda: scene.is_at_rest and scene.widget.image.width() == width)
+    assert scene.widget.image.devicePixelRatio() == 1.5
 
 
 def test_a_large_cloud_grows_to_its_last_point(
