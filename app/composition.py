@@ -40,7 +40,7 @@ IMPORTS = {
     "results": (*_SHARED, "app.controllers.results", "app.panels.results_page"),
     "compare": (*_SHARED, "app.controllers.compare", "app.panels.compare_page"),
 }
-#: How long the window is on screen before the rig is asked for, ms.
+#: How long the first page is on screen before the rig is asked for, ms.
 CONNECT_AFTER_MS = 200
 
 

@@ -25,6 +25,7 @@ STEPS = (
     "dsl_core.simulation.sim_devices",
     "zarr",
     "dsl_core.pipeline",
+    "app.panels.rig_page",
     "app.controllers.scan",
     "app.controllers.forecast",
     "app.controllers.effects",
