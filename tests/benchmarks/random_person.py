@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog,
 from app.application import ExceptionHook, make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
+from app.panels.compare_page import ComparePage
 from app.panels.results_page import ResultsPage
 from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
@@ -197,6 +198,18 @@ class RandomPerson:
                     self.rest()
         for room in self.window.findChildren(Late):
             _ = room.part
+        self._compare(results)
+
+    def _compare(self, results: ResultsPage) -> None:
+        """Compare a result with itself: the scales are made for the first pair."""
+        page, result = self.window.open_page("compare"), results._state.result.value
+        assert isinstance(page, ComparePage)
+        assert result is not None
+        self.done.append("first comparison")
+        for second in (False, True):
+            page._commands.open_side(result.path, second)
+            self._wait(lambda: not page._state.busy.value)
+        self._wait(lambda: len(page.view.bars) == 2)
 
     def rest(self, cancel: bool = True) -> None:
         """Leave all dialogs and let everything come to its end."""
