@@ -54,5 +54,7 @@ def test_what_was_captured_before_the_kill_is_kept(calibrated: Calibrated) -> No
     for path, content in kept.items():
         assert (calibrated.folder / path).read_bytes() == content, path
     frames = [p for p in calibrated.killed if p.startswith(INTERRUPTED) and "/frames" in p]
+    # A frame that was just being written was none yet: it is cleared away and taken again.
+    frames = [p for p in frames if not p.endswith(".partial")]
     assert frames == [p for p in frames if (calibrated.folder / p).exists()]
     assert not SessionReader(calibrated.folder / INTERRUPTED / "scan.dsl").missing()
