@@ -34,9 +34,8 @@ if TYPE_CHECKING:
 INSIDE = "DSL_SOAK_WINDOW"
 #: Rounds in which caches fill; growth counts from then on.
 WARM_ROUNDS = 3
-#: What may grow by so many between the first and the last third of all rounds: some windows come late, once,
-#: and pools of threads (of Qt, of zarr) fill as they are needed.
-MOST_WIDGETS, MOST_THREADS, MOST_FILES, MOST_MB = 60, 4, 3, 40.0
+#: What may grow by so many between the first and the last third of all rounds: some windows come late, once.
+MOST_WIDGETS, MOST_THREADS, MOST_FILES, MOST_MB = 60, 1, 3, 40.0
 #: What Qt says when a drag is given up that only a real mouse could end.
 BY_NO_PERSON = "QDragManager::drag in possibly invalid state"
 ACTIONS_A_ROUND = 25
