@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,12 +16,15 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog,
 
 from app.application import ExceptionHook, make_window
 from app.composition import Composition, Wish
+from app.jobs.base import Job
+from app.jobs.qt_runner import WORKERS
 from app.main_window import MainWindow
 from app.panels.compare_page import ComparePage
 from app.panels.results_page import ResultsPage
 from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
 from app.widgets.late import Late
+from dsl_core.progress import Progress
 
 RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "112x72")))
 NEVER = ("quit", "report_bundle")
@@ -198,6 +202,7 @@ class RandomPerson:
                     self.rest()
         for room in self.window.findChildren(Late):
             _ = room.part
+        self._busy_all_workers()
         self._compare(results)
 
     def _compare(self, results: ResultsPage) -> None:
@@ -210,6 +215,21 @@ class RandomPerson:
             page._commands.open_side(result.path, second)
             self._wait(lambda: not page._state.busy.value)
         self._wait(lambda: len(page.view.bars) == 2)
+
+    def _busy_all_workers(self) -> None:
+        """Let each worker calculate once: the last of them, and its own helpers, else come after hours."""
+        import torch
+
+        at_once = threading.Barrier(WORKERS)
+
+        def work(_progress: Progress) -> None:
+            at_once.wait()
+            torch.sin(torch.ones(1_000_000))
+
+        self.done.append("busy all workers")
+        for _ in range(WORKERS):
+            self.window.parts.runner.submit(Job("Calculate", work))
+        self.rest(cancel=False)
 
     def rest(self, cancel: bool = True) -> None:
         """Leave all dialogs and let everything come to its end."""
