@@ -45,25 +45,35 @@ def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
 
 
 def marks_of(kept: Annotations, result: ResultArrays, progress: Progress) -> tuple[Mark, ...]:
-    """Kept marks with their spectra; those that the result or a moved file no longer has are left out."""
-    marks: list[Mark] = []
-    for pin in kept.pins:
-        spectrum = spectrum_of_pixel(result, pin.pixel)
-        if spectrum is not None:
-            marks.append(Mark("pin", pin.name, pin.colour, spectrum, pin.shown, pixel=pin.pixel))
-    for region in kept.regions if result.has_spectra else ():
-        draft = Mark("region", region.name, region.colour, NOTHING, region.shown)
-        marks.append(
-            fill_region(replace(draft, outline_px=region.outline_px, runs=region.runs), result, progress)
-        )
-    for reference in kept.references:
-        path = Path(reference.file)
-        try:
-            made = mark_of_reference(reference.name, reference.colour, path, read_reference(path))
-        except DslError:
-            continue
-        marks.append(replace(made, shown=reference.shown))
-    return tuple(marks)
+    """Kept marks with their spectra; where there is none, a mark says why, so that it stays in the file."""
+    regions = tuple(_kept_region(region, result, progress) for region in kept.regions)
+    return (
+        *(_kept_pin(pin, result) for pin in kept.pins),
+        *regions,
+        *(_kept_reference(reference) for reference in kept.references),
+    )
+
+
+def _kept_pin(pin: PinRecord, result: ResultArrays) -> Mark:
+    spectrum = spectrum_of_pixel(result, pin.pixel)
+    trouble = "" if spectrum is not None else f"Pixel {pin.pixel[0]}, {pin.pixel[1]} has no spectrum here."
+    return Mark("pin", pin.name, pin.colour, spectrum or NOTHING, pin.shown, pixel=pin.pixel, trouble=trouble)
+
+
+def _kept_region(region: RegionRecord, result: ResultArrays, progress: Progress) -> Mark:
+    draft = Mark("region", region.name, region.colour, NOTHING, region.shown)
+    draft = replace(draft, outline_px=region.outline_px, runs=region.runs)
+    filled = fill_region(draft, result, progress) if result.has_spectra else draft
+    return filled if filled.used else replace(draft, trouble="No pixel of this region has a spectrum here.")
+
+
+def _kept_reference(reference: ReferenceRecord) -> Mark:
+    path = Path(reference.file)
+    try:
+        made = mark_of_reference(reference.name, reference.colour, path, read_reference(path))
+    except DslError as error:
+        made = Mark("reference", reference.name, reference.colour, NOTHING, file=path, trouble=str(error))
+    return replace(made, shown=reference.shown)
 
 
 def annotations_of(marks: Iterable[Mark]) -> Annotations:

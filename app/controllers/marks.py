@@ -9,21 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.controllers.mark_records import (
-    NOTHING,
-    annotations_of,
-    fill_region,
-    mark_of_reference,
-    marks_of,
-    read_reference,
-)
+from app.controllers.kept_marks import KeptMarks
+from app.controllers.mark_records import NOTHING, fill_region, mark_of_reference, read_reference
 from app.jobs.base import Job, JobRunner
 from app.state.results import Mark, Pixel, ResultsState
 from app.state.undo import Change, UndoStack
-from app.views import Notifier
+from app.views import Offerer
 from dsl_core.errors import DslError
 from dsl_core.evaluation.regions import runs_of
-from dsl_core.io.annotations_file import Annotations, load_annotations, save_annotations
 
 Mask = NDArray[np.bool_]
 #: Colours that are told apart; further marks share them.
@@ -31,15 +24,22 @@ COLOURS = 8
 
 
 class MarksController:
-    """Changes the marks; each change can be taken back and is saved beside the result at once."""
+    """Changes the marks; each change can be taken back and is saved beside the result at once.
 
-    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
+    New ones wait while those that are kept are read.
+    """
+
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
+        self._kept = KeptMarks(state, runner, notifier)
 
     # Make ------------------------------------------------------------------------------------------
 
     def pin(self, pixel: Pixel) -> None:
         """Keep the spectrum of a pixel; says why where there is none."""
+        self._kept.when_read(lambda: self._pin(pixel))
+
+    def _pin(self, pixel: Pixel) -> None:
         spectrum = self.state.spectrum_at(pixel)
         if spectrum is None:
             self._notifier.tell("info", f"Pixel {pixel[0]}, {pixel[1]} has no spectrum to pin.")
@@ -62,7 +62,7 @@ class MarksController:
         except DslError as error:
             self._notifier.tell("error", str(error))
             return
-        self._add(mark_of_reference(path.stem, self._colour(), path, curve))
+        self._kept.when_read(lambda: self._add(mark_of_reference(path.stem, self._colour(), path, curve)))
 
     def _add_region(self, draft: Mark) -> None:
         result = self.state.result.value
@@ -76,7 +76,9 @@ class MarksController:
             if region.used == 0:
                 self._notifier.tell("info", "No pixel in this outline has a spectrum. Draw a larger one.")
                 return
-            self._add(replace(region, name=self._name("region"), colour=self._colour()))
+            self._kept.when_read(
+                lambda: self._add(replace(region, name=self._name("region"), colour=self._colour()))
+            )
 
         self._runner.submit(
             Job(
@@ -125,7 +127,7 @@ class MarksController:
     def _setter(self, marks: tuple[Mark, ...]) -> Callable[[], None]:
         def set_marks() -> None:
             self.state.marks.set(marks)
-            self._save()
+            self._kept.save()
 
         return set_marks
 
@@ -143,40 +145,7 @@ class MarksController:
     def load(self) -> None:
         """Take the marks that are kept beside the result that was opened; forgets what could be undone."""
         self._undo.clear()
-        self.state.marks.set(())
-        self.state.selected.set(0)
-        result = self.state.result.value
-        if result is None:
-            return
-        try:
-            kept = load_annotations(result.path)
-        except DslError as error:
-            self._notifier.tell("warning", str(error))
-            return
-
-        def done(marks: tuple[Mark, ...]) -> None:
-            if self.state.result.value is result:
-                self.state.marks.set(marks)
-
-        if kept != Annotations():
-            self._runner.submit(
-                Job(
-                    "Marks",
-                    lambda progress: marks_of(kept, result, progress),
-                    done,
-                    self._tell,
-                    is_minor=True,
-                )
-            )
-
-    def _save(self) -> None:
-        result = self.state.result.value
-        if result is None:
-            return
-        try:
-            save_annotations(annotations_of(self.state.marks.value), result.path)
-        except DslError as error:
-            self._notifier.tell("warning", f"The marks could not be kept: {error}")
+        self._kept.read()
 
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", str(error))

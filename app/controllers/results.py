@@ -17,7 +17,7 @@ from app.controllers.result_files import expected_files, is_complete, picture_of
 from app.jobs.base import Job, JobRunner
 from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
 from app.state.undo import UndoStack
-from app.views import Notifier
+from app.views import Offerer
 from dsl_core.inspection import FrameBlock, IntensityGraph, find_session, intensity_graph, read_block
 from dsl_core.io.result_arrays import ResultArrays, load_arrays
 from dsl_core.progress import Progress
@@ -26,7 +26,7 @@ from dsl_core.progress import Progress
 class ResultsController:
     """Opens results and answers what the page asks of the whole image; ``marks`` has pins and regions."""
 
-    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self.marks = MarksController(state, runner, notifier, undo)
         self._block: FrameBlock | None = None
@@ -269,7 +269,7 @@ class ResultsController:
         result = self.state.result.value
         if result is None or not targets:
             return
-        pixels = [mark.pixel for mark in self.state.marks.value if mark.kind == "pin" and mark.pixel]
+        pixels = [mark.pixel for mark in self.state.marks.value if mark.pixel and not mark.trouble]
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.io.export import export, export_csv

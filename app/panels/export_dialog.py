@@ -53,7 +53,7 @@ class ExportDialog(QDialog):
         browse = QPushButton("Choose…")
         browse.setToolTip("Choose the folder to write to")
         browse.clicked.connect(self._browse)
-        pins = any(mark.kind == "pin" for mark in state.marks.value)
+        pins = any(mark.kind == "pin" and not mark.trouble for mark in state.marks.value)
         self.formats: dict[str, QCheckBox] = {}
         for form, _, text, needs_spectra in FORMATS:
             box = QCheckBox(text)

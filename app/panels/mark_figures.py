@@ -17,9 +17,11 @@ from dsl_core.io.result_arrays import ResultArrays
 def figures_of(state: ResultsState, theme: Theme) -> str:
     """What there is to say of the selected mark; empty when nothing."""
     chosen, result = state.selected_mark, state.result.value
+    if chosen is not None and chosen.trouble:
+        return f"<span style='color:{theme.warn}'>{escape(chosen.trouble)}</span>"
     if chosen is None or chosen.kind == "reference" or result is None:
         return ""
-    shown = [mark for mark in state.marks.value if mark.shown and mark.key != chosen.key]
+    shown = [mark for mark in state.marks.value if mark.shown and not mark.trouble and mark.key != chosen.key]
     return comparison_table(chosen, shown, theme) + distance_table(chosen, shown, result, theme)
 
 

@@ -119,6 +119,10 @@ class MarksPanel(QWidget):
             item.setIcon(0, self._swatch(mark))
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
             item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
+            if mark.trouble:
+                item.setForeground(1, QColor(self._theme.warn))
+                for i in range(3):
+                    item.setToolTip(i, mark.trouble)
             item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             self.tree.addTopLevelItem(item)
         self._filling = False
@@ -170,7 +174,9 @@ class MarksPanel(QWidget):
 
 
 def where(mark: Mark) -> str:
-    """Where a mark lies, in a few words."""
+    """Where a mark lies, in a few words, or that it has no spectrum now."""
+    if mark.trouble:
+        return "no spectrum"
     if mark.pixel is not None:
         return f"{mark.pixel[0]}, {mark.pixel[1]}"
     if mark.file is not None:
@@ -180,4 +186,4 @@ def where(mark: Mark) -> str:
 
 def count(mark: Mark) -> str:
     """Pixels of a region, those without spectrum left out."""
-    return f"{mark.used}" if mark.kind == "region" else ""
+    return f"{mark.used}" if mark.kind == "region" and not mark.trouble else ""

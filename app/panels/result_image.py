@@ -203,9 +203,11 @@ class ResultImage(QWidget):
         spots = []
         for mark in marks:
             colour = self._theme.pins[mark.colour % len(self._theme.pins)]
-            if mark.shown and mark.pixel is not None:
+            if not mark.shown or mark.trouble:
+                continue
+            if mark.pixel is not None:
                 spots.append({"pos": mark.pixel, "brush": colour, "pen": pg.mkPen("#000000", width=1)})
-            elif mark.shown and mark.kind == "region":
+            elif mark.kind == "region":
                 self._mark_items.append(self._region_item(mark, colour))
         self.pins.setData(spots)
         for item in self._mark_items:

@@ -153,7 +153,7 @@ class ScenePanel(QWidget):
             return
         spots, colours = [], []
         for mark in self._state.marks.value:
-            if mark.shown and mark.pixel is not None:
+            if mark.shown and mark.pixel is not None and not mark.trouble:
                 spots.append(result.at("points_mm", mark.pixel))
                 colour = self._theme.pins[mark.colour % len(self._theme.pins)]
                 colours.append(tuple(bytes.fromhex(colour[1:])))

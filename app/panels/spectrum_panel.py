@@ -86,7 +86,7 @@ class SpectrumPanel(QWidget):
                 curve.remove()
                 del self._curves[key]
         for key, mark in wanted.items():
-            if key not in self._curves and mark.shown:
+            if key not in self._curves and mark.shown and not mark.trouble:
                 curve = SpectrumCurve(self.item, with_band=mark.kind != "reference")
                 self._colour(curve, mark)
                 curve.set_spectrum(mark.spectrum)

@@ -66,12 +66,14 @@ class Spectrum:
     sigmas: float = BAND_95
 
 
-@dataclass(frozen=True)
+# Equal only to itself: arrays of spectra have no single truth of equality, nor need tuples of marks one.
+@dataclass(frozen=True, eq=False)
 class Mark:
     """A pin, a region or a reference: anything with a name, a colour and a spectrum.
 
     ``colour`` counts through the theme's colours of pins. A region has an outline, or runs of pixels (row,
     first column, columns) where it was marked in 3D; ``pixels`` lie in it, ``used`` have a spectrum.
+    ``trouble`` says why a mark that was kept has no spectrum now; empty when it has one.
     """
 
     kind: Literal["pin", "region", "reference"]
@@ -86,6 +88,7 @@ class Mark:
     used: int = 0
     file: Path | None = None
     curve: SpectralCurve | None = None
+    trouble: str = ""
     key: int = field(default_factory=lambda: next(_keys))
 
 

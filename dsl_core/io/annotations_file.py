@@ -70,10 +70,10 @@ def load_annotations(result: Path) -> Annotations:
     Raises `StoreError` for a damaged file, which is put aside, so that new marks do not replace it.
     """
     path = annotations_path(result)
-    if not path.exists():
-        return Annotations()
     try:
         return Annotations.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return Annotations()
     except (OSError, ValidationError) as error:
         raise StoreError(
             f"The marks in {path} cannot be read ({type(error).__name__}). The result is opened without them."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from itertools import chain, count
 from pathlib import Path
 
 from dsl_core.errors import StoreError
@@ -55,10 +56,12 @@ def sync_folder(folder: Path) -> None:
 def set_aside(path: Path) -> str:
     """Rename a file that cannot be read, so that a new one does not replace it; says where it is now.
 
-    Returns an empty text where it cannot be renamed.
+    What was set aside earlier stays too. Returns an empty text where the file cannot be renamed.
     """
-    aside = path.with_suffix(f".damaged{path.suffix}")
+    numbers = chain([""], count(2))
     try:
+        names = (path.with_suffix(f".damaged{number}{path.suffix}") for number in numbers)
+        aside = next(name for name in names if not name.exists())
         os.replace(path, aside)
     except OSError:
         return ""

@@ -8,6 +8,7 @@ import weakref
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ from app.panels.result_layers import Layers, rgb_of
 from app.panels.results_page import ResultsPage
 from app.panels.scene import TurnedScene
 from app.panels.still_scene import still_picture
-from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Tool, View
+from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Spectrum, Tool, View
 from app.theme import DARK as DARK_THEME
 from app.theme import LIGHT
 from app.widgets.late import Late
@@ -251,6 +252,45 @@ def test_the_list_names_hides_and_selects(bench: Bench) -> None:
     assert now is not None
     tree.setCurrentItem(now)
     assert bench.state.selected.value == bench.marks[0].key
+
+
+def test_a_mark_that_lost_its_spectrum_says_why_and_is_drawn_nowhere(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = Spectrum(np.empty(0), np.empty(0))
+    bench.control.marks.pin((10, 10))
+    bench.state.marks.set(
+        (
+            *bench.marks,
+            Mark("pin", "far", 1, nothing, pixel=(990, 5), trouble="Pixel 990, 5 has no spectrum here."),
+            Mark("region", "leaf", 2, nothing, runs=((990, 0, 5),), trouble="No pixel."),
+            Mark("reference", "tile", 3, nothing, file=Path("tile.csv"), trouble="tile.csv is gone."),
+        )
+    )
+    tree = bench.page.marks.tree
+    rows = [tree.topLevelItem(row) for row in range(4)]
+    assert [row.text(1) for row in rows if row is not None] == ["10, 10", *["no spectrum"] * 3]
+    assert [row.toolTip(0) for row in rows[2:] if row is not None] == ["No pixel.", "tile.csv is gone."]
+    assert list(bench.page.spectra._curves) == [bench.marks[0].key]
+    assert len(bench.page.image.pins.data) == 1
+    scene, result, drawn = bench.page.scene, bench.state.result.value, Mock()
+    assert result is not None
+    with monkeypatch.context() as patch:
+        patch.setattr(scene, "isVisible", lambda: True)
+        patch.setattr(scene, "_layers", Layers(result))
+        patch.setattr(scene, "scene", drawn)
+        scene._show_pins()
+    assert len(drawn.show_pins.call_args.args[0]) == 1
+    assert "distance" not in figures_of(select(bench, 0), DARK_THEME)
+    assert "Pixel 990, 5" in figures_of(select(bench, 1), DARK_THEME)
+    bench.page.marks.remove_selected()
+    assert [mark.name for mark in bench.marks] == ["pin 1", "leaf", "tile"]
+
+
+def select(bench: Bench, place: int) -> ResultsState:
+    """Select the mark at a place."""
+    bench.state.selected.set(bench.marks[place].key)
+    return bench.state
 
 
 def test_references_are_dropped_and_compared(bench: Bench, qtbot: QtBot, tmp_path: Path) -> None:

@@ -35,3 +35,7 @@ def test_a_damaged_file_is_named_and_put_aside(tmp_path: Path) -> None:
         load_annotations(tmp_path / "scan.zarr")
     assert not (tmp_path / "scan.marks.json").exists()
     assert (tmp_path / "scan.marks.damaged.json").read_text() == '{"pins": 3}'
+    (tmp_path / "scan.marks.json").write_text("later")
+    with pytest.raises(StoreError, match=r"scan\.marks\.damaged2\.json"):
+        load_annotations(tmp_path / "scan.zarr")
+    assert (tmp_path / "scan.marks.damaged.json").read_text() == '{"pins": 3}'
