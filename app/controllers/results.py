@@ -15,6 +15,7 @@ from app.controllers.known_files import RESULT_NAME, Kind, kind_of
 from app.controllers.marks import MarksController
 from app.controllers.result_files import expected_files, is_complete, picture_of
 from app.jobs.base import Job, JobRunner
+from app.state.evented import Event
 from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
 from app.state.undo import UndoStack
 from app.views import Offerer
@@ -29,7 +30,10 @@ class ResultsController:
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self.marks = MarksController(state, runner, notifier, undo)
+        #: Tells when a result is there with all its views, so that one may look at it in another way.
+        self.opened: Event[ResultArrays] = Event()
         self._block: FrameBlock | None = None
+        self._turn, self._lit = 0, ("D65", True)
 
     # Open ------------------------------------------------------------------------------------------
 
@@ -111,13 +115,18 @@ class ResultsController:
         state.graph.set(None)
         self._block = None
         state.cursor.set(None)
+        self._turn += 1
         state.light.set("D65")
+        self._lit = "D65", state.adapted.value
         state.picture.set(picture)
-        state.band.set(len(arrays.wavelengths_nm) // 2)
+        # Every result has this band; that of another one it may not have.
+        state.band.set(0)
         state.result.set(arrays)
+        state.band.set(len(arrays.wavelengths_nm) // 2)
         if not arrays.has_spectra and state.view.value in (View.COLOUR, View.BAND):
             state.view.set(View.DEPTH)
         self.marks.load()
+        self.opened.emit(arrays)
 
     def _failed(self, error: Exception) -> None:
         self.state.busy.set("")
@@ -170,10 +179,12 @@ class ResultsController:
     # Light -----------------------------------------------------------------------------------------
 
     def relight(self, light: str, adapted: bool) -> None:
-        """Show the colours under another light."""
+        """Show the colours under another light; of quick choices the last."""
         result = self.state.result.value
         if result is None or not result.has_spectra:
             return
+        self._turn += 1
+        turn = self._turn
 
         def work(progress: Progress) -> NDArray[np.uint8]:
             from dsl_core.evaluation.relighting import relight
@@ -182,12 +193,24 @@ class ResultsController:
             return picture_of(relight(result["reflectance"], result.wavelengths_nm, light, adapted))
 
         def done(picture: NDArray[np.uint8]) -> None:
-            if self.state.result.value is result:
-                self.state.light.set(light)
-                self.state.adapted.set(adapted)
+            if turn == self._turn:
+                self._lit = light, adapted
                 self.state.picture.set(picture)
 
-        self._runner.submit(Job(f"Light {light}", work, done, self._tell, is_minor=True))
+        def undone() -> None:
+            if turn == self._turn:
+                self._choose_light(*self._lit)
+
+        def failed(error: Exception) -> None:
+            undone()
+            self._tell(error)
+
+        self._choose_light(light, adapted)
+        self._runner.submit(Job(f"Light {light}", work, done, failed, undone, is_minor=True))
+
+    def _choose_light(self, light: str, adapted: bool) -> None:
+        self.state.light.set(light)
+        self.state.adapted.set(adapted)
 
     # Search ----------------------------------------------------------------------------------------
 

@@ -12,7 +12,7 @@ from app.controllers.result_files import is_complete
 from app.controllers.results import ResultsController
 from app.controllers.scan import ScanController
 from app.state.compare import CompareState, Side
-from app.state.evented import Value
+from app.state.evented import Event, Value
 from app.state.results import Quality, ResultsState, View
 from app.state.scan import CalibrationChoice, ScanState, preset_of
 from app.state.session import ComparePart, ResultsPart, ScanPart
@@ -60,7 +60,7 @@ def come_back_to_result(part: ResultsPart, control: ResultsController) -> None:
         if (part.light, part.adapted) != (state.light.value, state.adapted.value):
             control.relight(part.light, part.adapted)
 
-    _once(state.result, look, lambda result: result.path == part.path)
+    _once(control.opened, look, lambda result: result.path == part.path)
     control.open(part.path)
 
 
@@ -105,7 +105,7 @@ def compare_part(state: CompareState) -> ComparePart | None:
 def come_back_to_comparison(part: ComparePart, control: CompareController) -> None:
     """Open A, then B or the truth of A."""
 
-    def then(_: Side) -> None:
+    def then(_: Side | None) -> None:
         if part.with_truth:
             control.use_truth()
         elif part.second is not None:
@@ -115,7 +115,7 @@ def come_back_to_comparison(part: ComparePart, control: CompareController) -> No
         if part.second is not None:
             control.open_side(part.second, second=True)
         return
-    _once(control.state.first, then, lambda side: side.arrays.path == part.first)
+    _once(control.state.first.changed, then, lambda side: _path(side) == part.first)
     control.open_side(part.first, second=False)
 
 
@@ -133,12 +133,12 @@ def _set_named(value: Value[E], kind: type[E], name: str) -> None:
         value.set(found)
 
 
-def _once(value: Value[T | None], do: Callable[[T], object], if_: Callable[[T], bool]) -> None:
-    """Do something the first time that a value is what is waited for."""
+def _once(event: Event[T], do: Callable[[T], object], if_: Callable[[T], bool]) -> None:
+    """Do something the first time that an event is what is waited for."""
 
-    def judge(now: T | None) -> None:
-        if now is not None and if_(now):
+    def judge(now: T) -> None:
+        if if_(now):
             stop()
             do(now)
 
-    stop = value.changed.connect(judge)
+    stop = event.connect(judge)

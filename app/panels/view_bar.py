@@ -64,7 +64,6 @@ class ViewBar(QWidget):
             self.light.addItem(text, key)
         self.adapted = QCheckBox("adapted eyes")
         self.adapted.setToolTip("White stays white, as to eyes used to the light; else as beside daylight")
-        self.adapted.setChecked(True)
         self.quality = ChoiceBox("Quality", "What the quality view shows")
         for each in Quality:
             self.quality.addItem(each.value[0].upper() + each.value[1:], each)
@@ -142,6 +141,7 @@ class ViewBar(QWidget):
         state.tool.follow(lambda tool: self.tools[tool].setChecked(True))
         state.band.follow(lambda _: self._show_band())
         state.light.changed.connect(lambda light: self.light.setCurrentIndex(self.light.findData(light)))
+        state.adapted.follow(self.adapted.setChecked)
         for value in (state.view, state.quality, state.cloud_by):
             value.changed.connect(lambda _: self._show_controls())
         self._show_controls()

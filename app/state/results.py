@@ -120,9 +120,10 @@ class Search:
 class ResultsState:
     """Values that the results' controllers set and the page follows.
 
-    ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes
-    under ``light``; ``cloud_by`` is the view that colours the cloud; ``busy`` says in words what is being
-    opened (empty: nothing). ``graph`` is what the pixel saw that was last inspected.
+    ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes;
+    it follows ``light`` and ``adapted`` once it is computed. ``cloud_by`` is the view that colours the cloud;
+    ``busy`` says in words what is being opened (empty: nothing). ``graph`` is what the pixel saw that was
+    last inspected.
     """
 
     def __init__(self) -> None:

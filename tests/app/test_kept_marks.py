@@ -210,7 +210,7 @@ def test_marks_of_spectra_survive_a_result_without(path: Path, tmp_path: Path) -
 
 
 def test_marks_of_one_name_are_told_apart_without_their_arrays() -> None:
-    one, other = (Mark("pin", "leaf", 0, Spectrum(BLUE, BLUE), pixel=DARK, key=1) for _ in range(2))
+    one, other = (Mark("pin", "leaf", 0, Spectrum(BLUE, BLUE.copy()), pixel=DARK) for _ in range(2))
     state = ResultsState()
     told: list[tuple[Mark, ...]] = []
     state.marks.changed.connect(told.append)
