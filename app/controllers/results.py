@@ -224,11 +224,13 @@ class ResultsController:
             return
 
         def work(progress: Progress) -> Search:
-            from dsl_core.evaluation.similarity import likeness
+            from dsl_core.evaluation.similarity import likeness, spectrum_at
 
-            spectrum = np.interp(result.wavelengths_nm, wanted.nm, wanted.mean)
+            nm = result.wavelengths_nm
             return Search(
-                name, likeness(result["reflectance"], spectrum, result.wavelengths_nm, progress), seek
+                name,
+                likeness(result["reflectance"], spectrum_at(nm, wanted.nm, wanted.mean), nm, progress),
+                seek,
             )
 
         def done(search: Search) -> None:
@@ -256,7 +258,7 @@ class ResultsController:
     def _target(self) -> tuple[str, Spectrum | None]:
         mark, cursor = self.state.selected_mark, self.state.cursor.value
         if mark is not None:
-            return mark.name, mark.spectrum
+            return mark.name, None if mark.trouble else mark.spectrum
         if cursor is not None:
             return f"pixel {cursor[0]}, {cursor[1]}", self.state.spectrum_at(cursor)
         return "", None

@@ -72,7 +72,10 @@ class SearchPanel(QWidget):
         if (search.within_rad, search.within_delta_e) != (self.angle.value(), self.delta_e.value()):
             self._limit()
             return
-        share = float(search.found.mean())
+        share = search.share
+        if share is None:
+            self.text.setText("No pixel of this result has a spectrum.")
+            return
         words = {
             Seek.SPECTRUM: f"have the spectrum of {search.name} (angle up to {search.within_rad:g} rad)",
             Seek.METAMERS: (
@@ -80,4 +83,4 @@ class SearchPanel(QWidget):
                 f" {search.within_rad:g} rad"
             ),
         }
-        self.text.setText(f"{share:.2%} of the pixels {words[search.seek]}.")
+        self.text.setText(f"{share:.2%} of the pixels with a spectrum {words[search.seek]}.")

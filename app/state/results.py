@@ -116,6 +116,12 @@ class Search:
             return self.likeness.same_spectrum(self.within_rad)
         return self.likeness.metamers(self.within_delta_e, self.within_rad)
 
+    @property
+    def share(self) -> float | None:
+        """Share of the pixels with a spectrum that are found; None where no pixel has one."""
+        known = int(np.isfinite(self.likeness.angle_rad).sum())
+        return int(self.found.sum()) / known if known else None
+
 
 class ResultsState:
     """Values that the results' controllers set and the page follows.

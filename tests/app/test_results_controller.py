@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -166,6 +167,26 @@ def test_looking_for_a_spectrum_finds_its_material(bench: Bench) -> None:
     assert not bench.state.search.value.found.any()
     bench.control.end_search()
     assert bench.state.search.value is None
+
+
+def test_a_reference_of_part_of_the_range_is_not_looked_for(bench: Bench, tmp_path: Path) -> None:
+    short = tmp_path / "short.csv"
+    short.write_text("\n".join(f"{nm},{nm / 1000}" for nm in range(400, 551, 10)))
+    bench.control.open(short)
+    bench.control.search(Seek.SPECTRUM)
+    assert "400 to 550 nm" in bench.told
+    assert "430 to 660 nm" in bench.told
+    assert bench.state.search.value is None
+
+
+def test_the_share_found_is_of_pixels_with_a_spectrum(bench: Bench) -> None:
+    bench.control.point_at((30, 5))
+    bench.control.search(Seek.SPECTRUM)
+    search = bench.state.search.value
+    assert search is not None
+    assert search.share == 18 * 24 / (36 * 24 - 1)
+    nowhere = replace(search.likeness, angle_rad=np.full_like(search.likeness.angle_rad, np.nan))
+    assert replace(search, likeness=nowhere).share is None
 
 
 def test_another_light_changes_the_picture(bench: Bench) -> None:

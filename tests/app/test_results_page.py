@@ -317,7 +317,7 @@ def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
     bench.control.point_at((30, 5))
     panel = bench.page.search
     panel.start.click()
-    assert "50.00% of the pixels" in panel.text.text()
+    assert "50.06% of the pixels with a spectrum" in panel.text.text()
     assert bench.page.image.overlay.isVisible()
     panel.what.setCurrentIndex(panel.what.findData(Seek.METAMERS))
     assert "look like pixel 30, 5" in panel.text.text()

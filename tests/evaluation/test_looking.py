@@ -14,7 +14,7 @@ from dsl_core.evaluation.explanation import explain_pixel, undecided_ranges
 from dsl_core.evaluation.quality import gravest_flag
 from dsl_core.evaluation.regions import mask_of_outline, mask_of_runs, region_spectrum, runs_of
 from dsl_core.evaluation.relighting import LIGHTS, relight
-from dsl_core.evaluation.similarity import angle_map, likeness
+from dsl_core.evaluation.similarity import angle_map, likeness, spectrum_at
 from dsl_core.model.result import Flag
 from dsl_core.model.spectral import SpectralCurve
 
@@ -85,6 +85,17 @@ def test_metamers_look_alike_and_are_not() -> None:
     found = likeness(cube, spectrum, NM)
     assert found.metamers(1.0, 0.05).tolist() == [[False, True, False]]
     assert found.same_spectrum(0.05).tolist() == [[True, False, True]]
+
+
+def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
+    bands = np.arange(430.0, 661.0, 10.0)
+    nm = np.arange(400.0, 701.0, 3.0)
+    np.testing.assert_allclose(spectrum_at(bands, nm, nm / 1000), bands / 1000)
+    # Half a band further is still the band's own light.
+    assert spectrum_at(bands, np.array([435.0, 655.0]), np.array([0.1, 0.3]))[0] == 0.1
+    for low, high in ((400.0, 550.0), (436.0, 700.0)):
+        with pytest.raises(DecodeError, match=rf"{low:g} to {high:g} nm.*430 to 660 nm"):
+            spectrum_at(bands, np.array([low, high]), np.array([0.1, 0.3]))
 
 
 @pytest.mark.parametrize("light", LIGHTS)
