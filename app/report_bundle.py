@@ -16,7 +16,7 @@ from dsl_core.io.staging import staged
 
 
 def write_report_bundle(path: Path, lines: Iterable[str], settings: Settings) -> Path:
-    """Write a zip file; raises `StoreError` when the file exists or the disk fails."""
+    """Write a zip file, over one that exists: who chose its name was asked. Raises `StoreError`."""
     versions = sorted(f"{d.metadata['Name']}=={d.version}" for d in distributions())
     facts = {
         "dsl-scan": __version__,
@@ -24,7 +24,10 @@ def write_report_bundle(path: Path, lines: Iterable[str], settings: Settings) ->
         "system": platform.platform(),
         "packages": versions,
     }
-    with staged([path]) as (draft,), zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as bundle:
+    with (
+        staged([path], overwrite=True) as (draft,),
+        zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as bundle,
+    ):
         bundle.writestr("log.txt", "\n".join(lines))
         bundle.writestr("settings.json", settings.model_dump_json(indent=1))
         bundle.writestr("versions.json", json.dumps(facts, indent=1))

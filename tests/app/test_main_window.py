@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import logging
 import threading
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QLabel, QMessageBox, QVBoxLayout
+from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from app.actions import ACTIONS, PAGES
@@ -93,6 +94,17 @@ def test_a_known_file_becomes_a_recent_one(window: MainWindow, tmp_path: Path) -
     (tmp_path / "zarr.json").touch()
     window.open_path(tmp_path)
     assert window.parts.settings.recent == [str(tmp_path)]
+
+
+def test_a_report_bundle_replaces_a_file_after_the_dialog_has_asked(
+    window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "report.zip"
+    path.write_text("old")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path), ""))
+    window.actions_by_key["report_bundle"].trigger()
+    assert window.toasts.shown[-1].text == f"Saved as {path}."
+    assert set(zipfile.ZipFile(path).namelist()) == {"log.txt", "settings.json", "versions.json"}
 
 
 def test_the_log_shows_records_of_any_thread(window: MainWindow, qtbot: QtBot) -> None:
