@@ -187,7 +187,7 @@ class ResultsController:
         turn = self._turn
 
         def work(progress: Progress) -> NDArray[np.uint8]:
-            from dsl_core.evaluation.relighting import relight
+            from dsl_core.optics.relighting import relight
 
             progress.report("relight", 0, 1)
             return picture_of(relight(result["reflectance"], result.wavelengths_nm, light, adapted))
@@ -290,24 +290,31 @@ class ResultsController:
     # Export ----------------------------------------------------------------------------------------
 
     def export(self, targets: dict[str, Path], overwrite: bool) -> None:
-        """Write the result in formats by name, to a path each; tells what was written."""
+        """Write the result in formats by name, to a path each; tells what was written.
+
+        Tables hold the pins, and pictures the band and the light that are shown.
+        """
         result = self.state.result.value
         if result is None or not targets:
             return
         pixels = [mark.pixel for mark in self.state.marks.value if mark.pixel and not mark.trouble]
+        band_nm = float(result.wavelengths_nm[self.state.band.value]) if result.has_spectra else None
+        light, adapted = self._lit
 
         def work(progress: Progress) -> list[Path]:
-            from dsl_core.io.export import export, export_csv
+            from dsl_core.io.export import Exporter, export_csv, export_png, formats
             from dsl_core.io.result_file import load_result
 
+            exporters: dict[str, Exporter] = {
+                **formats(),
+                "csv": partial(export_csv, pixels=pixels),
+                "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted),
+            }
             data, written = load_result(result.path), []
             for done, (form, path) in enumerate(targets.items()):
                 check = partial(progress.report, f"write {form}", done, len(targets))
                 check()
-                if form == "csv":
-                    written += export_csv(data, path, overwrite=overwrite, pixels=pixels, check=check)
-                else:
-                    written += export(data, path, form, overwrite=overwrite, check=check)
+                written += exporters[form](data, path, overwrite=overwrite, check=check)
             return written
 
         self._runner.submit(Job(f"Export {result.path.stem}", work, self._exported, self._tell))

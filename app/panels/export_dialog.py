@@ -29,7 +29,7 @@ FORMATS = (
     ("envi", ".hdr", "ENVI – spectral cube and its deviation", True),
     ("exr", ".exr", "OpenEXR – spectral image", True),
     ("csv", ".csv", "CSV – spectra of the pins, with deviations", True),
-    ("png", ".png", "PNG – colour, depth, one band and flags as pictures", False),
+    ("png", ".png", "PNG – pictures of colour, depth, the band shown, and flags", False),
 )
 
 

@@ -10,9 +10,8 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 
 from app.state.results import Quality, ResultsState, View
-from dsl_core.evaluation.quality import FLAG_COLOURS, gravest_flag
 from dsl_core.io.result_arrays import ResultArrays
-from dsl_core.model.result import Flag
+from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 
 #: Perceptually uniform maps of pyqtgraph: grey for a band, colours for what is no light.
 GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
@@ -102,7 +101,7 @@ class Layers:
     def _flags(self) -> Layer:
         classes = gravest_flag(self.result["flags"])
         colours = ["", *FLAG_COLOURS.values()]
-        names = ["nothing to remark", *(str(flag.name).lower().replace("_", " ") for flag in Flag)]
+        names = ["nothing to remark", *FLAG_NAMES.values()]
         return _classes(classes, names, [NOTHING, *colours[1:]])
 
     def _orders(self, band: int) -> Layer:

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from app.panels.results_commands import ResultCommands
 from app.state.results import Quality, ResultsState, Tool, View
 from app.widgets.forms import ChoiceBox, label
-from dsl_core.evaluation.relighting import LIGHTS
+from dsl_core.optics.relighting import LIGHTS
 
 VIEWS = (
     (View.COLOUR, "sRGB", "Colours as the eye sees them under a light"),

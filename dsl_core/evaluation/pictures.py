@@ -9,7 +9,7 @@ from io import BytesIO
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.evaluation.quality import FLAG_COLOURS, GRAVITY
+from dsl_core.model.flag_classes import FLAG_COLOURS, GRAVITY
 from dsl_core.model.result import REASONS, Flag
 
 Floats = NDArray[np.float64] | NDArray[np.float32]

@@ -8,6 +8,7 @@ import pytest
 
 from app.controllers.results import ResultsController
 from app.jobs.base import InlineRunner
+from app.panels.result_layers import Layers, rgb_of
 from app.state.results import ResultsState, Seek, View
 from app.state.undo import UndoStack
 from app.views import RecordingNotifier
@@ -210,6 +211,27 @@ def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tm
     assert "exists already" in bench.told
     bench.control.export(targets, overwrite=True)
     assert "Wrote 6 files" in bench.told
+
+
+def test_pictures_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path) -> None:
+    import cv2
+
+    bench.control.step_band(-3)
+    bench.control.relight("A", adapted=False)
+    bench.state.view.set(View.QUALITY)
+    bench.control.export({"png": tmp_path / "a.png"}, overwrite=False)
+    files = {path.name: np.asarray(cv2.imread(str(path)))[..., ::-1] for path in tmp_path.glob("a_*.png")}
+    assert set(files) == {"a_rgb_A_unadapted.png", "a_depth.png", "a_530nm.png", "a_flags.png"}
+    result, picture = bench.state.result.value, bench.state.picture.value
+    assert result is not None
+    assert picture is not None
+    lit = picture[..., 3] > 0
+    np.testing.assert_array_equal(files["a_rgb_A_unadapted.png"][lit], picture[lit, :3])
+    layer = Layers(result).layer(bench.state)
+    assert layer is not None
+    flagged = result["flags"] != 0
+    assert flagged.sum() == 2
+    np.testing.assert_array_equal(files["a_flags.png"][:24, :36][flagged], rgb_of(layer)[flagged])
 
 
 def test_marks_on_disk_follow_undo(bench: Bench, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a person asks of a result: regions, likeness, other light, references, distances, reasons."""
+"""What a person asks of a result: regions, likeness, references, distances, reasons."""
 
 from __future__ import annotations
 
@@ -11,9 +11,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.evaluation.comparison import compare
 from dsl_core.evaluation.distance import distance_between, nearest_on_screen, on_screen
 from dsl_core.evaluation.explanation import explain_pixel, undecided_ranges
-from dsl_core.evaluation.quality import gravest_flag
 from dsl_core.evaluation.regions import mask_of_outline, mask_of_runs, region_spectrum, runs_of
-from dsl_core.evaluation.relighting import LIGHTS, relight
 from dsl_core.evaluation.similarity import angle_map, likeness, spectrum_at
 from dsl_core.model.result import Flag
 from dsl_core.model.spectral import SpectralCurve
@@ -98,17 +96,6 @@ def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
             spectrum_at(bands, np.array([low, high]), np.array([0.1, 0.3]))
 
 
-@pytest.mark.parametrize("light", LIGHTS)
-def test_white_stays_white_to_adapted_eyes(light: str) -> None:
-    white = np.ones((NM.size, 1, 1), np.float32)
-    np.testing.assert_allclose(relight(white, NM, light), 1.0, atol=0.02)
-
-
-def test_a_lamp_is_yellow_beside_daylight() -> None:
-    rgb = relight(np.full((NM.size, 1, 1), 0.5, np.float32), NM, "A", adapted=False)
-    assert rgb[0, 0, 0] > rgb[1, 0, 0] > rgb[2, 0, 0]
-
-
 def test_a_reference_of_another_scale_differs_only_by_the_scale() -> None:
     truth = np.linspace(0.2, 0.8, NM.size)
     reference = SpectralCurve.of(NM, truth)
@@ -154,13 +141,3 @@ def test_reasons_name_bands_and_deviations() -> None:
     assert any("430–440 nm" in line for line in text)
     assert any("±1.2 mm" in line for line in text)
     assert explain_pixel(0, NM) == []
-
-
-def test_the_gravest_flag_wins() -> None:
-    flags = np.array([0, int(Flag.NO_LIGHT | Flag.POOR_FIT), int(Flag.POOR_FIT | Flag.NON_FINITE)], np.uint16)
-    order = list(Flag)
-    assert gravest_flag(flags).tolist() == [
-        0,
-        1 + order.index(Flag.NO_LIGHT),
-        1 + order.index(Flag.NON_FINITE),
-    ]

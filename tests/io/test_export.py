@@ -12,7 +12,9 @@ from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export import export, export_csv, export_envi, export_exr, export_ply, export_png, formats
 from dsl_core.io.export.exr import linear_from_srgb
 from dsl_core.io.export.png import GREY, flags_picture
+from dsl_core.model.flag_classes import FLAG_COLOURS
 from dsl_core.model.result import Flag, reasons
+from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import never
 from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result
 
@@ -175,9 +177,34 @@ def test_png_in_opencv(tmp_path: Path) -> None:
     assert red[0] > red[1]
     assert blue[1] > blue[0]
     assert tuple(flags[0, 0]) == (255, 255, 255)
-    assert tuple(flags[UNLIT]) == (0, 0, 0)
-    assert tuple(flags[UNSURE]) == (0, 117, 220)
+    assert bytes(flags[UNLIT]).hex() == FLAG_COLOURS[Flag.NO_LIGHT][1:]
+    assert bytes(flags[UNSURE]).hex() == FLAG_COLOURS[Flag.CODE_UNSURE][1:]
     assert b"scan_id\0\0\0\0\0" + b"2026-05-04-chart" in files[0].read_bytes()
+
+
+def test_png_shows_the_gravest_flag_whichever_bit_it_has() -> None:
+    flags = np.array([[0, int(Flag.NOT_REFINED | Flag.NON_FINITE)], [int(Flag.NOT_REFINED), 0]], np.uint16)
+    picture = flags_picture(flags)
+    assert [bytes(picture[at]).hex() for at in ((0, 0), (0, 1), (1, 0))] == [
+        "ffffff",
+        FLAG_COLOURS[Flag.NON_FINITE][1:],
+        FLAG_COLOURS[Flag.NOT_REFINED][1:],
+    ]
+    assert len(picture) == 2 + 18 * 2 + 4
+
+
+@pytest.mark.parametrize(("adapted", "name"), [(True, "view_rgb_A.png"), (False, "view_rgb_A_unadapted.png")])
+def test_png_under_another_light_says_so_in_its_name(tmp_path: Path, adapted: bool, name: str) -> None:
+    import cv2
+
+    result = small_result()
+    file = export_png(result, tmp_path / "view.png", light="A", adapted=adapted)[0]
+    assert file.name == name
+    lit = np.isfinite(result["depth_mm"].values)
+    wanted = relight(result["reflectance"].values, result["wavelength_nm"].values, "A", adapted)
+    shown = np.asarray(cv2.imread(str(file)))[..., ::-1]
+    np.testing.assert_allclose(shown[lit], np.moveaxis(wanted, 0, -1)[lit].clip(0, 1) * 255, atol=0.5)
+    assert tuple(shown[UNLIT]) == GREY
 
 
 def test_png_text_is_read_by_another_library(tmp_path: Path) -> None:

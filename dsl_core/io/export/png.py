@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
+from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 from dsl_core.model.result import Flag
+from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -27,20 +29,6 @@ Image = NDArray[np.uint8]
 
 GREY = (128, 128, 128)
 _MARGIN_PX = 110
-# Distinct hues for the flags, in the order of their bits (after P. Green-Armytage, 2010), R, G, B.
-_FLAG_COLOURS = (
-    (0, 0, 0),
-    (240, 50, 50),
-    (0, 117, 220),
-    (255, 164, 5),
-    (148, 255, 181),
-    (194, 0, 136),
-    (255, 255, 128),
-    (0, 153, 143),
-    (116, 10, 255),
-    (255, 204, 153),
-    (0, 92, 49),
-)
 
 
 def export_png(
@@ -49,16 +37,22 @@ def export_png(
     *,
     overwrite: bool = False,
     band_nm: float | None = None,
+    light: str = "D65",
+    adapted: bool = True,
     check: Check = never,
 ) -> list[Path]:
     """Write ``NAME_rgb``, ``NAME_depth``, ``NAME_550nm``, ``NAME_flags.png``, as far as the result has them.
 
-    ``path`` is ``NAME.png``; ``band_nm`` picks the band (the middle one if not given). Raises `StoreError`,
-    also when the result has no band within half a band's distance of ``band_nm``.
+    ``path`` is ``NAME.png``; ``band_nm`` picks the band (the middle one if not given). Colours under another
+    ``light`` than D65, as of `relight`, are named after it: ``NAME_rgb_A``. Raises `StoreError`, also when
+    the result has no band within half a band's distance of ``band_nm``.
     """
     require_suffix(path, ".png")
     pictures: dict[str, Image] = {}
-    if "rgb" in result:
+    if light != "D65" and "reflectance" in result:
+        lit = relight(plane(result, "reflectance"), np.array(wavelengths_nm(result)), light, adapted)
+        pictures[f"rgb_{light}" if adapted else f"rgb_{light}_unadapted"] = rgb_picture(lit)
+    elif "rgb" in result:
         pictures["rgb"] = rgb_picture(plane(result, "rgb"))
     if "depth_mm" in result:
         pictures["depth"] = depth_picture(plane(result, "depth_mm"))
@@ -130,21 +124,19 @@ def depth_picture(depth_mm: NDArray[np.float32]) -> Image:
 
 
 def flags_picture(flags: NDArray[Any]) -> Image:
-    """The first reason (lowest bit) of every pixel as a colour, white where all is well, and a legend."""
-    picture = np.full((*flags.shape, 3), 255, np.uint8)
-    present = [
-        (flag, colour) for flag, colour in zip(Flag, _FLAG_COLOURS, strict=True) if np.any(flags & flag)
-    ]
-    for flag, colour in reversed(present):
-        picture[(flags & flag) != 0] = colour
+    """The gravest flag of every pixel as a colour, white where all is well, and a legend."""
+    classes = gravest_flag(flags)
+    colours = np.array([(255, 255, 255), *(tuple(bytes.fromhex(FLAG_COLOURS[flag][1:])) for flag in Flag)])
+    picture: Image = colours.astype(np.uint8)[classes]
+    counts = np.bincount(classes.ravel(), minlength=len(colours))
+    present = [(flag, place) for place, flag in enumerate(Flag, 1) if counts[place]]
     if not present:
         return picture
     legend = np.full((18 * len(present) + 4, max(picture.shape[1], 240), 3), 255, np.uint8)
-    for place, (flag, colour) in enumerate(present):
-        top = 18 * place + 4
-        legend[top : top + 12, 4:16] = colour
-        share = 100 * np.count_nonzero(flags & flag) / flags.size
-        _write(legend, f"{str(flag.name).lower()}  {share:.1f} %", 22, top + 11)
+    for line, (flag, place) in enumerate(present):
+        top = 18 * line + 4
+        legend[top : top + 12, 4:16] = colours[place]
+        _write(legend, f"{FLAG_NAMES[flag]}  {100 * counts[place] / flags.size:.1f} %", 22, top + 11)
     padding = legend.shape[1] - picture.shape[1]
     return np.vstack([np.pad(picture, ((0, 0), (0, padding), (0, 0)), constant_values=255), legend])
 

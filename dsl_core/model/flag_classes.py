@@ -1,4 +1,4 @@
-"""Flags as a map of classes with one colour each."""
+"""Which flag of a pixel counts, and its name and colour in every picture: on screen, in reports and files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from dsl_core.model.result import Flag
 
+#: What each flag is called below a picture.
+FLAG_NAMES: dict[Flag, str] = {flag: str(flag.name).lower().replace("_", " ") for flag in Flag}
 #: One colour per flag, in the order of `Flag`; told apart by the common kinds of colour blindness
 #: (after P. Tol, "Colour schemes", 2021, bright and muted).
 FLAG_COLOURS: dict[Flag, str] = dict(
