@@ -10,7 +10,7 @@ from app.controllers.plan_files import read_plan
 from app.controllers.scan_facts import find_facts, sentence_of
 from app.jobs.base import Job, JobRunner
 from app.state.rig import RigState
-from app.state.scan import OWN_CALIBRATION, CalibrationChoice, Interrupted, ScanState
+from app.state.scan import OWN_CALIBRATION, CalibrationChoice, Interrupted, Phase, ScanState
 from app.state.undo import Change, UndoStack
 from app.views import Notifier
 from dsl_core.devices.base import DeviceRig
@@ -39,7 +39,12 @@ class ScanPlanController:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
         self._undo, self._library = undo, library
         self._chosen: Rig | None = None
-        self._disconnect = rig.devices.follow(lambda _: self.take_rig())
+        #: What was chosen while a scan ran, which keeps its own.
+        self._next: CalibrationChoice | None = None
+        self._stops = [
+            rig.devices.follow(lambda _: self.take_rig()),
+            state.phase.changed.connect(self._phase_changed),
+        ]
 
     # Plan ------------------------------------------------------------------------------------------
 
@@ -179,8 +184,9 @@ class ScanPlanController:
         self._runner.submit(Job("Read the calibrations", work, done, self._tell, is_minor=True))
 
     def choose_calibration(self, choice: CalibrationChoice) -> None:
-        """Scan with another calibration."""
+        """Scan with another calibration; a scan under way keeps its own."""
         if self.state.phase.value.is_busy:
+            self._choose_later(choice)
             return
         if not choice.key:
             self._chosen = None
@@ -189,6 +195,9 @@ class ScanPlanController:
             return
 
         def done(rig: Rig) -> None:
+            if self.state.phase.value.is_busy:
+                self._choose_later(choice)
+                return
             self._chosen = rig
             known = self.state.calibrations.value
             if choice.key not in [each.key for each in known]:
@@ -200,6 +209,19 @@ class ScanPlanController:
         title = f"Open the calibration {choice.key}"
         self._runner.submit(Job(title, work, done, self._tell, is_minor=True))
 
+    def _choose_later(self, choice: CalibrationChoice) -> None:
+        is_news = choice != self._next and choice.key != self.state.calibration.value.key
+        self._next = choice
+        if is_news:
+            self._notifier.tell(
+                "info", f"The scan under way keeps its calibration. Scans after it use {choice.name}."
+            )
+
+    def _phase_changed(self, phase: Phase) -> None:
+        if not phase.is_busy and self._next is not None:
+            choice, self._next = self._next, None
+            self.choose_calibration(choice)
+
     def set_override(self, on: bool) -> None:
         """Use the calibration although settings differ from it."""
         self.state.override.set(on)
@@ -210,7 +232,8 @@ class ScanPlanController:
 
     def close(self) -> None:
         """Follow the rig no more."""
-        self._disconnect()
+        for stop in self._stops:
+            stop()
 
 
 def connect_first(session: Interrupted) -> str:

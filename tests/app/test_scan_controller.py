@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from app.controllers.scan_plan import connect_first
-from app.state.scan import Phase
+from app.state.scan import CalibrationChoice, Phase
 from dsl_core.cli.options import PlanChoice
 from dsl_core.errors import DeviceError, StoreError
+from dsl_core.io.calibration_library import LibraryEntry
 from dsl_core.io.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
@@ -216,6 +217,48 @@ def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp
     assert phase(bench) is Phase.DONE
     assert "gain" in SessionReader(tmp_path / "first.dsl").manifest.notes["calibration_overridden"]
     assert devices.calibration.conditions is None
+
+
+def test_a_calibration_chosen_during_a_scan_is_for_the_next(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    own, snap = bench.calibration, SimCamera.snap
+    bench.library.store("bench", own.model_copy(update={"name": "bench"}))
+
+    def choosing(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        bench.scans.plans.choose_calibration(CalibrationChoice("bench", "bench"))
+        return snap(self, timeout_ms)
+
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(SimCamera, "snap", choosing)
+        bench.scans.start()
+    assert [text for _, text in bench.notifier.told] == [
+        "The scan under way keeps its calibration. Scans after it use bench."
+    ]
+    taken = SessionReader(tmp_path / "first.dsl").calibration
+    assert taken is not None
+    assert taken.name == own.name
+    assert bench.state.calibration.value.key == "bench"
+    assert bench.scans.plans.calibration is not None
+    assert bench.scans.plans.calibration.name == "bench"
+
+
+def test_a_calibration_that_is_read_when_a_scan_starts_waits_for_its_end(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.library.store("bench", bench.calibration)
+    find = bench.library.find
+
+    def slow(key: str) -> LibraryEntry:
+        bench.state.phase.set(Phase.STARTING)
+        return find(key)
+
+    with monkeypatch.context() as reading:
+        reading.setattr(bench.library, "find", slow)
+        bench.scans.plans.choose_calibration(CalibrationChoice("bench", "bench"))
+    assert bench.state.calibration.value.key == ""
+    bench.state.phase.set(Phase.DONE)
+    assert bench.state.calibration.value.key == "bench"
 
 
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
