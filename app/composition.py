@@ -203,7 +203,7 @@ class Composition(QObject):
             lambda phase: _remember_folder(window, state) if phase is Phase.DONE else None
         )
         self._scans = controller = ScanController(
-            state, self.rig(window), parts.runner, window.toasts, parts.undo
+            state, self.rig(window), parts.runner, window.toasts, parts.undo, hidden=_demo_folder()
         )
         self.desk(window).serve(controller)
         self.session(window).serve_scan(controller)

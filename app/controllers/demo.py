@@ -12,6 +12,7 @@ from app.controllers.scan import ScanController
 from app.controllers.scan_words import fresh_target
 from app.jobs.base import Job, JobRunner
 from app.state.rig import Link, RigChoice
+from app.state.scan import Phase
 from app.views import Offerer
 from dsl_core.errors import Cancelled, DslError
 from dsl_core.model.plan import CapturePlan
@@ -142,6 +143,9 @@ class DemoController:
         scans.plans.set_target(fresh_target(self._folder, self._clock()))
         scans.state.then_reconstruct.set(True)
         scans.start()
+        if scans.state.phase.value is Phase.PLANNING:
+            # It was refused: what a person starts instead goes where their scans go.
+            scans.leave_session()
 
 
 def take_demo(session: Path, progress: Progress) -> None:

@@ -29,7 +29,10 @@ _BUSY = "A scan is running. Wait for its end, or cancel it first; frames taken s
 
 
 class ScanController:
-    """Plans and runs one scan at a time; `take_news` brings what happened in the job to the state."""
+    """Plans and runs one scan at a time; `take_news` brings what happened in the job to the state.
+
+    ``hidden`` is a folder of the program itself, such as the demo's: no scan goes there unless it is told to.
+    """
 
     def __init__(
         self,
@@ -40,9 +43,13 @@ class ScanController:
         undo: UndoStack,
         library: CalibrationLibrary | None = None,
         clock: Callable[[], datetime] = datetime.now,
+        hidden: Path | None = None,
     ) -> None:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
-        self._clock = clock
+        self._clock, self._hidden = clock, hidden
+        #: Where the scans of a person go.
+        self._folder = state.target.value.parent
+        self._stop_following = state.target.changed.connect(self._keep_folder)
         self.plans = ScanPlanController(
             state, rig.state, runner, notifier, undo, library or CalibrationLibrary()
         )
@@ -148,7 +155,7 @@ class ScanController:
         self.state.interrupted.set(None)
         self.state.check_drift.set(True)
         self.state.note.set(f"All {status.total} frames are stored in {folder}.")
-        self.state.target.set(fresh_target(folder.parent, self._clock()))
+        self._aim_anew()
         self.plans.refresh()
         if self.state.then_reconstruct.value:
             self.reconstruct(folder)
@@ -182,6 +189,14 @@ class ScanController:
     def _ended(self, phase: Phase) -> None:
         self._job = None
         self.state.phase.set(phase)
+
+    def _keep_folder(self, target: Path) -> None:
+        if target.parent != self._hidden:
+            self._folder = target.parent
+
+    def _aim_anew(self) -> None:
+        """Store the next scan beside those that a person took."""
+        self.state.target.set(fresh_target(self._folder, self._clock()))
 
     def reconstruct(self, session: Path) -> None:
         """Make the result of a complete scan, save it beside the scan and tell of it."""
@@ -252,7 +267,7 @@ class ScanController:
         self.state.phase.set(Phase.PLANNING)
         self.state.trouble.set("")
         self.state.note.set("")
-        self.state.target.set(fresh_target(self.state.target.value.parent, self._clock()))
+        self._aim_anew()
         self.plans.take_rig()
 
     def command_line(self) -> str:
@@ -273,4 +288,5 @@ class ScanController:
 
     def close(self) -> None:
         """Follow the rig no more."""
+        self._stop_following()
         self.plans.close()

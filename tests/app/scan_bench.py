@@ -63,7 +63,7 @@ def make_bench(folder: Path, runner: JobRunner | None = None) -> ScanBench:
     rig = RigController(RigState(TWIN), runner, notifier)
     library = CalibrationLibrary(folder / "library")
     clock = lambda: datetime(2026, 3, 1, 10, 20)  # noqa: E731
-    scans = ScanController(state, rig, runner, notifier, undo, library, clock)
+    scans = ScanController(state, rig, runner, notifier, undo, library, clock, hidden=folder / "demo")
     return ScanBench(state, rig, scans, notifier, undo, library)
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import shutil
+from collections import namedtuple
 from datetime import datetime
 from pathlib import Path
 
@@ -10,8 +12,11 @@ from app.controllers.demo import DemoController
 from app.jobs.base import InlineRunner
 from app.state.rig import Link, RigChoice
 from app.state.scan import Phase
+from dsl_core.errors import DeviceError
 from dsl_core.io.result_file import load_result
 from dsl_core.io.session import SessionReader
+from dsl_core.model.frames import Frame
+from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.scan_bench import SHORT, ScanBench, make_bench
 
 SMALL = {"scene": "color-checker", "size": "64x48"}
@@ -81,6 +86,33 @@ def test_the_live_demo_connects_the_twin_and_scans(bench: Bench, tmp_path: Path)
     assert state.preset.key == "preview"
     folder = tmp_path / "demo" / "scan-20260301-1020.dsl"
     assert not SessionReader(folder).missing()
+    # Scans of a person go where they went before.
+    assert state.target.value == tmp_path / "scan-20260301-1020.dsl"
+
+
+def test_after_a_live_demo_that_was_interrupted_too(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def lost(camera: SimCamera, timeout_ms: float = 5000.0) -> Frame:
+        raise DeviceError("The power failed.")
+
+    monkeypatch.setattr(SimCamera, "snap", lost)
+    bench.demo.scan_live()
+    session = bench.scans.state.interrupted.value
+    assert session is not None
+    assert session.folder.parent == tmp_path / "demo"
+    bench.scans.scans.leave_session()
+    assert bench.scans.state.target.value == tmp_path / "scan-20260301-1020.dsl"
+
+
+def test_a_live_demo_that_cannot_start_leaves_the_folder(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))
+    bench.demo.scan_live()
+    assert "too little room" in bench.scans.notifier.told[-1][1]
+    assert bench.scans.state.target.value.parent == tmp_path
 
 
 def test_the_rig_of_a_person_is_not_taken_away(bench: Bench) -> None:
