@@ -250,7 +250,7 @@ class ScanController:
         missing, total = len(reader.missing()), reader.plan.shot_count
         if not missing:
             return False
-        self.state.plan.set(reader.plan)
+        self.plans.take_plan(reader.plan)
         self.state.target.set(folder)
         self.state.interrupted.set(
             Interrupted(folder, total - missing, total, rig_words(reader.manifest.notes))

@@ -10,7 +10,7 @@ from app.controllers.plan_files import read_plan
 from app.controllers.scan_facts import find_facts, sentence_of
 from app.jobs.base import Job, JobRunner
 from app.state.rig import RigState
-from app.state.scan import OWN_CALIBRATION, CalibrationChoice, Interrupted, Phase, ScanState
+from app.state.scan import OWN_CALIBRATION, CalibrationChoice, Interrupted, Phase, ScanState, same_plan
 from app.state.undo import Change, UndoStack
 from app.views import Notifier
 from dsl_core.devices.base import DeviceRig
@@ -63,10 +63,14 @@ class ScanPlanController:
 
     def _set_plan(self, plan: CapturePlan) -> None:
         if not self._is_locked():
-            if plan != self.state.plan.value:
-                self.state.plan_file.set(None)
-            self.state.plan.set(plan)
+            self.take_plan(plan)
             self.refresh()
+
+    def take_plan(self, plan: CapturePlan) -> None:
+        """Let this be the plan at hand as it is; a file of another one holds it no more."""
+        if not same_plan(plan, self.state.plan.value):
+            self.state.plan_file.set(None)
+        self.state.plan.set(plan)
 
     def open_plan(self, path: Path) -> None:
         """Plan what a file says, a plan or a pattern set; undo brings back what was planned."""
@@ -141,7 +145,7 @@ class ScanPlanController:
             state.period_ms.set(info.frame_period_ms)
             state.latency_ms.set(info.latency_ms)
             if not self._is_locked():
-                state.plan.set(on_cycles(self._fitted(state.plan.value), info.frame_period_ms))
+                self.take_plan(on_cycles(self._fitted(state.plan.value), info.frame_period_ms))
         own = None if devices is None else devices.calibration
         choice = OWN_CALIBRATION if own is None else CalibrationChoice("", own.name, own.provenance.created)
         rest = tuple(each for each in state.calibrations.value if each.key)

@@ -139,3 +139,9 @@ def same_settings(first: Sequence[Setting], second: Sequence[Setting]) -> bool:
         a.level == b.level and math.isclose(a.exposure_ms, b.exposure_ms, rel_tol=1e-9)
         for a, b in zip(first, second, strict=True)
     )
+
+
+def same_plan(first: CapturePlan, second: CapturePlan) -> bool:
+    """Whether plans are the same but for the rounding of whole cycles."""
+    alike = first.model_copy(update={"settings": second.settings}) == second
+    return alike and same_settings(first.settings, second.settings)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from dsl_core.planning.prediction import Prediction
 
 TWIN = RigChoice("twin", (("scene", "color-checker"), ("size", "64x48")))
+#: A rig of another size.
+SMALL = RigChoice("twin", (("scene", "color-checker"), ("size", "32x24")))
 SHORT = PRESETS[0].plan
 #: All frames of the short plan, and its patterns.
 FRAMES, PATTERNS = SHORT.shot_count, SHORT.spectral_count

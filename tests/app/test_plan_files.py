@@ -10,11 +10,14 @@ from pytestqt.qtbot import QtBot
 
 from app.panels.plan_editor import PlanEditor
 from app.state.scan import Phase
+from dsl_core.errors import DeviceError
 from dsl_core.io.plan_file import load_plan, save_plan
+from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
 from dsl_core.model.presets import PRESETS
 from dsl_core.planning.designed import DesignedSet, packed, save_design
-from tests.app.scan_bench import COMB, ScanBench, planned_bench
+from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.scan_bench import COMB, SMALL, TWIN, ScanBench, planned_bench
 
 
 @pytest.fixture
@@ -111,6 +114,37 @@ def test_while_a_scan_runs_its_plan_stays(bench: ScanBench, tmp_path: Path) -> N
     assert bench.scans.open(path)
     assert bench.state.plan.value is before
     assert "keeps its plan" in bench.notifier.told[-1][1]
+
+
+def saved_comb(bench: ScanBench, folder: Path) -> None:
+    bench.scans.plans.change_plan(COMB)
+    bench.scans.plans.save_plan(folder / "comb.json")
+    assert "--plan" in bench.scans.command_line()
+
+
+def test_a_scan_that_is_opened_brings_another_plan_than_the_file(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def lost(camera: SimCamera, timeout_ms: float = 5000.0) -> Frame:
+        raise DeviceError("The power failed.")
+
+    with monkeypatch.context() as losing:
+        losing.setattr(SimCamera, "snap", lost)
+        bench.scans.start()
+    bench.scans.leave_session()
+    saved_comb(bench, tmp_path)
+    assert bench.scans.open(tmp_path / "first.dsl")
+    bench.scans.leave_session()
+    assert bench.state.preset is PRESETS[0]
+    assert "--plan" not in bench.scans.command_line()
+
+
+def test_a_plan_that_is_fitted_to_another_rig_is_no_longer_the_file(bench: ScanBench, tmp_path: Path) -> None:
+    saved_comb(bench, tmp_path)
+    bench.rig.connect(TWIN)
+    assert "--plan" in bench.scans.command_line()
+    bench.rig.connect(SMALL)
+    assert "--plan" not in bench.scans.command_line()
 
 
 def test_combs_of_three_colours_stay_so_when_something_else_is_edited(qtbot: QtBot) -> None:
