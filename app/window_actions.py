@@ -38,8 +38,8 @@ class WindowActions:
             "export": self._refuse_export,
             "report_bundle": self._save_report_bundle,
             "quit": window.close,
-            "undo": undo.undo,
-            "redo": undo.redo,
+            "undo": lambda: self._tell(undo.undo()),
+            "redo": lambda: self._tell(undo.redo()),
             "cancel_jobs": self._cancel_jobs,
             "show_command": self._show_command,
             "help_page": self._explain,
@@ -47,6 +47,11 @@ class WindowActions:
             "shortcuts": lambda: text_windows.shortcuts_window(ACTIONS, window).open(),
             "about": lambda: text_windows.about_window(window).open(),
         }
+
+    def _tell(self, reason: str) -> None:
+        """Say why something is not done, if there is a reason."""
+        if reason:
+            self._toasts.tell("info", reason)
 
     # Files -----------------------------------------------------------------------------------------
 

@@ -23,6 +23,11 @@ from dsl_core.model.presets import PRESETS, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
+KEEPS_ITS_PLAN = (
+    "The scan at hand keeps its plan. It can be changed, undone and redone once that scan is complete, or"
+    " left by 'Plan a new scan'."
+)
+
 
 class ScanPlanController:
     """Keeps plan, target and calibration of the next scan, and says what they take."""
@@ -55,16 +60,23 @@ class ScanPlanController:
 
     def change_plan(self, plan: CapturePlan) -> None:
         """Take a plan of any kind, with the sizes of the rig; can be undone."""
-        old, new = self.state.plan.value, self._fitted(plan)
+        old, new, period_ms = self.state.plan.value, self._fitted(plan), self.state.period_ms.value
         if new != old and not self._is_locked():
             self._undo.push(
-                Change("change of plan", lambda: self._set_plan(new), lambda: self._set_plan(old))
+                Change(
+                    "change of plan",
+                    lambda: self._set_plan(new, period_ms),
+                    lambda: self._set_plan(old, period_ms),
+                    lambda: KEEPS_ITS_PLAN if self._is_locked() else "",
+                )
             )
 
-    def _set_plan(self, plan: CapturePlan) -> None:
-        if not self._is_locked():
-            self.take_plan(plan)
-            self.refresh()
+    def _set_plan(self, plan: CapturePlan, period_ms: float) -> None:
+        """Take a plan that was made for an LED cycle; another rig may be connected since."""
+        now_ms = self.state.period_ms.value
+        fitted = self._fitted(plan)
+        self.take_plan(fitted if period_ms == now_ms else on_cycles(fitted, now_ms))
+        self.refresh()
 
     def take_plan(self, plan: CapturePlan) -> None:
         """Let this be the plan at hand as it is; a file of another one holds it no more."""

@@ -13,11 +13,15 @@ DEPTH = 200
 
 @dataclass(frozen=True)
 class Change:
-    """Something that was done, in words, and how to do it and take it back."""
+    """Something that was done, in words, and how to do it and take it back.
+
+    ``obstacle`` says why neither can be at this moment; empty when nothing is in the way.
+    """
 
     text: str
     do: Callable[[], object]
     undo: Callable[[], object]
+    obstacle: Callable[[], str] = str
 
 
 class UndoStack:
@@ -45,21 +49,24 @@ class UndoStack:
         self._undone.clear()
         self.changed.emit(None)
 
-    def undo(self) -> None:
-        """Take the last change back; nothing happens when there is none."""
-        if self._done:
-            change = self._done.pop()
-            change.undo()
-            self._undone.append(change)
-            self.changed.emit(None)
+    def undo(self) -> str:
+        """Take the last change back; the reason where that cannot be now, and then it stays the last one."""
+        return self._move(self._done, self._undone, lambda change: change.undo())
 
-    def redo(self) -> None:
-        """Do the change again that was taken back last; nothing happens when there is none."""
-        if self._undone:
-            change = self._undone.pop()
-            change.do()
-            self._done.append(change)
+    def redo(self) -> str:
+        """Do the change again that was taken back last; the reason where that cannot be now."""
+        return self._move(self._undone, self._done, lambda change: change.do())
+
+    def _move(self, source: list[Change], target: list[Change], act: Callable[[Change], object]) -> str:
+        if not source:
+            return ""
+        reason = source[-1].obstacle()
+        if not reason:
+            change = source.pop()
+            act(change)
+            target.append(change)
             self.changed.emit(None)
+        return reason
 
     def clear(self) -> None:
         """Forget everything, as when another result is opened."""

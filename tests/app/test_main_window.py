@@ -14,6 +14,7 @@ from app.actions import ACTIONS, PAGES
 from app.application import ExceptionHook, make_window
 from app.jobs.base import Job
 from app.main_window import MainWindow
+from app.state.undo import Change
 from app.views import RecordingNotifier
 from app.widgets.page import PageWidget
 
@@ -168,3 +169,10 @@ def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -
     qtbot.waitUntil(lambda: made.stack.count() == 1)
     assert made.windowTitle().startswith("Rig")
     made.close()
+
+
+def test_a_change_that_cannot_be_undone_now_is_told(window: MainWindow) -> None:
+    window.parts.undo.push(Change("change of plan", int, int, lambda: "A scan keeps its plan."))
+    window.do("undo")
+    assert window.toasts.shown[-1].text == "A scan keeps its plan."
+    assert window.actions_by_key["undo"].isEnabled()

@@ -16,7 +16,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, TWIN, ScanBench, make_bench, planned_bench
+from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, SMALL, TWIN, ScanBench, make_bench, planned_bench
 
 
 @pytest.fixture
@@ -60,6 +60,35 @@ def test_presets_can_be_chosen_and_taken_back(bench: ScanBench) -> None:
     assert bench.state.preset is PRESETS[-1]
     bench.undo.undo()
     assert bench.state.preset is PRESETS[0]
+
+
+def test_the_plan_of_a_scan_at_hand_is_not_taken_back(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    bench.state.phase.set(Phase.RUNNING)
+    assert "keeps its plan" in bench.undo.undo()
+    assert bench.state.preset is PRESETS[-1]
+    bench.state.phase.set(Phase.DONE)
+    assert bench.undo.undo() == ""
+    assert bench.state.preset is PRESETS[0]
+
+
+def test_a_plan_that_comes_back_suits_the_rig_that_is_connected_now(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    bench.rig.connect(SMALL)
+    bench.undo.undo()
+    facts = bench.state.facts.value
+    assert bench.state.preset is PRESETS[0]
+    assert bench.state.plan.value.camera_size_px == (32, 24)
+    assert facts is not None
+    assert facts.obstacles == ()
+
+
+def test_a_plan_that_comes_back_has_whole_cycles_of_the_projector_of_now(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    bench.state.period_ms.set(20.0)
+    bench.undo.undo()
+    assert bench.state.preset is PRESETS[0]
+    assert all(setting.exposure_ms % 20 == 0 for setting in bench.state.plan.value.settings)
 
 
 def test_an_impossible_plan_says_why(bench: ScanBench) -> None:

@@ -52,3 +52,16 @@ def test_nothing_to_undo_is_no_error() -> None:
     stack.undo()
     stack.redo()
     assert stack.undo_text == ""
+
+
+def test_a_change_that_cannot_be_taken_back_now_stays_and_says_why() -> None:
+    reasons, pins = ["A scan runs."], [0]
+    stack = UndoStack()
+    stack.push(Change("pin", lambda: pins.append(1), pins.pop, lambda: reasons[0]))
+    assert stack.undo() == "A scan runs."
+    assert (pins, stack.undo_text, stack.redo_text) == ([0, 1], "pin", "")
+    reasons[0] = ""
+    assert stack.undo() == ""
+    reasons[0] = "A scan runs."
+    assert stack.redo() == "A scan runs."
+    assert (pins, stack.undo_text, stack.redo_text) == ([0], "", "pin")
