@@ -58,7 +58,6 @@ class SessionDesk(QObject):
             state.phase,
             state.interrupted,
             state.then_reconstruct,
-            state.override,
             state.calibration,
         )
 

@@ -74,13 +74,15 @@ def scan_part(state: ScanState) -> ScanPart | None:
         plan=state.plan.value,
         target=state.target.value,
         then_reconstruct=state.then_reconstruct.value,
-        override=state.override.value,
         calibration=state.calibration.value.key,
     )
 
 
 def come_back_to_scan(part: ScanPart, control: ScanController) -> None:
-    """Plan the same again; a scan that the crash interrupted is offered to be gone on with."""
+    """Plan the same again; a scan that the crash interrupted is offered to be gone on with.
+
+    That a calibration is used although settings differ is asked anew: a crash is no reason to skip the check.
+    """
     control.state.then_reconstruct.set(part.then_reconstruct)
     if (part.target / MANIFEST_NAME).is_file() and not is_complete(part.target):
         control.open(part.target)
@@ -88,7 +90,6 @@ def come_back_to_scan(part: ScanPart, control: ScanController) -> None:
     control.plans.change_plan(part.plan)
     if not part.target.exists():
         control.plans.set_target(part.target)
-    control.plans.set_override(part.override)
     if part.calibration:
         control.plans.choose_calibration(CalibrationChoice(part.calibration, part.calibration))
 

@@ -46,6 +46,7 @@ class CalibrationBox(QGroupBox):
         self.stops = [
             state.calibrations.follow(self._list),
             state.calibration.follow(self._mark),
+            state.override.follow(self.override.setChecked),
             state.facts.follow(self._show_facts),
         ]
 

@@ -33,7 +33,6 @@ class ScanPart(_Part):
     plan: CapturePlan
     target: Path
     then_reconstruct: bool = True
-    override: bool = False
     calibration: str = ""
 
 

@@ -128,6 +128,7 @@ def test_a_plan_comes_back(tmp_path: Path) -> None:
     assert scan_part(first.state) is None
     first.plan()
     first.scans.plans.set_target(tmp_path / "leaf.dsl")
+    first.scans.plans.set_override(True)
     part = scan_part(first.state)
     assert part is not None
     again = make_bench(tmp_path)
@@ -135,6 +136,8 @@ def test_a_plan_comes_back(tmp_path: Path) -> None:
     assert again.state.plan.value == first.state.plan.value
     assert again.state.target.value == tmp_path / "leaf.dsl"
     assert not again.state.then_reconstruct.value
+    # Nobody overrides a check unasked.
+    assert not again.state.override.value
 
 
 def test_a_scan_that_the_crash_interrupted_can_be_gone_on_with(
