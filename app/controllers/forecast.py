@@ -8,7 +8,7 @@ from pathlib import Path
 from app.controllers.forecast_job import ForecastJob, Rigging, usual_candidates
 from app.controllers.scan_facts import sentence_of
 from app.controllers.scan_measured import measure
-from app.controllers.scan_plan import ScanPlanController
+from app.controllers.scan_plan import KEEPS_ITS_PLAN, ScanPlanController
 from app.jobs.base import Job, JobRunner
 from app.state.forecast import ForecastState, Foreseen, Measured, identity
 from app.state.rig import RigState
@@ -189,10 +189,13 @@ class ForecastController:
             return
         best = self._known[identity(found.plan)]
         self.choose(best)
-        self.state.answer.set(
-            f"Chosen: {best.title}, {best.expected.seconds:.0f} s, error of a pixel"
-            f" {best.expected.pixel_rmse:.4f}.{so_far}"
+        words = (
+            f"{best.title}, {best.expected.seconds:.0f} s, error of a pixel {best.expected.pixel_rmse:.4f}."
         )
+        if identity(self._scan.plan.value) == best.key:
+            self.state.answer.set(f"Chosen: {words}{so_far}")
+        else:
+            self.state.answer.set(f"Best would be {words}{so_far} {KEEPS_ITS_PLAN}")
 
     # After a scan ----------------------------------------------------------------------------------
 

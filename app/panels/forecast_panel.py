@@ -219,14 +219,19 @@ class ForecastPanel(QWidget):
             origin = f"Expected from the calibration, for {scene}: F1 says how."
             text = f"{done} of {total} plans predicted. {origin}" if total > 1 else origin
         self._note.setText(text)
-        self.ask.setEnabled(bool(state.points.value))
+        self._allow_to_ask()
 
     def fix(self, fixed: bool) -> None:
         """Let nothing be chosen while a scan is under way."""
         self._is_fixed = fixed
         if self.curve.made is not None:
             self.curve.made.fix(fixed)
-        self.ask.setEnabled(not fixed and bool(self._state.points.value))
+        self._allow_to_ask()
+
+    def _allow_to_ask(self) -> None:
+        for box in (self.wish, self.budget, self.error):
+            box.setEnabled(not self._is_fixed)
+        self.ask.setEnabled(not self._is_fixed and bool(self._state.points.value))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

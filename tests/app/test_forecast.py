@@ -10,6 +10,7 @@ from app.controllers.forecast_store import ForecastStore
 from app.jobs.base import InlineRunner, Job
 from app.state.forecast import ForecastState, Foreseen, identity, plan_title
 from app.state.rig import RigChoice
+from app.state.scan import Phase
 from dsl_core.errors import PlanError
 from dsl_core.io.result_file import load_result, save_result
 from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
@@ -111,6 +112,18 @@ def test_wishes_choose_a_plan_or_say_what_could_be_had(
     assert "No plan takes at most 1 s" in control.state.answer.value
     control.answer(error=1e-6)
     assert "the best" in control.state.answer.value
+
+
+def test_a_wish_during_a_scan_does_not_claim_a_choice(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    bench.state.phase.set(Phase.RUNNING)
+    control.answer(error=min(each.expected.pixel_rmse for each in control.state.points.value))
+    assert bench.state.preset is PRESETS[0]
+    assert "Chosen" not in control.state.answer.value
+    assert control.state.answer.value.startswith("Best would be ")
+    assert "keeps its plan" in control.state.answer.value
 
 
 def test_without_calibration_nothing_is_predicted_and_the_reason_said(

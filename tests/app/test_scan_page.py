@@ -188,6 +188,15 @@ def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
     assert len(bench.state.plan.value.settings) == 2
 
 
+def test_an_override_is_shown_as_it_is(ready: Bench) -> None:
+    page, bench, _ = ready
+    bench.scans.plans.set_override(True)
+    assert page.calibration.override.isChecked()
+    assert page.calibration.override.isVisible()
+    page.calibration.override.click()
+    assert not bench.state.override.value
+
+
 def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> None:
     page, _, _ = ready
     page.plan.step.setValue(9)
@@ -287,6 +296,19 @@ def test_a_wish_for_time_is_answered(qtbot: QtBot, ready: Bench, predicted: None
     page.forecast.error.setValue(0.001)
     click(page.forecast.ask)
     assert "No plan is expected to reach" in page.forecast._answer.text()
+
+
+def test_nothing_is_asked_for_while_a_scan_runs(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, bench, _ = ready
+    state = begin(qtbot, page)
+    bench.state.phase.set(Phase.RUNNING)
+    # News of predictions come while it runs.
+    state.progress.set((1, 7))
+    boxes = (page.forecast.ask, page.forecast.wish, page.forecast.budget, page.forecast.error)
+    assert not any(box.isEnabled() for box in boxes)
+    bench.state.phase.set(Phase.DONE)
+    assert all(box.isEnabled() for box in boxes)
+    state.progress.set((0, 0))
 
 
 def test_every_figure_has_its_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
