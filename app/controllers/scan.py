@@ -200,7 +200,8 @@ class ScanController:
 
     def reconstruct(self, session: Path) -> None:
         """Make the result of a complete scan, save it beside the scan and tell of it."""
-        target = session.with_suffix(".zarr")
+        target, before = session.with_suffix(".zarr"), self.state.note.value
+        waiting = f"{before} Reconstructing…".strip()
 
         def work(progress: Progress) -> Path:
             from dsl_core.io.result_file import save_result
@@ -213,8 +214,20 @@ class ScanController:
             self.state.note.set(f"The result lies in {path}.")
             self.state.result.emit(path)
 
-        self.state.note.set(f"{self.state.note.value} Reconstructing…".strip())
-        self._runner.submit(Job(f"Reconstruct {session.stem}", work, done, self._tell))
+        def ended(how: str) -> None:
+            # Another scan may have something of its own to say meanwhile.
+            if self.state.note.value == waiting:
+                again = f"Open {session.name} on the Results page to reconstruct it."
+                self.state.note.set(f"{before} The reconstruction {how}. {again}".strip())
+
+        def failed(error: Exception) -> None:
+            ended("failed")
+            self._tell(error)
+
+        self.state.note.set(waiting)
+        self._runner.submit(
+            Job(f"Reconstruct {session.stem}", work, done, failed, lambda: ended("was cancelled"))
+        )
 
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", sentence_of(error))

@@ -8,8 +8,9 @@ import pytest
 
 from app.controllers.scan_plan import connect_first
 from app.state.scan import CalibrationChoice, Phase
+from dsl_core import sessions
 from dsl_core.cli.options import PlanChoice
-from dsl_core.errors import DeviceError, StoreError
+from dsl_core.errors import Cancelled, DecodeError, DeviceError, DslError, StoreError
 from dsl_core.io.calibration_library import LibraryEntry
 from dsl_core.io.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
@@ -126,6 +127,24 @@ def test_a_result_follows_and_is_told(bench: ScanBench, tmp_path: Path) -> None:
     bench.scans.start()
     assert results == [tmp_path / "first.zarr"]
     assert results[0].is_dir()
+
+
+@pytest.mark.parametrize(
+    ("error", "how"), [(Cancelled("Stopped."), "was cancelled"), (DecodeError("No light."), "failed")]
+)
+def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, error: DslError, how: str
+) -> None:
+    def ending(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(sessions, "reconstruct_session", ending)
+    bench.state.then_reconstruct.set(True)
+    bench.scans.start()
+    note = bench.state.note.value
+    assert note.startswith(f"All {FRAMES} frames are stored in ")
+    assert "Reconstructing…" not in note
+    assert f"The reconstruction {how}. Open first.dsl on the Results page" in note
 
 
 def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
