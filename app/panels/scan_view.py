@@ -59,16 +59,15 @@ class FramePicture(QWidget):
 
     def show_picture(self, shown: LivePicture | None, plan: CapturePlan) -> None:
         """Show a frame of a plan."""
-        first, self._shown = self._shown is None, shown
+        before, self._shown = self._shown, shown
         if shown is None:
             self._image.clear()
             self._text.setText(HINT)
             return
         self._image.setImage(shown.picture, autoLevels=False, levels=None)
-        height, width = shown.picture.shape[:2]
-        self._image.setRect(0, 0, width * shown.cell_px, height * shown.cell_px)
+        self._image.setRect(0, 0, *covered_px(shown))
         self._text.setText(f"Frame {shown.shot.index + 1} of {plan.shot_count}: {words_of(shown.shot, plan)}")
-        if first:
+        if before is None or covered_px(before) != covered_px(shown):
             self.box.autoRange(padding=0.01)
 
     def show_cursor(self, pixel: tuple[int, int] | None) -> None:
@@ -85,8 +84,8 @@ class FramePicture(QWidget):
 
     def _point(self, x: int, y: int) -> None:
         assert self._shown is not None
-        height, width = self._shown.picture.shape[:2]
-        if 0 <= x < width * self._shown.cell_px and 0 <= y < height * self._shown.cell_px:
+        width, height = covered_px(self._shown)
+        if 0 <= x < width and 0 <= y < height:
             self.pointed.emit((x, y))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -95,9 +94,11 @@ class FramePicture(QWidget):
         if step is None or self._shown is None:
             super().keyPressEvent(event)
             return
-        height, width = self._shown.picture.shape[:2]
+        width, height = covered_px(self._shown)
         cell = self._shown.cell_px
-        x, y = self._cursor or (width * cell // 2, height * cell // 2)
+        x, y = self._cursor or (width // 2, height // 2)
+        # The pixel may be one of an earlier scan with a larger picture.
+        x, y = min(x, width - 1), min(y, height - 1)
         self._point(x + 2 * cell * step[0], y + 2 * cell * step[1])
 
     def apply_theme(self, theme: Theme) -> None:
@@ -192,6 +193,12 @@ class GraphPlot(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         theme_plots((self.plot,), theme)
+
+
+def covered_px(shown: LivePicture) -> tuple[int, int]:
+    """Width and height of what a picture shows, in pixels of the camera."""
+    height, width = shown.picture.shape[:2]
+    return width * shown.cell_px, height * shown.cell_px
 
 
 def words_of(shot: Shot, plan: CapturePlan) -> str:

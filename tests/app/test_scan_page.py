@@ -4,8 +4,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
-from PySide6.QtCore import QPointF, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
@@ -15,9 +16,10 @@ from app.controllers.forecast import ForecastController
 from app.jobs.qt_runner import QtRunner
 from app.panels.forecast_panel import ForecastPanel
 from app.panels.scan_page import ScanPage
+from app.panels.scan_view import FramePicture
 from app.state.effects import EffectsState
 from app.state.forecast import ForecastState
-from app.state.scan import Phase
+from app.state.scan import LivePicture, Phase
 from app.theme import LIGHT
 from dsl_core.errors import DeviceError
 from dsl_core.io.session import SessionReader
@@ -342,3 +344,28 @@ def test_a_plan_is_saved_and_opened_by_the_buttons(
     click(page.plan.open)
     qtbot.waitUntil(lambda: bench.state.preset is PRESETS[0])
     assert page.plan.preset.currentData() == "preview"
+
+
+def test_a_scan_of_another_picture_size_fills_the_view(qtbot: QtBot) -> None:
+    picture = FramePicture()
+    qtbot.addWidget(picture)
+    picture.resize(600, 400)
+    picture.show()
+    shot = next(iter(SHORT.shots()))
+    for width, height, cell_px in ((48, 32, 2), (600, 400, 2), (600, 400, 4), (30, 20, 2)):
+        seen = LivePicture(shot, np.zeros((height, width, 3), np.uint8), cell_px)
+        picture.show_picture(seen, SHORT)
+        view = picture.box.viewRect()
+        assert view.contains(QRectF(0, 0, width * cell_px, height * cell_px))
+        assert view.height() < 1.2 * height * cell_px
+
+
+def test_arrow_keys_come_back_into_a_smaller_picture(qtbot: QtBot) -> None:
+    picture = FramePicture()
+    qtbot.addWidget(picture)
+    shot = next(iter(SHORT.shots()))
+    picture.show_picture(LivePicture(shot, np.zeros((20, 30, 3), np.uint8), 2), SHORT)
+    picture.show_cursor((500, 10))
+    with qtbot.waitSignal(picture.pointed) as pointed:
+        QTest.keyClick(picture, Qt.Key.Key_Left)
+    assert pointed.args == [(55, 10)]
