@@ -19,7 +19,7 @@ from app.settings import Settings, save_settings
 from app.state.recent import RecentFiles
 from app.state.undo import UndoStack
 from app.theme import DARK, Theme
-from app.widgets.drops import dropped_paths, open_after_drop
+from app.widgets.drops import FilesInTurn, dropped_paths
 from app.widgets.job_strip import JobStrip
 from app.widgets.layout_memory import keep_layout
 from app.widgets.page import PageWidget
@@ -70,6 +70,8 @@ class PagedWindow(QMainWindow):
         self.stack = QStackedWidget()
         self.strip = JobStrip(parts.runner)
         self.statusBar().addPermanentWidget(self.strip)
+        self._dropped = FilesInTurn(self.open_path, self._is_reading, self)
+        parts.runner.changed.connect(self._dropped.go_on)
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -137,9 +139,12 @@ class PagedWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Open what was dropped."""
+        """Open what was dropped, one after the other."""
         event.acceptProposedAction()
-        open_after_drop(dropped_paths(event.mimeData()), self.open_path, self)
+        self._dropped.add(dropped_paths(event.mimeData()))
+
+    def _is_reading(self) -> bool:
+        return any(page.is_reading for page in self._made.values())
 
     # Look, memory, end -----------------------------------------------------------------------------
 

@@ -46,6 +46,11 @@ class KeptMarks:
         self.state.selected.set(0)
         self._read()
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether what is kept is still being read."""
+        return self._reading is _Reading.UNDER_WAY
+
     def when_read(self, change: Callable[[], None]) -> None:
         """Change marks as soon as those that are kept are there; says so where that is not now."""
         if self._reading is _Reading.DONE:

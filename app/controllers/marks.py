@@ -147,5 +147,10 @@ class MarksController:
         self._undo.clear()
         self._kept.read()
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether kept marks are still being read."""
+        return self._kept.is_reading
+
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", str(error))

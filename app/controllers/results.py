@@ -34,6 +34,7 @@ class ResultsController:
         self.opened: Event[ResultArrays] = Event()
         self._block: FrameBlock | None = None
         self._turn, self._lit = 0, ("D65", True)
+        self._loading: Job[tuple[ResultArrays, NDArray[np.uint8] | None]] | None = None
 
     # Open ------------------------------------------------------------------------------------------
 
@@ -49,6 +50,12 @@ class ResultsController:
             case _:
                 return False
         return True
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether a result or its marks are still being read; a reconstruction is no reading."""
+        is_loading = self._loading is not None and not self._loading.state.is_final
+        return is_loading or self.marks.is_reading
 
     def offer(self, session: Path) -> None:
         """Open the result beside a scan, or offer to make it."""
@@ -94,17 +101,17 @@ class ResultsController:
                 observer_weights(arrays.wavelengths_nm)
             return arrays, picture_of(arrays["rgb"]) if "rgb" in arrays.arrays else None
 
-        self._runner.submit(
-            Job(
-                title,
-                both,
-                self._opened,
-                self._failed,
-                lambda: self.state.busy.set(""),
-                exclusive="opening",
-                is_minor=is_minor,
-            )
+        job = Job(
+            title,
+            both,
+            self._opened,
+            self._failed,
+            lambda: self.state.busy.set(""),
+            exclusive="opening",
+            is_minor=is_minor,
         )
+        self._loading = job if is_minor else None
+        self._runner.submit(job)
 
     def _opened(self, opened: tuple[ResultArrays, NDArray[np.uint8] | None]) -> None:
         arrays, picture = opened

@@ -47,6 +47,10 @@ class ResultCommands(Protocol):
     def open(self, path: Path) -> bool:
         """Open a result, scan or reference."""
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether what was opened last is still being read."""
+
     def reconstruct(self) -> None:
         """Make the result of the scan that is offered."""
 

@@ -279,6 +279,11 @@ class ResultsPage(PageWidget):
         """Open a result, a scan or a reference."""
         return self._commands.open(path)
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether a result or its marks are still being read."""
+        return self._commands.is_reading
+
     def command_line(self) -> str:
         """The command that makes or exports what is open."""
         return self._commands.command_line()

@@ -25,6 +25,11 @@ class PageWidget(QWidget):
         """Open a file or folder that was chosen or dropped; False when it is none of the page's."""
         return False
 
+    @property
+    def is_reading(self) -> bool:
+        """Whether what was opened last is still being read; further files wait for that."""
+        return False
+
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
 

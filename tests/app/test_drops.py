@@ -13,7 +13,9 @@ from pytestqt.qtbot import QtBot
 from app.application import make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
+from app.panels.results_page import ResultsPage
 from app.panels.scan_page import ScanPage
+from dsl_core.io.annotations_file import Annotations, PinRecord, save_annotations
 from dsl_core.io.plan_file import save_plan
 from dsl_core.model.plan import CapturePlan, LineComb
 from tests.app.small_result import RED, write_reference, write_small_result
@@ -42,6 +44,13 @@ def drop(window: MainWindow, *paths: Path) -> bool:
     return enter.isAccepted()
 
 
+def result_of(window: MainWindow) -> Path | None:
+    page = window.page_of("results")
+    assert isinstance(page, ResultsPage)
+    result = page._state.result.value
+    return None if result is None or page.is_reading else result.path
+
+
 def test_a_result_opens_where_results_are(qtbot: QtBot, window: MainWindow, tmp_path: Path) -> None:
     path = write_small_result(tmp_path)
     assert drop(window, path)
@@ -66,6 +75,32 @@ def test_a_wrong_file_is_told_with_what_is_known(qtbot: QtBot, window: MainWindo
     assert "cat.jpeg is no scan" in window.toasts.shown[0].text
     assert "Open a result first" in window.toasts.shown[1].text
     assert window.parts.settings.recent == []
+    window.close()
+
+
+def test_results_that_are_dropped_together_are_opened_in_turn(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    (tmp_path / "b").mkdir()
+    first, second = write_small_result(tmp_path), write_small_result(tmp_path / "b")
+    drop(window, first, second)
+    qtbot.waitUntil(lambda: result_of(window) == second, timeout=10_000)
+    assert window.parts.settings.recent == [str(second), str(first)]
+    assert window.toasts.shown == ()
+    window.close()
+
+
+def test_a_reference_waits_for_the_result_that_is_dropped_with_it(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    path = write_small_result(tmp_path)
+    save_annotations(Annotations(pins=(PinRecord(name="kept pin", pixel=(7, 8)),)), path)
+    drop(window, path, write_reference(tmp_path / "tile.csv", RED))
+    page = window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    marks = page._state.marks
+    qtbot.waitUntil(lambda: [mark.name for mark in marks.value] == ["kept pin", "tile"], timeout=10_000)
+    assert window.toasts.shown == ()
     window.close()
 
 
