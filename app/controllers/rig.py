@@ -20,6 +20,7 @@ from dsl_core.progress import Progress
 
 #: What only one job may use at a time.
 RIG = "the rig"
+DISCONNECT = "Disconnect"
 #: Lost frames in a row after which a camera counts as lost.
 LOST_AFTER = 3
 #: Shortest time between two live frames, s: a twin would else keep a core busy for nobody.
@@ -42,7 +43,7 @@ class RigController:
         self.state, self._runner, self._notifier = state, runner, notifier
         self._wrap = wrap_projector
         self._live_job: Job[None] | None = None
-        self._waiting: list[tuple[Job[Any], Callable[[str], object]]] = []
+        self._waiting: list[tuple[Job[Any], Callable[[str], object], Callable[[], object]]] = []
         self._mail: Frame | None = None
         self._lock = threading.Lock()
         self._counts = FrameCounts()
@@ -51,14 +52,11 @@ class RigController:
     # Connect ---------------------------------------------------------------------------------------
 
     def connect(self, choice: RigChoice) -> None:
-        """Open a rig by name, closing the one at hand."""
-        if self.state.link.value is Link.OPENING:
+        """Open a rig by name, closing the one at hand; while something else uses that, all stays as it is."""
+        state = self.state
+        if state.link.value is Link.OPENING:
             return
-        self.state.choice.set(choice)
-        self.state.link.set(Link.OPENING)
-        self.state.trouble.set("")
-        old = self.state.devices.value
-        self.state.devices.set(None)
+        link, old = state.link.value, state.devices.value
 
         def work(progress: Progress) -> DeviceRig:
             from dsl_core.devices.registry import open_rig
@@ -69,16 +67,47 @@ class RigController:
             devices.projector = self._wrap(devices.projector)
             return devices
 
+        def accepted() -> None:
+            state.choice.set(choice)
+            state.link.set(Link.OPENING)
+            state.trouble.set("")
+            state.devices.set(None)
+
+        def cancelled() -> None:
+            # Only before it began: the devices are as they were.
+            state.devices.set(old)
+            state.link.set(link)
+
+        def refused(text: str) -> None:
+            if state.link.value is Link.OPENING:
+                state.link.set(link)
+            self._tell_refused(text)
+
+        if self._live_job is not None:
+            # Nobody asks twice while the live view stops.
+            state.link.set(Link.OPENING)
         title = f"Connect {choice.name}"
-        self.run(Job(title, work, self._connected, self._refused, exclusive=RIG, is_minor=True))
+        job = Job(title, work, self._connected, self._refused, cancelled, exclusive=RIG, is_minor=True)
+        self.run(job, refused, accepted)
 
     def disconnect(self) -> None:
-        """Close the devices."""
-        old = self.state.devices.value
-        self.state.devices.set(None)
-        self.state.link.set(Link.CLOSED)
-        if old is not None:
-            self.run(Job("Disconnect", lambda progress: old.close(), exclusive=RIG, is_minor=True))
+        """Close the devices, unless something else uses them."""
+        state = self.state
+        link, old = state.link.value, state.devices.value
+        if old is None or any(job.title == DISCONNECT for job, *_ in self._waiting):
+            return
+
+        def accepted() -> None:
+            state.devices.set(None)
+            state.link.set(Link.CLOSED)
+
+        def cancelled() -> None:
+            state.devices.set(old)
+            state.link.set(link)
+
+        work = lambda progress: old.close()  # noqa: E731
+        job = Job(DISCONNECT, work, on_cancelled=cancelled, exclusive=RIG, is_minor=True)
+        self.run(job, accepted=accepted)
 
     def _connected(self, devices: DeviceRig) -> None:
         self.state.devices.set(devices)
@@ -160,8 +189,8 @@ class RigController:
         self._exposer.end()
         self.state.live.set(False)
         waiting, self._waiting = self._waiting, []
-        for job, refused in waiting:
-            self.run(job, refused)
+        for job, refused, accepted in waiting:
+            self.run(job, refused, accepted)
 
     def _live_failed(self, error: Exception) -> None:
         self.state.link.set(Link.LOST)
@@ -171,16 +200,29 @@ class RigController:
 
     # Use -------------------------------------------------------------------------------------------
 
-    def run(self, job: Job[Any], refused: Callable[[str], object] | None = None) -> bool:
+    def run(
+        self,
+        job: Job[Any],
+        refused: Callable[[str], object] | None = None,
+        accepted: Callable[[], object] = lambda: None,
+    ) -> bool:
         """Run a job that uses the rig, after the live view has stopped; False when another one uses it.
 
         ``refused`` is told why, now or when the live view has stopped; else the person at the window is.
+        ``accepted`` is called instead as soon as the rig is the job's.
         """
         refused = refused or self._tell_refused
         if self._live_job is not None:
-            self._waiting.append((job, refused))
+            self._waiting.append((job, refused, accepted))
             self.stop_live()
             return True
+
+        def taken() -> None:
+            # Opening and closing devices takes no frames that a picture could spoil.
+            self.state.used_by.set("" if job.is_minor else job.title)
+            accepted()
+
+        job.on_accepted, job.on_ended = taken, lambda: self.state.used_by.set("")
         try:
             self._runner.submit(job)
         except DslError as error:
@@ -192,7 +234,11 @@ class RigController:
         self._notifier.tell("warning", text)
 
     def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
-        """Project a trial picture; the live view goes on meanwhile."""
+        """Project a trial picture, unless it would spoil frames; the live view goes on meanwhile."""
+        if self.state.used_by.value:
+            user = self.state.used_by.value
+            self._notifier.tell("info", f"{user} has the projector. Wait for its end, or cancel it.")
+            return
         devices = self.state.devices.value
         if devices is None:
             self._notifier.tell("info", "No projector is connected. Connect a rig first.")

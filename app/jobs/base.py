@@ -48,7 +48,9 @@ class Job(Generic[T]):
 
     ``work`` runs in a worker thread and reports to the `Progress` it is given; the callbacks run in the
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
-    ``is_minor`` work may be stopped unasked when the window closes: nobody misses it.
+    ``is_minor`` work may be stopped unasked when the window closes: nobody misses it. ``on_accepted`` is told
+    once nothing else keeps the job from its work, before that begins; ``on_ended`` before the others, however
+    it ends.
     """
 
     title: str
@@ -58,12 +60,19 @@ class Job(Generic[T]):
     on_cancelled: Callable[[], object] | None = None
     exclusive: str = ""
     is_minor: bool = False
+    on_accepted: Callable[[], object] | None = None
+    on_ended: Callable[[], object] | None = None
     number: int = field(default_factory=lambda: next(_numbers))
     state: JobState = JobState.WAITING
     progress: JobProgress = JobProgress()
     error: Exception | None = None
     started_s: float | None = None
     token: CancelToken = field(default_factory=CancelToken)
+
+    def accept(self) -> None:
+        """Tell that the job has what it needs; called by its runner."""
+        if self.on_accepted is not None:
+            self.on_accepted()
 
     def cancel(self) -> None:
         """Ask the work to stop at its next report."""
@@ -98,19 +107,25 @@ class Job(Generic[T]):
         self.progress = JobProgress(stage, done, total)
 
     def _finish_done(self, result: T) -> None:
-        self.state = JobState.DONE
+        self._end(JobState.DONE)
         if self.on_done is not None:
             self.on_done(result)
 
     def _finish_failed(self, error: Exception) -> None:
-        self.state, self.error = JobState.FAILED, error
+        self.error = error
+        self._end(JobState.FAILED)
         if self.on_failed is not None:
             self.on_failed(error)
 
     def _finish_cancelled(self) -> None:
-        self.state = JobState.CANCELLED
+        self._end(JobState.CANCELLED)
         if self.on_cancelled is not None:
             self.on_cancelled()
+
+    def _end(self, state: JobState) -> None:
+        self.state = state
+        if self.on_ended is not None:
+            self.on_ended()
 
 
 class JobRunner(Protocol):
@@ -137,6 +152,7 @@ class InlineRunner:
 
     def submit(self, job: Job[Any]) -> Job[Any]:
         """Run the job to its end."""
+        job.accept()
         job.run()()
         self.finished.append(job)
         return job

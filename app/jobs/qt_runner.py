@@ -48,6 +48,7 @@ class QtRunner(QObject):
                     f"{job.title} needs {job.exclusive}, which {other.title} uses. Wait for it, or cancel it."
                 )
         self._active.append(job)
+        job.accept()
         self._pool.submit(self._work, job)
         self._ticker.start()
         self.changed.emit()

@@ -54,10 +54,12 @@ class ProjectorPanel(QGroupBox):
         self._timer.setInterval(LOOP_MS)
         self._note = label("", "muted")
         self._note.setWordWrap(True)
+        self._info: ProjectorInfo | None = None
+        self._user = ""
         self._lay_out()
         self._connect()
         self.refresh_screens("")
-        self.set_projector(None)
+        self._show_state()
 
     def _lay_out(self) -> None:
         line = QHBoxLayout()
@@ -89,16 +91,33 @@ class ProjectorPanel(QGroupBox):
 
     def set_projector(self, info: ProjectorInfo | None) -> None:
         """Offer what this projector can show."""
-        for widget in (self._kind, self._level, self._column, self._slider, self._loop):
-            widget.setEnabled(info is not None)
-        if info is None:
+        self._info = info
+        if info is not None:
+            last = info.width_px - LINE_PX
+            self._column.setMaximum(last)
+            self._slider.setRange(0, last)
+        self._show_state()
+
+    def set_user(self, title: str) -> None:
+        """Leave the projector to work of this title, whose frames a picture would spoil; empty for none."""
+        self._user = title
+        self._show_state()
+
+    def _show_state(self) -> None:
+        info, is_free = self._info, not self._user
+        can_show = info is not None and is_free
+        if not can_show:
             self._loop.setChecked(False)
+        for shown in (self._kind, self._level, self._column, self._slider, self._loop):
+            shown.setEnabled(can_show)
+        self._screen.setEnabled(is_free)
+        self._identify.setEnabled(is_free)
+        if not is_free:
+            self._note.setText(f"{self._user} has the projector. Pictures can be shown when it has ended.")
+        elif info is None:
             self._note.setText("No projector is connected. Connect a rig to show pictures.")
-            return
-        last = info.width_px - LINE_PX
-        self._column.setMaximum(last)
-        self._slider.setRange(0, last)
-        self._note.setText(f"{info.model}, {info.width_px} × {info.height_px} logical pixels")
+        else:
+            self._note.setText(f"{info.model}, {info.width_px} × {info.height_px} logical pixels")
 
     def refresh_screens(self, chosen: str, lost: str = "") -> None:
         """List the screens that there are now, and mark the chosen one, or the one that is ``lost``."""

@@ -139,6 +139,7 @@ class RigPage(PageWidget):
             state.trouble.follow(self._show_trouble),
             state.live.follow(self._show_live),
             state.exposure_ms.follow(self._show_exposure),
+            state.used_by.follow(self.projector.set_user),
             state.is_exposing.follow(lambda _: self._show_auto()),
         ]
 

@@ -55,7 +55,8 @@ class RigState:
     """Values that the rig's controller sets and pages follow.
 
     ``frame`` is the latest live frame; ``trouble`` a sentence on why the rig is not there (empty: nothing).
-    ``is_exposing`` says that an exposure is being looked for.
+    ``is_exposing`` says that an exposure is being looked for. ``used_by`` names the work that has the rig for
+    itself and would be spoilt by another picture (empty: none).
     """
 
     def __init__(self, choice: RigChoice) -> None:
@@ -68,6 +69,7 @@ class RigState:
         self.exposure_ms = Value(1000.0 / 6.0)
         self.counts = Value(FrameCounts())
         self.is_exposing = Value(False)
+        self.used_by = Value("")
 
     @property
     def camera(self) -> CameraInfo | None:

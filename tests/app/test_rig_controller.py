@@ -1,20 +1,24 @@
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from pytestqt.qtbot import QtBot
 
-from app.controllers.rig import LOST_AFTER, RigController
+from app.controllers.rig import LOST_AFTER, RIG, RigController
 from app.jobs.base import InlineRunner, Job
-from app.jobs.qt_runner import QtRunner
+from app.jobs.qt_runner import WORKERS, QtRunner
 from app.state.rig import FrameCounts, Link, RigChoice, RigState
 from app.views import RecordingNotifier
+from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import PictureKind
+from dsl_core.progress import Progress
 from dsl_core.simulation.sim_devices import SimCamera
 
 Live = Callable[[], tuple[RigController, RecordingNotifier, QtRunner]]
@@ -170,3 +174,127 @@ def test_the_cycle_is_the_calibrated_one() -> None:
     assert rig.state.cycle_ms == 8.0
     devices.calibration = None
     assert rig.state.cycle_ms == devices.projector.info.frame_period_ms
+
+
+@dataclass
+class Busy:
+    """A rig that a job holds until it is let go; ``closed`` counts devices that were closed."""
+
+    rig: RigController
+    notifier: RecordingNotifier
+    runner: QtRunner
+    gate: threading.Event = field(default_factory=threading.Event)
+    closed: list[object] = field(default_factory=list)
+
+    def hold(self) -> None:
+        self.rig.run(Job("Scan first", self._work, exclusive=RIG))
+
+    def _work(self, progress: Progress) -> None:
+        assert self.gate.wait(60)
+
+    def is_idle(self) -> bool:
+        return self.runner.active == ()
+
+
+@pytest.fixture
+def busy(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Busy]:
+    runner = QtRunner()
+    rig, notifier = controller(runner)
+    made = Busy(rig, notifier, runner)
+    monkeypatch.setattr(DeviceRig, "close", lambda devices: made.closed.append(devices))
+    rig.connect(TWIN)
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=60_000)
+    yield made
+    made.gate.set()
+    runner.shut_down()
+
+
+def test_no_picture_reaches_the_projector_while_a_job_has_the_rig(qtbot: QtBot, busy: Busy) -> None:
+    rig, devices = busy.rig, busy.rig.state.devices.value
+    assert devices is not None
+    world = devices.camera.world  # type: ignore[attr-defined]
+    rig.show("black")
+    before = world.image
+    busy.hold()
+    assert rig.state.used_by.value == "Scan first"
+    rig.show("white")
+    assert world.image is before
+    assert busy.notifier.told[-1] == (
+        "info",
+        "Scan first has the projector. Wait for its end, or cancel it.",
+    )
+    busy.gate.set()
+    qtbot.waitUntil(busy.is_idle)
+    assert rig.state.used_by.value == ""
+    rig.show("white")
+    assert world.image is not before
+
+
+def test_what_follows_a_job_finds_the_rig_free() -> None:
+    rig, _ = controller()
+    seen: list[str] = []
+    look = lambda _: seen.append(rig.state.used_by.value)  # noqa: E731
+    rig.run(Job("Look", look, look, exclusive=RIG))
+    assert seen == ["Look", ""]
+
+
+def test_a_rig_in_use_stays_connected_whatever_is_asked(qtbot: QtBot, busy: Busy) -> None:
+    rig, state = busy.rig, busy.rig.state
+    devices = state.devices.value
+    links: list[Link] = []
+    state.link.changed.connect(links.append)
+    busy.hold()
+    rig.disconnect()
+    rig.connect(RigChoice("twin", (("scene", "box"), ("size", "64x48"))))
+    assert [level for level, _ in busy.notifier.told] == ["warning", "warning"]
+    assert "which Scan first uses" in busy.notifier.told[-1][1]
+    assert (links, state.choice.value, state.devices.value) == ([], TWIN, devices)
+    busy.gate.set()
+    qtbot.waitUntil(busy.is_idle)
+    rig.disconnect()
+    qtbot.waitUntil(busy.is_idle)
+    assert (state.link.value, busy.closed) == (Link.CLOSED, [devices])
+
+
+def test_a_rig_that_something_else_takes_after_the_live_view_stays_connected(
+    qtbot: QtBot, busy: Busy
+) -> None:
+    rig, state = busy.rig, busy.rig.state
+    devices = state.devices.value
+    rig.start_live()
+    busy.hold()
+    rig.disconnect()
+    rig.connect(TWIN)
+    assert state.link.value is Link.OPENING
+    rig.connect(TWIN)
+    qtbot.waitUntil(lambda: len(busy.notifier.told) >= 2)
+    assert [text.split(" needs")[0] for _, text in busy.notifier.told] == ["Disconnect", "Connect twin"]
+    assert (state.link.value, state.devices.value, busy.closed) == (Link.OPEN, devices, [])
+
+
+def test_disconnecting_twice_while_the_live_view_stops_is_once(qtbot: QtBot, busy: Busy) -> None:
+    rig, state = busy.rig, busy.rig.state
+    devices = state.devices.value
+    rig.start_live()
+    rig.disconnect()
+    rig.disconnect()
+    qtbot.waitUntil(lambda: busy.closed == [devices] and busy.is_idle())
+    assert (state.link.value, busy.notifier.told) == (Link.CLOSED, [])
+
+
+def test_a_change_that_is_cancelled_before_it_begins_changes_nothing(qtbot: QtBot, busy: Busy) -> None:
+    rig, state = busy.rig, busy.rig.state
+    devices = state.devices.value
+    changes: tuple[Callable[[], object], ...] = (lambda: rig.connect(TWIN), rig.disconnect)
+    for change in changes:
+        # Every thread has something to do, so that the change waits.
+        others = [Job("Other", busy._work) for _ in range(WORKERS)]
+        for other in others:
+            busy.runner.submit(other)
+        change()
+        assert state.devices.value is None
+        busy.runner.active[-1].cancel()
+        busy.gate.set()
+        qtbot.waitUntil(busy.is_idle)
+        busy.gate.clear()
+        assert (state.link.value, state.devices.value, busy.closed) == (Link.OPEN, devices, [])

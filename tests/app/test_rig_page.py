@@ -165,3 +165,25 @@ def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
     state.choice.set(RigChoice("replay", (("session", "first.dsl"),)))
     assert page._rig.currentText() == "replay"
     assert page._options.text() == "session=first.dsl"
+
+
+def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, notifier = bench
+    connect(qtbot, page, state)
+    panel = page.projector
+    panel._loop.click()
+    assert panel._timer.isActive()
+    devices = state.devices.value
+    assert devices is not None
+    state.used_by.set("Scan first")
+    assert not panel._timer.isActive()
+    assert not panel._loop.isChecked()
+    controls = (
+        panel._kind, panel._level, panel._column, panel._slider, panel._loop, panel._screen, panel._identify,
+    )  # fmt: skip
+    assert not any(widget.isEnabled() for widget in controls)
+    assert panel._note.text() == "Scan first has the projector. Pictures can be shown when it has ended."
+    state.used_by.set("")
+    assert all(widget.isEnabled() for widget in controls)
+    assert "640 × 360" in panel._note.text()
+    assert not notifier.told
