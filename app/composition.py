@@ -123,6 +123,7 @@ class Composition(QObject):
             state = RigState(self._wish.rig or remembered)
             state.choice.changed.connect(lambda choice: _remember(window, choice))
             self._screens = screens = ProjectorScreens(window)
+            state.used_by.changed.connect(lambda _: screens.hide_names())
             self._rig = RigController(
                 state, window.parts.runner, window.toasts, lambda own: ScreenProjector(screens.beam, own)
             )

@@ -37,6 +37,7 @@ class ProjectorScreens(QObject):
                 "info", f"The screen {name} is there again. Choose it on the Rig page to use it."
             )
         )
+        window.closed.connect(self.leave)
         window.destroyed.connect(self.beam.close)
 
     def serve(self, page: RigPage) -> None:
@@ -50,10 +51,22 @@ class ProjectorScreens(QObject):
 
     def identify(self) -> None:
         """Show every screen's name on it for a while."""
+        self.hide_names()
         self._labels = [ScreenLabel(s, describe_screen(s)) for s in QGuiApplication.screens()]
         for label in self._labels:
             label.show()
-            QTimer.singleShot(IDENTIFY_MS, label, label.close)
+            QTimer.singleShot(IDENTIFY_MS, label, self.hide_names)
+
+    def hide_names(self) -> None:
+        """Take the names away; frames must not show them."""
+        labels, self._labels = self._labels, []
+        for label in labels:
+            label.close()
+
+    def leave(self) -> None:
+        """Leave all screens to others."""
+        self.hide_names()
+        self.beam.close()
 
     def _list(self, page: RigPage) -> None:
         beam = self.beam

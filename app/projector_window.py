@@ -90,6 +90,8 @@ class ProjectorWindow(QWidget):
         self.setWindowTitle("dsl-scan projector")
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
+        # The program ends with its main window, whatever is on the projector.
+        self.setAttribute(Qt.WidgetAttribute.WA_QuitOnClose, False)
         self.setCursor(Qt.CursorShape.BlankCursor)
         self._screen_id: ScreenId | None = None
         self._image: QImage | None = None
@@ -263,6 +265,7 @@ class ScreenLabel(QWidget):
         super().__init__(None, Qt.WindowType.ToolTip | Qt.WindowType.WindowStaysOnTopHint)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
+        self.setAttribute(Qt.WidgetAttribute.WA_QuitOnClose, False)
         self._text = text
         area = screen.geometry()
         self.setGeometry(area.x() + area.width() // 4, area.y() + area.height() // 3, area.width() // 2, 160)

@@ -6,7 +6,9 @@ import time
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
+from shiboken6 import isValid
 
 from app.application import make_window
 from app.composition import Composition, Wish
@@ -97,3 +99,36 @@ def test_the_program_says_how_it_is_called() -> None:
     done = subprocess.run([sys.executable, "-m", "app", "--help"], capture_output=True, text=True)
     assert done.returncode == 0
     assert "--rig" in done.stdout
+
+
+def test_nothing_stays_on_any_screen_when_the_window_closes(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    composition, window = composed
+    composition.rig(window)
+    screens = composition._screens
+    assert screens is not None
+    screens.beam.show()
+    screens.identify()
+    (name,) = screens._labels
+    for shown in (screens.beam, name):
+        assert not shown.testAttribute(Qt.WidgetAttribute.WA_QuitOnClose)
+    monkeypatch.setattr(window, "_may_stop", lambda: False)
+    assert not window.close()
+    assert screens.beam.isVisible()
+    assert name.isVisible()
+    monkeypatch.undo()
+    assert window.close()
+    assert not screens.beam.isVisible()
+    assert not screens._labels
+
+
+def test_names_of_screens_leave_before_a_scan(composed: tuple[Composition, MainWindow]) -> None:
+    composition, window = composed
+    state, screens = composition.rig(window).state, composition._screens
+    assert screens is not None
+    screens.identify()
+    (name,) = screens._labels
+    state.used_by.set("Scan first")
+    assert not screens._labels
+    assert not isValid(name) or not name.isVisible()
