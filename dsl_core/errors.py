@@ -13,6 +13,10 @@ class DeviceError(DslError):
     """A camera, projector, stage or spectroradiometer did not do what it was asked."""
 
 
+class DriftError(DeviceError):
+    """Every device answers, but scene, rig or light are not as they were when a scan stopped."""
+
+
 class CalibrationError(DslError):
     """A calibration is missing, damaged, or does not belong to the data at hand."""
 

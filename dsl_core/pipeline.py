@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.errors import CalibrationError, DeviceError
+from dsl_core.errors import CalibrationError, DriftError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.rig import Rig
@@ -106,12 +106,12 @@ def scan(
 def resume(
     rig: DeviceRig, folder: Path, progress: Progress | None = None, check_drift: bool = True
 ) -> Status:
-    """Go on with a session after a look at whether anything moved; raises `DeviceError` if it did."""
+    """Go on with a session after a look at whether anything moved; raises `DriftError` if it did."""
     return scan(rig, prepare_resume(rig, folder, check_drift), folder, progress)
 
 
 def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> CapturePlan:
-    """The plan of a session to go on with; raises `DeviceError` if anything moved since it stopped.
+    """The plan of a session to go on with; raises `DriftError` if anything moved since it stopped.
 
     The session's own calibration counts, whatever the rig says of itself now.
     """
@@ -126,7 +126,7 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> Ca
     if check_drift and done and missing:
         report = drift.check_drift(rig, reader, drift.pick_reference_shots(done), pattern_image)
         if not report.is_stable:
-            raise DeviceError(report.message)
+            raise DriftError(report.message)
     return reader.plan
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -18,6 +19,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import PictureKind, trial_picture
 from dsl_core.progress import Progress
 
+_log = logging.getLogger(__name__)
 #: What only one job may use at a time.
 RIG = "the rig"
 DISCONNECT = "Disconnect"
@@ -53,6 +55,36 @@ class RigController:
 
     def connect(self, choice: RigChoice) -> None:
         """Open a rig by name, closing the one at hand; while something else uses that, all stays as it is."""
+        self._open(choice, lambda devices: None, self._connected, self._refused, self._tell_refused)
+
+    def reconnect(
+        self, choice: RigChoice, done: Callable[[], object], failed: Callable[[str], object]
+    ) -> None:
+        """Open a lost rig again and see that it answers; else it stays lost, and ``failed`` is told why."""
+
+        def connected(devices: DeviceRig) -> None:
+            self._connected(devices)
+            done()
+
+        def still_lost(error: Exception) -> None:
+            self.lose(str(error))
+            failed(str(error))
+
+        self._open(choice, require_answers, connected, still_lost, failed)
+
+    def lose(self, reason: str) -> None:
+        """Say that a device does not answer any more."""
+        self.state.link.set(Link.LOST)
+        self.state.trouble.set(reason)
+
+    def _open(
+        self,
+        choice: RigChoice,
+        check: Callable[[DeviceRig], object],
+        done: Callable[[DeviceRig], object],
+        failed: Callable[[Exception], object],
+        refused: Callable[[str], object],
+    ) -> None:
         state = self.state
         if state.link.value is Link.OPENING:
             return
@@ -62,9 +94,14 @@ class RigController:
             from dsl_core.devices.registry import open_rig
 
             if old is not None:
-                old.close()
+                close_quietly(old)
             devices = open_rig(choice.name, dict(choice.options))
             devices.projector = self._wrap(devices.projector)
+            try:
+                check(devices)
+            except BaseException:
+                close_quietly(devices)
+                raise
             return devices
 
         def accepted() -> None:
@@ -76,19 +113,19 @@ class RigController:
         def cancelled() -> None:
             # Only before it began: the devices are as they were.
             state.devices.set(old)
-            state.link.set(link)
+            not_now(f"{title} was cancelled before it began.")
 
-        def refused(text: str) -> None:
+        def not_now(text: str) -> None:
             if state.link.value is Link.OPENING:
                 state.link.set(link)
-            self._tell_refused(text)
+            refused(text)
 
         if self._live_job is not None:
             # Nobody asks twice while the live view stops.
             state.link.set(Link.OPENING)
         title = f"Connect {choice.name}"
-        job = Job(title, work, self._connected, self._refused, cancelled, exclusive=RIG, is_minor=True)
-        self.run(job, refused, accepted)
+        job = Job(title, work, done, failed, cancelled, exclusive=RIG, is_minor=True)
+        self.run(job, not_now, accepted)
 
     def disconnect(self) -> None:
         """Close the devices, unless something else uses them."""
@@ -193,8 +230,7 @@ class RigController:
             self.run(job, refused, accepted)
 
     def _live_failed(self, error: Exception) -> None:
-        self.state.link.set(Link.LOST)
-        self.state.trouble.set(str(error))
+        self.lose(str(error))
         self._notifier.tell("error", f"The live view stopped: {error}")
         self._live_ended()
 
@@ -266,3 +302,21 @@ class RigController:
             low, high = camera.exposure_range_ms
             exposure_ms = min(max(exposure_ms, low), high)
         self.state.exposure_ms.set(exposure_ms)
+
+
+def require_answers(devices: DeviceRig) -> None:
+    """Show black and take a frame; raises `DeviceError` when a device was opened but is not there."""
+    import numpy as np
+
+    info, camera = devices.projector.info, devices.camera
+    devices.projector.show(np.zeros((info.height_px, info.width_px), np.uint8))
+    camera.configure(camera.info.exposure_range_ms[0])
+    camera.snap()
+
+
+def close_quietly(devices: DeviceRig) -> None:
+    """Let devices go; lost ones may fail even in that, which must keep nobody from opening others."""
+    try:
+        devices.close()
+    except Exception as error:
+        _log.warning("the devices of %s did not close well: %s", devices.name, error)

@@ -8,18 +8,20 @@ from datetime import datetime
 from pathlib import Path
 
 from app.controllers.known_files import Kind, kind_of
+from app.controllers.rescue import Rescuer
 from app.controllers.rig import RIG, RigController
 from app.controllers.scan_facts import sentence_of
 from app.controllers.scan_job import Order, ScanJob
 from app.controllers.scan_plan import ScanPlanController
 from app.controllers.scan_words import fresh_target, rig_words, scan_command
 from app.jobs.base import Job, JobRunner, JobState
-from app.state.scan import Interrupted, Phase, ScanState
+from app.state.rig import Link
+from app.state.scan import Interrupted, Phase, Rescue, ScanState
 from app.state.undo import UndoStack
 from app.views import Notifier
 from dsl_core.capture.status import State, Status
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DslError
+from dsl_core.errors import DeviceError, DriftError, DslError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.origin import rig_notes
 from dsl_core.progress import Progress
@@ -53,6 +55,7 @@ class ScanController:
         self.plans = ScanPlanController(
             state, rig.state, runner, notifier, undo, library or CalibrationLibrary()
         )
+        self._rescuer = Rescuer(state, rig, notifier, self.start)
         self._scan: ScanJob | None = None
         self._job: Job[Status] | None = None
 
@@ -84,6 +87,7 @@ class ScanController:
             check_drift=state.check_drift.value,
         )
         self._scan = scan = ScanJob(order)
+        self._rescuer.forget()
         for text in (state.trouble, state.note):
             text.set("")
         state.phase.set(Phase.STARTING)
@@ -98,6 +102,17 @@ class ScanController:
         scan.token = self._job.token
         if not self._rig.run(self._job):
             self._ended(Phase.PLANNING)
+
+    def resume(self) -> None:
+        """Go on with the interrupted scan; a rig that was lost is connected before."""
+        if self.state.rescue.value is Rescue.NONE or self._rig.state.link.value is Link.OPEN:
+            self.start()
+        else:
+            self._rescuer.try_now()
+
+    def stop_reconnecting(self) -> None:
+        """Leave a rig that was lost to the person at the window."""
+        self._rescuer.stop()
 
     def pause(self) -> None:
         """Wait before the next frame."""
@@ -117,6 +132,7 @@ class ScanController:
 
     def take_news(self) -> None:
         """Hand what the job told since last time to who follows; called by the window's clock."""
+        self._rescuer.take_news()
         scan = self._scan
         if scan is None:
             return
@@ -165,8 +181,12 @@ class ScanController:
         self._offer_again(folder)
         session = self.state.interrupted.value
         safe = f" {session.done} of {session.total} frames are safe in {folder}." if session else ""
-        self.state.trouble.set(f"The scan stopped: {sentence_of(error)}{safe}")
+        story = f"The scan stopped: {sentence_of(error)}{safe}"
+        self.state.trouble.set(story)
         self._notifier.tell("error", f"The scan {folder.name} was interrupted. The Scan page says why.")
+        if isinstance(error, DeviceError) and not isinstance(error, DriftError):
+            self._rig.lose(sentence_of(error))
+            self._rescuer.begin(story)
 
     def _cancelled(self) -> None:
         self._offer_again(self._end(Phase.STOPPED))
@@ -247,10 +267,15 @@ class ScanController:
             self._notifier.tell("info", _BUSY)
             return True
         try:
-            return self._remember(path)
+            is_taken = self._remember(path)
         except DslError as error:
             self._notifier.tell("error", str(error))
             return True
+        if is_taken:
+            # What was said of another scan does not count for this one.
+            self._rescuer.forget()
+            self.state.trouble.set("")
+        return is_taken
 
     def _remember(self, folder: Path) -> bool:
         """Offer to go on with a session that lacks frames; False when there is nothing to go on with."""
@@ -275,6 +300,7 @@ class ScanController:
         """Plan a new scan; the interrupted one stays on disk."""
         if self.state.phase.value.is_busy:
             return
+        self._rescuer.forget()
         self.state.interrupted.set(None)
         self.state.check_drift.set(True)
         self.state.phase.set(Phase.PLANNING)
@@ -302,4 +328,5 @@ class ScanController:
     def close(self) -> None:
         """Follow the rig no more."""
         self._stop_following()
+        self._rescuer.close()
         self.plans.close()

@@ -50,6 +50,12 @@ class ScanCommands(Protocol):
     def start(self) -> None:
         """Start, or go on with the interrupted session."""
 
+    def resume(self) -> None:
+        """Go on with the interrupted session, connecting a rig before that was lost."""
+
+    def stop_reconnecting(self) -> None:
+        """Connect a rig no more that was lost."""
+
     def pause(self) -> None:
         """Wait before the next frame."""
 

@@ -25,7 +25,7 @@ from app.panels.scan_commands import ScanCommands
 from app.panels.scan_run import CalibrationBox, RunBox, TargetBox
 from app.panels.scan_view import ScanView
 from app.state.effects import EffectsState
-from app.state.scan import Phase, ScanState
+from app.state.scan import Phase, Rescue, ScanState
 from app.theme import Theme
 from app.widgets.banner import Banner
 from app.widgets.help_window import set_help
@@ -35,6 +35,8 @@ from app.widgets.page import PageWidget
 #: How often news of the scan is fetched, ms: ten pictures a second look alive.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX = 276, 292
+RESUME = "Go on at the next missing frame, after a look at whether anything moved"
+RECONNECT = "Open the rig again, and go on at the next missing frame after a look at whether anything moved"
 PLANS = "Plans and pattern sets (*.json)"
 
 
@@ -53,9 +55,8 @@ class ScanPage(PageWidget):
         super().__init__()
         self._state, self._commands, self._open_result = state, commands, open_result
         self.banner = Banner("Resume")
-        self.banner.action.setToolTip(
-            "Go on at the next missing frame, after a look at whether anything moved"
-        )
+        self.stop = self.banner.add_button("Stop trying")
+        self.stop.setToolTip("Connect the rig no more by itself; everything stored stays")
         self.plan = PlanEditor()
         self.plan.setObjectName("scan-plan")
         for box in (self.plan.preset, self.plan.code, self.plan.patterns):
@@ -107,7 +108,8 @@ class ScanPage(PageWidget):
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands
-        self.banner.action.clicked.connect(commands.start)
+        self.banner.action.clicked.connect(commands.resume)
+        self.stop.clicked.connect(commands.stop_reconnecting)
         self.plan.preset_chosen.connect(commands.plans.choose_preset)
         self.plan.plan_changed.connect(self._change_plan)
         self.plan.open_wanted.connect(self._open_plan)
@@ -121,6 +123,7 @@ class ScanPage(PageWidget):
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.phase.follow(self._show_phase),
             state.trouble.follow(self.banner.say),
+            state.rescue.follow(self._show_rescue),
             state.result.connect(self._show_result),
             self._rendered.offered.follow(self._offer_effects),
         ]
@@ -154,7 +157,18 @@ class ScanPage(PageWidget):
         self.forecast.fix(fixed)
         if phase is Phase.STARTING:
             self.middle.setCurrentWidget(self.view)
-        if phase.is_busy:
+        self._keep_time()
+
+    def _show_rescue(self, rescue: Rescue) -> None:
+        self.banner.action.setText("Reconnect and resume" if rescue.is_away else "Resume")
+        self.banner.action.setToolTip(RECONNECT if rescue.is_away else RESUME)
+        self.banner.action.setEnabled(rescue is not Rescue.RESUMING)
+        self.stop.setVisible(rescue.is_trying)
+        self._keep_time()
+
+    def _keep_time(self) -> None:
+        """Fetch news while there may be some."""
+        if self._state.phase.value.is_busy or self._state.rescue.value.is_trying:
             self._timer.start()
         else:
             self._timer.stop()

@@ -36,6 +36,26 @@ class Phase(Enum):
         return self in (Phase.STARTING, Phase.RUNNING, Phase.PAUSED, Phase.STOPPING)
 
 
+class Rescue(Enum):
+    """What becomes of a rig that was lost during a scan; the scan waits for a person unless `RESUMING`."""
+
+    NONE = "nothing was lost"
+    TRYING = "connecting again"
+    RESUMING = "connecting again to go on with the scan"
+    GIVEN_UP = "not there"
+    BACK = "connected again"
+
+    @property
+    def is_trying(self) -> bool:
+        """Whether the rig is being connected again."""
+        return self in (Rescue.TRYING, Rescue.RESUMING)
+
+    @property
+    def is_away(self) -> bool:
+        """Whether the rig must be connected before the scan goes on."""
+        return self.is_trying or self is Rescue.GIVEN_UP
+
+
 @dataclass(frozen=True)
 class CalibrationChoice:
     """A calibration to scan with: ``key`` is its name in the library, empty for the rig's own."""
@@ -90,7 +110,8 @@ class ScanState:
     """Values that the scan's controller sets and the page follows.
 
     ``trouble`` is a sentence on what interrupted the scan (empty: nothing), ``note`` one on what became of
-    it. ``plan_file`` holds the plan at hand, where it was saved or opened and is still the same.
+    it. ``rescue`` is what becomes of the rig where a lost device was it. ``plan_file`` holds the plan at
+    hand, where it was saved or opened and is still the same.
     ``check_drift`` compares two old frames before an interrupted scan goes on. ``period_ms`` is the LED cycle
     of the rig's projector. ``result`` fires with each new result.
     """
@@ -111,6 +132,7 @@ class ScanState:
         self.phase = Value(Phase.PLANNING)
         self.status = Value(Status(State.IDLE))
         self.trouble = Value("")
+        self.rescue = Value(Rescue.NONE)
         self.note = Value("")
         self.picture: Value[LivePicture | None] = Value(None)
         self.cursor: Value[tuple[int, int] | None] = Value(None)

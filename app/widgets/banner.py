@@ -17,11 +17,17 @@ class Banner(QFrame):
         self._text.setTextFormat(Qt.TextFormat.PlainText)
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.action = QPushButton(action)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(12, 8, 8, 8)
-        row.addWidget(self._text, 1)
-        row.addWidget(self.action)
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(12, 8, 8, 8)
+        self._row.addWidget(self._text, 1)
+        self._row.addWidget(self.action)
         self.say("")
+
+    def add_button(self, text: str) -> QPushButton:
+        """Another button, after ``action``."""
+        button = QPushButton(text)
+        self._row.addWidget(button)
+        return button
 
     @property
     def text(self) -> str:

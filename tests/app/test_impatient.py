@@ -180,7 +180,8 @@ def test_a_projector_that_is_pulled_out_interrupts_and_its_scan_goes_on(bench: B
     QTest.mouseClick(page.run.start, _LEFT)
     bench.wait(lambda: state.phase.value is Phase.LOST)
     assert "frames are safe" in page.banner.text
-    rig.devices.set(whole)
+    bench.wait(lambda: rig.link.value is Link.OPEN)
+    assert page.banner.text.endswith("The rig is connected again.")
     QTest.mouseClick(page.banner.action, _LEFT)
     bench.wait(lambda: state.phase.value is Phase.DONE)
     assert not page.banner.isVisible()

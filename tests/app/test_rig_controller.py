@@ -298,3 +298,46 @@ def test_a_change_that_is_cancelled_before_it_begins_changes_nothing(qtbot: QtBo
         qtbot.waitUntil(busy.is_idle)
         busy.gate.clear()
         assert (state.link.value, state.devices.value, busy.closed) == (Link.OPEN, devices, [])
+
+
+def test_a_lost_rig_that_does_not_answer_is_closed_again_and_stays_lost(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig, notifier = controller()
+    rig.connect(TWIN)
+    rig.lose("The camera sent no frame.")
+    assert (rig.state.link.value, rig.state.trouble.value) == (Link.LOST, "The camera sent no frame.")
+    closed: list[DeviceRig] = []
+    done: list[str] = []
+
+    def close(devices: DeviceRig) -> None:
+        closed.append(devices)
+        raise DeviceError("The camera cannot be reached.")
+
+    def gone(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        raise DeviceError("Check its cable.")
+
+    monkeypatch.setattr(DeviceRig, "close", close)
+    with monkeypatch.context() as away:
+        away.setattr(SimCamera, "snap", gone)
+        rig.reconnect(TWIN, lambda: done.append("there"), done.append)
+    assert (rig.state.link.value, rig.state.devices.value) == (Link.LOST, None)
+    # The one that was lost, and the one that was opened and did not answer.
+    assert len(closed) == 2
+    assert closed[0] is not closed[1]
+    rig.reconnect(TWIN, lambda: done.append("there"), done.append)
+    assert done == ["Check its cable.", "there"]
+    assert (rig.state.link.value, rig.state.trouble.value) == (Link.OPEN, "")
+    assert not notifier.told
+
+
+def test_devices_that_do_not_close_keep_nobody_from_another_rig(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, _ = controller()
+    rig.connect(TWIN)
+
+    def close(devices: DeviceRig) -> None:
+        raise DeviceError("The camera cannot be reached.")
+
+    monkeypatch.setattr(DeviceRig, "close", close)
+    rig.connect(TWIN)
+    assert rig.state.link.value is Link.OPEN

@@ -2,12 +2,15 @@ from __future__ import annotations
 
 import shutil
 from collections import namedtuple
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
+from app.controllers.rescue import ATTEMPTS, RETRY_S
 from app.controllers.scan_plan import connect_first
-from app.state.scan import CalibrationChoice, Phase
+from app.state.rig import Link
+from app.state.scan import CalibrationChoice, Phase, Rescue
 from dsl_core import sessions
 from dsl_core.cli.options import PlanChoice
 from dsl_core.errors import Cancelled, DecodeError, DeviceError, DslError, StoreError
@@ -172,10 +175,14 @@ def test_a_scene_that_moved_meanwhile_is_refused(
     with monkeypatch.context() as lost:
         fail_from(lost, 30)
         bench.scans.start()
+    told = len(bench.notifier.told)
     bench.rig.connect(TWIN.__class__("twin", (("scene", "box"), ("size", "64x48"))))
     bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "changed since the scan stopped" in bench.state.trouble.value
+    # Its devices answer, and connecting them again would move nothing back.
+    assert (bench.rig.state.link.value, bench.state.rescue.value) == (Link.OPEN, Rescue.NONE)
+    assert len(bench.notifier.told) == told + 1
     assert "--no-drift-check" not in bench.scans.command_line()
     # Who knows better goes on all the same.
     bench.state.check_drift.set(False)
@@ -345,6 +352,129 @@ def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
         bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "The disk is full" in bench.state.trouble.value
+    assert (bench.rig.state.link.value, bench.state.rescue.value) == (Link.OPEN, Rescue.NONE)
     assert f"20 of {FRAMES} frames are safe" in bench.state.trouble.value
     bench.scans.start()
     assert SessionReader(tmp_path / "first.dsl").missing() == []
+
+
+@dataclass
+class Outage:
+    """A scan whose camera is gone after two frames, and stays so until it is plugged in."""
+
+    bench: ScanBench
+    now_s: float = 0.0
+    is_gone: bool = True
+    links: list[Link] = field(default_factory=list)
+
+    @property
+    def rescue(self) -> Rescue:
+        return self.bench.state.rescue.value
+
+    @property
+    def link(self) -> Link:
+        return self.bench.rig.state.link.value
+
+    @property
+    def told(self) -> str:
+        return self.bench.state.trouble.value
+
+    def wait(self, seconds: float) -> None:
+        self.now_s += seconds
+        self.bench.scans.take_news()
+
+
+@pytest.fixture
+def outage(bench: ScanBench, monkeypatch: pytest.MonkeyPatch) -> Outage:
+    made, snap = Outage(bench), SimCamera.snap
+
+    def failing(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        if made.is_gone and not 0 <= self._shot < 2:
+            raise DeviceError("The camera sent no frame. Check its cable.")
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", failing)
+    monkeypatch.setattr(bench.scans._rescuer, "_clock", lambda: made.now_s)
+    bench.rig.state.link.changed.connect(made.links.append)
+    bench.scans.start()
+    return made
+
+
+def test_a_lost_rig_is_connected_again_a_few_times_and_no_more(outage: Outage) -> None:
+    bench = outage.bench
+    devices = bench.rig.state.devices
+    assert outage.links == [Link.LOST, Link.OPENING, Link.LOST]
+    assert (outage.rescue, devices.value) == (Rescue.TRYING, None)
+    assert "Check its cable" in bench.rig.state.trouble.value
+    assert outage.told.endswith(f"Connecting the rig again, attempt 1 of {ATTEMPTS}.")
+    outage.wait(RETRY_S / 2)
+    assert "attempt 1" in outage.told
+    for attempt in range(2, ATTEMPTS + 1):
+        outage.wait(RETRY_S)
+        assert (outage.link, f"attempt {attempt} of" in outage.told) == (Link.LOST, attempt < ATTEMPTS)
+    assert outage.rescue is Rescue.GIVEN_UP
+    assert outage.told.endswith("could not be connected again: The camera sent no frame. Check its cable.")
+    assert [level for level, _ in bench.notifier.told] == ["error", "error"]
+    outage.is_gone = False
+    outage.wait(10 * RETRY_S)
+    assert outage.rescue is Rescue.GIVEN_UP
+    bench.scans.resume()
+    assert (phase(bench), outage.rescue, outage.link) == (Phase.DONE, Rescue.NONE, Link.OPEN)
+
+
+def test_a_rig_that_comes_back_goes_on_only_when_asked(outage: Outage) -> None:
+    bench = outage.bench
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (phase(bench), outage.rescue, outage.link) == (Phase.LOST, Rescue.BACK, Link.OPEN)
+    assert f"2 of {FRAMES} frames are safe" in outage.told
+    assert outage.told.endswith("The rig is connected again.")
+    bench.scans.resume()
+    assert (phase(bench), outage.told) == (Phase.DONE, "")
+
+
+def test_who_wishes_so_finds_the_scan_gone_on(outage: Outage) -> None:
+    bench = outage.bench
+    bench.scans.resume()
+    assert outage.rescue is Rescue.RESUMING
+    assert "attempt 2 of" in outage.told
+    assert outage.told.endswith("The scan goes on by itself when it answers.")
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert phase(bench) is Phase.DONE
+    assert ("info", "The rig is connected again. The scan goes on.") in bench.notifier.told
+
+
+def test_no_attempt_follows_a_stop(outage: Outage) -> None:
+    outage.bench.scans.stop_reconnecting()
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (outage.rescue, outage.link) == (Rescue.GIVEN_UP, Link.LOST)
+    assert outage.told.endswith("The rig is no longer being connected.")
+
+
+def test_a_rig_that_a_person_connects_is_back_too(outage: Outage) -> None:
+    outage.bench.scans.resume()
+    outage.is_gone = False
+    outage.bench.rig.connect(TWIN)
+    # It may be another rig than the one that was wished for.
+    assert (phase(outage.bench), outage.rescue) == (Phase.LOST, Rescue.BACK)
+
+
+def test_a_rig_is_not_connected_again_for_a_scan_that_was_left(outage: Outage) -> None:
+    outage.bench.scans.leave_session()
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (outage.rescue, outage.link, outage.told) == (Rescue.NONE, Link.LOST, "")
+
+
+def test_another_scan_that_is_opened_does_not_go_on_by_itself(outage: Outage, tmp_path: Path) -> None:
+    bench = outage.bench
+    shutil.copytree(tmp_path / "first.dsl", tmp_path / "other.dsl")
+    bench.scans.resume()
+    assert not bench.scans.open(tmp_path)
+    assert outage.rescue is Rescue.RESUMING
+    assert bench.scans.open(tmp_path / "other.dsl")
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (phase(bench), outage.rescue, outage.told) == (Phase.LOST, Rescue.NONE, "")

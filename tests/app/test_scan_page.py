@@ -11,6 +11,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
+from app.controllers import rescue
 from app.controllers.effects import EffectsController
 from app.controllers.forecast import ForecastController
 from app.jobs.qt_runner import QtRunner
@@ -19,6 +20,7 @@ from app.panels.scan_page import ScanPage
 from app.panels.scan_view import FramePicture
 from app.state.effects import EffectsState
 from app.state.forecast import ForecastState
+from app.state.rig import Link
 from app.state.scan import LivePicture, Phase
 from app.theme import LIGHT
 from dsl_core.errors import DeviceError
@@ -127,6 +129,8 @@ def test_a_lost_camera_is_said_over_the_page(
     qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page, bench, _ = ready
+    monkeypatch.setattr(rescue, "RETRY_S", 0.0)
+    monkeypatch.setattr(rescue, "ATTEMPTS", 1000)
 
     def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
         raise DeviceError("The camera sent no frame. Check its cable.")
@@ -135,9 +139,18 @@ def test_a_lost_camera_is_said_over_the_page(
         lost.setattr(SimCamera, "snap", silent)
         click(page.run.start)
         qtbot.waitUntil(in_phase(bench, Phase.LOST), timeout=60_000)
-    assert page.banner.isVisible()
-    assert "Check its cable" in page.banner.text
+        assert page.banner.isVisible()
+        assert "Check its cable" in page.banner.text
+        # The page itself makes one attempt after another.
+        qtbot.waitUntil(lambda: "attempt 1 of" not in page.banner.text, timeout=60_000)
+        assert page.banner.action.text() == "Reconnect and resume"
+        assert page.stop.isVisible()
+        click(page.stop)
+        assert not page.stop.isVisible()
+        assert "no longer" in page.banner.text
+        qtbot.waitUntil(lambda: bench.rig.state.link.value is Link.LOST)
     click(page.banner.action)
+    assert not page.banner.action.isEnabled()
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert not page.banner.isVisible()
 
