@@ -49,7 +49,7 @@ def reconstruct(
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.result_file import save_result
+    from dsl_core.io.result_file import RESULT_FOLDER, save_result
     from dsl_core.io.staging import check_targets
     from dsl_core.pipeline import Options
     from dsl_core.sessions import reconstruct_session
@@ -58,7 +58,7 @@ def reconstruct(
     if model not in MODELS:
         raise PlanError(f"--model must be one of {', '.join(MODELS)}, not {model!r}.")
     grid = parse_bands(bands)
-    check_targets([target], overwrite=force)
+    check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
     options = Options(grid, model, refine, not depth_only, _torch_device(device))
     with output.progress() as progress:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io.folder_kind import FolderKind
 from dsl_core.io.staging import staged
 from dsl_core.model.result import SCHEMA_VERSION
 
@@ -49,13 +50,13 @@ _INTEGERS: dict[str, type[np.unsignedinteger[Any]]] = {"flags": np.uint16, "reac
 def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> Path:
     """Store a result as a folder, whole or not at all, and return its path.
 
-    Raises `StoreError` when the folder exists already (unless ``overwrite``), the disk fails, or the
-    dataset is not a result of this version.
+    Raises `StoreError` when the folder exists already (unless ``overwrite``, and it is a result too), the
+    disk fails, or the dataset is not a result of this version.
     """
     _check_version(result.attrs.get("schema_version"), path)
     import zarr
 
-    with staged([path], overwrite=overwrite) as (draft,):
+    with staged([path], overwrite=overwrite, kind=RESULT_FOLDER) as (draft,):
         attributes = {key: _plain(value) for key, value in result.attrs.items()}
         labels = {str(n): c.values.tolist() for n, c in result.coords.items() if c.dtype.kind in "UO"}
         group = zarr.create_group(draft, zarr_format=3, attributes={**attributes, "labels": labels})
@@ -86,6 +87,29 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
         raise StoreError(
             f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames."
         ) from error
+
+
+def _node(path: Path) -> dict[str, Any]:
+    """What zarr says of a folder; nothing where it is none of zarr's, or cannot be read."""
+    try:
+        content = json.loads((path / "zarr.json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _is_result(folder: Path) -> bool:
+    """Whether a folder is a result, of whatever version."""
+    attributes = _node(folder).get("attributes")
+    return isinstance(attributes, dict) and "schema_version" in attributes
+
+
+def _is_of_result(entry: Path) -> bool:
+    return entry.name == "zarr.json" or _node(entry).get("node_type") == "array"
+
+
+#: What a result may replace.
+RESULT_FOLDER = FolderKind("a result", _is_result, _is_of_result)
 
 
 def _read_labels(path: Path) -> dict[str, list[str]]:

@@ -11,17 +11,20 @@ from pathlib import Path
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import PARTIAL_SUFFIX, store_error, sync_folder
+from dsl_core.io.folder_kind import FolderKind
 
 
 @contextmanager
-def staged(targets: Sequence[Path], *, overwrite: bool = False) -> Iterator[list[Path]]:
-    """Yield a private path for each target (files or folders, all in one folder).
+def staged(
+    targets: Sequence[Path], *, overwrite: bool = False, kind: FolderKind | None = None
+) -> Iterator[list[Path]]:
+    """Yield a private path for each target (all in one folder): files, or folders of a ``kind``.
 
     When the block ends well, what it wrote is synced and renamed onto the targets; when it fails, the targets
     are as before and nothing is left behind. Raises `StoreError` when a target exists and may not be
     replaced, when the folder cannot be used, or when the disk fails.
     """
-    check_targets(targets, overwrite=overwrite)
+    check_targets(targets, overwrite=overwrite, kind=kind)
     home = targets[0].parent
     room = home / f".{targets[0].name}.{uuid.uuid4().hex[:8]}{PARTIAL_SUFFIX}"
     try:
@@ -30,21 +33,42 @@ def staged(targets: Sequence[Path], *, overwrite: bool = False) -> Iterator[list
         yield drafts
         for draft in drafts:
             _sync_tree(draft)
+        # What lies there now may have come while the block was writing.
+        check_targets(targets, overwrite=overwrite, kind=kind)
         for draft, target in zip(drafts, targets, strict=True):
             _move_in(draft, target, room)
         sync_folder(home)
     except OSError as error:
         raise store_error(targets[0], error) from error
     finally:
-        shutil.rmtree(room, ignore_errors=True)
+        _clear(room, targets)
 
 
-def check_targets(targets: Sequence[Path], *, overwrite: bool) -> None:
-    """Raise `StoreError` when a target exists and may not be replaced; asked before long work too."""
+def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind | None = None) -> None:
+    """Raise `StoreError` when a target exists and may not be replaced; asked before long work too.
+
+    A file gives way to a file, a folder only to one of its own ``kind`` and with nothing else in it.
+    """
     taken = [target for target in targets if target.exists()]
+    for target in taken:
+        _require_form(target, kind)
     if taken and not overwrite:
         names = ", ".join(str(target) for target in taken)
         raise StoreError(f"{names} exists already. Choose another name, or allow it to be replaced.")
+    for target in taken:
+        if kind is not None and (why := kind.refusal(target)):
+            raise StoreError(
+                f"{target} {why} and is not replaced: {kind.name} gives way to another one, and nothing else"
+                " does. Choose another name."
+            )
+
+
+def _require_form(target: Path, kind: FolderKind | None) -> None:
+    """Raise `StoreError` when a folder stands where a file is wanted, or the reverse."""
+    if target.is_dir() and kind is None:
+        raise StoreError(f"{target} is a folder, where a file is to be written. Choose another name.")
+    if not target.is_dir() and kind is not None:
+        raise StoreError(f"{target} is a file, where {kind.name}, a folder, is to lie. Choose another name.")
 
 
 def _sync_tree(path: Path) -> None:
@@ -59,14 +83,29 @@ def _sync_tree(path: Path) -> None:
 
 
 def _move_in(draft: Path, target: Path, room: Path) -> None:
-    if not target.is_dir():
-        os.replace(draft, target)
-        return
-    # A folder cannot be replaced in one step; the old one steps aside and returns if the new one fails.
-    aside = room / (target.name + ".old")
-    os.replace(target, aside)
-    try:
-        os.replace(draft, target)
-    except OSError:
-        os.replace(aside, target)
-        raise
+    # A folder cannot be replaced in one step: the old one steps aside, and `_clear` says what becomes of it.
+    if target.is_dir():
+        os.replace(target, _aside(target, room))
+    os.replace(draft, target)
+
+
+def _clear(room: Path, targets: Sequence[Path]) -> None:
+    """Delete what is left over, after an old folder without a successor has come back to its place.
+
+    Raises `StoreError` that says where the old folder is when it cannot come back; then it stays there.
+    """
+    for target in targets:
+        aside = _aside(target, room)
+        if aside.exists() and not target.exists():
+            try:
+                os.replace(aside, target)
+            except OSError as error:
+                raise StoreError(
+                    f"{target} could not be replaced ({error.strerror or error})."
+                    f" The old one is kept as {aside}; move it back."
+                ) from error
+    shutil.rmtree(room, ignore_errors=True)
+
+
+def _aside(target: Path, room: Path) -> Path:
+    return room / (target.name + ".old")

@@ -268,6 +268,22 @@ def test_a_result_is_not_replaced_unasked(give: Give, finished: Path) -> None:
     assert (finished / "scan.zarr" / "zarr.json").stat().st_mtime_ns == before
 
 
+def test_force_replaces_no_scan_and_nobodys_folder(
+    give: Give, scan_copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dsl_core.sessions.reconstruct_session", lambda *_: 1 / 0)  # told before long work
+    onto_itself = give("reconstruct", scan_copy, "-o", scan_copy, "--force")
+    assert (onto_itself.code, "holds a scan and is not replaced" in onto_itself.sentence) == (2, True)
+    assert SessionReader(scan_copy).missing() == []
+    documents = tmp_path / "docs"
+    documents.mkdir()
+    (documents / "thesis.txt").write_text("years")
+    for command in (["reconstruct", scan_copy, "-o", documents], ["export", scan_copy, "dataset", documents]):
+        ending = give(*command, "--force")
+        assert (ending.code, "is not replaced" in ending.sentence) == (2, True)
+    assert (documents / "thesis.txt").read_text() == "years"
+
+
 def test_a_disk_that_is_too_small_is_told_before_the_scan(
     give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -9,6 +9,7 @@ are left-aligned in 16 bit in the files and right-aligned in ``bit_depth`` bits 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io.folder_kind import FolderKind
 from dsl_core.io.published.layout import (
     DEPTH_NAME,
+    FOLDERS,
     FileRecord,
     Place,
     Survey,
@@ -145,7 +148,7 @@ def export_dataset(
     """
     progress = progress or NoProgress()
     plan = source.plan
-    with staged([folder], overwrite=overwrite) as (draft,):
+    with staged([folder], overwrite=overwrite, kind=DATASET_FOLDER) as (draft,):
         for shot in plan.shots():
             progress.report("export", shot.index, plan.shot_count)
             target = draft / folder_name(shot.role, shot.setting) / file_name(shot.role, shot.pattern)
@@ -155,6 +158,19 @@ def export_dataset(
             np.save(draft / DEPTH_NAME, np.moveaxis(points_mm, 0, -1) / 1000, allow_pickle=False)
         names = sorted(file.relative_to(draft) for file in draft.rglob("*") if file.is_file())
     return [folder / name for name in names]
+
+
+def _is_dataset(folder: Path) -> bool:
+    return (folder / folder_name("spectral", 0)).is_dir()
+
+
+def _is_of_dataset(entry: Path) -> bool:
+    ours = "|".join(name.format(k=r"\d+") for name in FOLDERS.values())
+    return entry.name in {PLAN_NAME, DEPTH_NAME} or re.fullmatch(ours, entry.name) is not None
+
+
+#: What an exported dataset may replace.
+DATASET_FOLDER = FolderKind("a published dataset", _is_dataset, _is_of_dataset)
 
 
 def _write_rgb(mosaic: NDArray[np.uint16], path: Path, bayer: BayerPattern, bit_depth: int) -> None:

@@ -1,0 +1,232 @@
+"""Nothing gives way but what may: folders to their own kind, files to files, and nothing is lost between."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.published import export_dataset
+from dsl_core.io.result_file import RESULT_FOLDER, save_result
+from dsl_core.io.session import SessionReader
+from dsl_core.io.staging import staged
+from dsl_core.model.plan import CapturePlan, LineComb, Shot
+from tests.cases.small_result import small_result
+
+PLAN = CapturePlan(
+    camera_size_px=(10, 7),
+    projector_size_px=(16, 8),
+    spectral=LineComb(width_px=2, step_px=2, period_px=8),
+)
+
+
+class Grey:
+    """A scan of one value."""
+
+    plan = PLAN
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        return np.full((7, 10), 1000, np.uint16)
+
+
+def _save(path: Path) -> None:
+    save_result(small_result(), path, overwrite=True)
+
+
+def _export(path: Path) -> None:
+    export_dataset(Grey(), path, overwrite=True)
+
+
+def _tree(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder."""
+    files = (file for file in folder.rglob("*") if file.is_file())
+    return {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
+
+
+def _documents(path: Path) -> None:
+    path.mkdir()
+    # A plan of ours lies where somebody works, and does not make the folder ours.
+    (path / "plan.json").write_text(PLAN.model_dump_json())
+    (path / "thesis.txt").write_text("years")
+
+
+def _campaign(path: Path) -> None:
+    path.mkdir()
+    (path / "campaign.json").write_text("{}")
+
+
+def _result_with_notes(path: Path) -> None:
+    _save(path)
+    (path / "notes.txt").write_text("mine")
+
+
+def _result_around_a_scan(path: Path) -> None:
+    _save(path)
+    (path / "scan.dsl").mkdir()
+    (path / "scan.dsl" / "manifest.json").write_text("{}")
+
+
+def _results_together(path: Path) -> None:
+    _save(path)
+    _save(path / "second.zarr")
+
+
+def _dataset_with_notes(path: Path) -> None:
+    _export(path)
+    (path / "notes.txt").write_text("mine")
+
+
+@pytest.mark.parametrize("write", [_save, _export])
+def test_a_scan_is_never_replaced(session: Path, write: Callable[[Path], None]) -> None:
+    before = _tree(session)
+    with pytest.raises(StoreError, match=r"scan\.dsl holds a scan and is not replaced.*another name"):
+        write(session)
+    with pytest.raises(StoreError, match="is not replaced"):
+        write(session / "frames")
+    with pytest.raises(StoreError, match="is not replaced"):
+        write(session.parent)
+    assert _tree(session) == before
+    assert SessionReader(session).missing() == []
+
+
+@pytest.mark.parametrize(
+    ("lies_there", "write", "says"),
+    [
+        (_documents, _save, "is not a result"),
+        (_documents, _export, "is not a published dataset"),
+        (_campaign, _save, "holds the captures of a campaign"),
+        (_campaign, _export, "holds the captures of a campaign"),
+        (_save, _export, "is not a published dataset"),
+        (_export, _save, "is not a result"),
+        (_result_with_notes, _save, r"holds notes\.txt beside a result"),
+        (_result_around_a_scan, _save, r"holds scan\.dsl beside a result"),
+        (_results_together, _save, r"holds second\.zarr beside a result"),
+        (_dataset_with_notes, _export, r"holds notes\.txt beside a published dataset"),
+    ],
+)
+def test_a_folder_of_something_else_stays(
+    tmp_path: Path, lies_there: Callable[[Path], None], write: Callable[[Path], None], says: str
+) -> None:
+    path = tmp_path / "folder"
+    lies_there(path)
+    before = _tree(path)
+    with pytest.raises(StoreError, match=says + " and is not replaced"):
+        write(path)
+    assert _tree(path) == before
+
+
+@pytest.mark.parametrize("write", [_save, _export])
+def test_a_folder_of_its_own_kind_or_without_anything_gives_way(
+    tmp_path: Path, write: Callable[[Path], None]
+) -> None:
+    path = tmp_path / "folder"
+    path.mkdir()
+    (path / ".DS_Store").write_bytes(b"left by the system")
+    write(path)
+    written = _tree(path)
+    (path / ".DS_Store").write_bytes(b"left by the system")
+    write(path)
+    assert _tree(path).keys() == written.keys()
+    assert [each.name for each in tmp_path.iterdir()] == ["folder"]
+
+
+def test_a_file_gives_way_to_a_file_and_a_folder_to_a_folder(tmp_path: Path) -> None:
+    _documents(tmp_path / "docs")
+    before = _tree(tmp_path / "docs")
+    with (
+        pytest.raises(StoreError, match="docs is a folder, where a file is to be written"),
+        staged([tmp_path / "docs"], overwrite=True) as (draft,),
+    ):
+        draft.write_text("a page")
+    (tmp_path / "page.html").write_text("a page")
+    with pytest.raises(StoreError, match=r"page\.html is a file, where a result, a folder, is to lie"):
+        _save(tmp_path / "page.html")
+    assert _tree(tmp_path / "docs") == before
+    assert (tmp_path / "page.html").read_text() == "a page"
+
+
+def test_what_came_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "page.html"
+
+    def write_slowly() -> None:
+        with staged([path]) as (draft,):
+            draft.write_text("ours")
+            path.write_text("somebody's")
+
+    with pytest.raises(StoreError, match="exists already"):
+        write_slowly()
+    assert path.read_text() == "somebody's"
+    assert [each.name for each in tmp_path.iterdir()] == ["page.html"]
+
+
+def _replace(path: Path, content: str) -> None:
+    """Write the file by which a result is known; a real one renames within itself."""
+    with staged([path], overwrite=True, kind=RESULT_FOLDER) as (draft,):
+        draft.mkdir()
+        attributes = {"schema_version": 1, "content": content}
+        (draft / "zarr.json").write_text(json.dumps({"attributes": attributes}))
+
+
+def _interrupt_at(monkeypatch: pytest.MonkeyPatch, number: int, *, after: bool = False) -> None:
+    """Let Ctrl-C arrive at a rename, before or after it is done."""
+    real, count = os.replace, iter(range(1, 100))
+
+    def replace(source: Path, target: Path) -> None:
+        now = next(count)
+        if now != number or after:
+            real(source, target)
+        if now == number:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", replace)
+
+
+@pytest.mark.parametrize(("number", "after"), [(1, False), (1, True), (2, False)])
+def test_ctrl_c_between_the_renames_leaves_the_old_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, after: bool
+) -> None:
+    path = tmp_path / "r.zarr"
+    _replace(path, "old")
+    before = _tree(path)
+    _interrupt_at(monkeypatch, number, after=after)
+    with pytest.raises(KeyboardInterrupt):
+        _replace(path, "new")
+    assert _tree(path) == before
+    assert [each.name for each in tmp_path.iterdir()] == ["r.zarr"]
+
+
+def test_ctrl_c_after_the_renames_leaves_the_new_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.zarr"
+    _replace(path, "old")
+    _interrupt_at(monkeypatch, 2, after=True)
+    with pytest.raises(KeyboardInterrupt):
+        _replace(path, "new")
+    assert b'"new"' in _tree(path)["zarr.json"]
+    assert [each.name for each in tmp_path.iterdir()] == ["r.zarr"]
+
+
+def test_an_old_result_that_cannot_come_back_is_kept_aside(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.zarr"
+    _replace(path, "old")
+    before, real = _tree(path), os.replace
+
+    def one_way(source: Path, target: Path) -> None:
+        if target == path:
+            raise PermissionError(13, "Permission denied")
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", one_way)
+    with pytest.raises(StoreError, match=r"old one is kept as .*r\.zarr\.old; move it back"):
+        _replace(path, "new")
+    (kept,) = tmp_path.glob(".r.zarr.*/r.zarr.old")
+    assert _tree(kept) == before
