@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import csv
+import hashlib
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +68,27 @@ def test_ply_keeps_a_missing_band_as_nan_and_names_the_scan(tmp_path: Path) -> N
     assert "comment exported_by: dsl-scan" in header
 
 
+def test_ply_with_a_long_provenance_is_read_by_all(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    from vtkmodules.vtkIOPLY import vtkPLYReader
+
+    plan = json.dumps({"levels": [[0.125] * 3] * 6000})
+    effects = "words of what was rendered, " * 200
+    result = small_result().assign_attrs({"capture_plan": plan, "effects": effects, "a " * 300: "odd\nkey"})
+    (path,) = export_ply(result, tmp_path / "cloud.ply")
+    header = path.read_bytes().split(b"end_header")[0].decode("ascii")
+    assert max(map(len, header.splitlines())) <= 240
+    digest = hashlib.sha256(plan.encode()).hexdigest()[:16]
+    assert 'comment capture_plan: {"levels": [[0.125' in header
+    assert f"({len(plan)} characters, SHA-256 {digest}...; whole in the attributes of the result)" in header
+    reader = vtkPLYReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    lit = np.isfinite(result["depth_mm"].values)
+    assert reader.GetOutput().GetNumberOfPoints() == lit.sum()
+    np.testing.assert_array_equal(meshio.read(path).points.T, result["points_mm"].values[:, lit])
+
+
 def test_ply_of_depth_alone(tmp_path: Path) -> None:
     meshio = pytest.importorskip("meshio")
     (path,) = export_ply(small_result()[["points_mm"]], tmp_path / "cloud.ply")
@@ -112,7 +136,21 @@ def test_exr_in_openexr(tmp_path: Path) -> None:
         red = result["rgb"].values[0]
         np.testing.assert_allclose(channels["R"].pixels, linear_from_srgb(red), rtol=1e-6)
         assert header["spectralLayoutVersion"] == "1.0"
-        assert header["scan_id"] == "2026-05-04-chart"
+        assert header["dsl_scan_id"] == "2026-05-04-chart"
+
+
+def test_exr_keeps_its_own_names_to_itself(tmp_path: Path) -> None:
+    import OpenEXR
+
+    own = {"version": "0.1.0", "type": "plane", "channels": "many", "chunkCount": 3, "name": "chart"}
+    (path,) = export_exr(small_result().assign_attrs(own), tmp_path / "cube.exr")
+    # The header's first bytes hold the number of the format; a string of the same name is not to be there.
+    assert re.search(rb"(?<![a-z_])version\0string", path.read_bytes()) is None
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        header = file.header()
+        assert {key: header[f"dsl_{key}"] for key in own} == {key: str(value) for key, value in own.items()}
+        assert header["type"] == OpenEXR.scanlineimage
+        assert len(file.channels()) == len(WAVELENGTHS_NM) + 4
 
 
 def test_linear_light_of_srgb() -> None:

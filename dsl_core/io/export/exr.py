@@ -3,6 +3,7 @@
 Layout: A. Fichet, R. Pacanowski, A. Wilkie, An OpenEXR Layout for Spectral Images, JCGT 10(3), 2021. The
 decimal comma is theirs, since a dot separates layers; ``T`` is a reflective or transmissive quantity. All
 channels are float32, so NaN stays NaN. The preview is linear, as OpenEXR expects, and ``Z`` is in mm.
+Attributes ``dsl_...`` say where the data come from.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Begins the names of attributes that say where the data come from.
+_PREFIX = "dsl_"
 
 
 def channel_name(wavelength_nm: float) -> str:
@@ -52,7 +56,8 @@ def export_exr(
         check()
         channels["Z"] = np.ascontiguousarray(plane(result, "depth_mm"))
     header: dict[str, Any] = {
-        **provenance(result),
+        # OpenEXR has names of its own, ``version`` and ``type`` among them, with meanings and types.
+        **{f"{_PREFIX}{key}": value for key, value in provenance(result).items()},
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "spectralLayoutVersion": "1.0",

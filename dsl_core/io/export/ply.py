@@ -7,6 +7,7 @@ colour without an answer is black (``uchar`` has no NaN).
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,9 @@ from dsl_core.solve.many import Check, never
 if TYPE_CHECKING:
     import xarray as xr
 
+#: Readers built on rply (CloudCompare, Open3D) refuse lines of 1,024 characters, VTK reads no points after
+#: long ones; no reader is known to refuse this length.
+_LONGEST_LINE = 240
 _PLY_NAMES = {"<f4": "float", "|u1": "uchar"}
 
 
@@ -72,8 +76,18 @@ def _header(table: NDArray[Any], comments: dict[str, str]) -> bytes:
         "format binary_little_endian 1.0",
         "comment unit mm, camera frame: x right, y down, z forward",
     ]
-    lines += [f"comment {ascii_text(key)}: {ascii_text(value)}" for key, value in comments.items()]
+    lines += [_comment(key, value) for key, value in comments.items()]
     lines.append(f"element vertex {len(table)}")
     assert table.dtype.names is not None
     lines += [f"property {_PLY_NAMES[table.dtype[name].str]} {name}" for name in table.dtype.names]
     return ("\n".join([*lines, "end_header"]) + "\n").encode("ascii")
+
+
+def _comment(key: str, value: str) -> str:
+    """A line of the header; of a long value its beginning, and how to find and recognise the whole."""
+    line = ascii_text(" ".join(f"comment {key}: {value}".split()))
+    if len(line) <= _LONGEST_LINE:
+        return line
+    digest = hashlib.sha256(value.encode()).hexdigest()[:16]
+    rest = f" ... ({len(value)} characters, SHA-256 {digest}...; whole in the attributes of the result)"
+    return line[: _LONGEST_LINE - len(rest)] + rest
