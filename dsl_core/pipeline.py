@@ -121,9 +121,9 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> Ca
 
     reader = SessionReader(folder)
     rig.calibration = reader.calibration or rig.calibration
-    missing = {shot.index for shot in reader.missing()}
-    done = [shot for shot in reader.plan.shots() if shot.index not in missing]
-    if check_drift and done and missing:
+    sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
+    done = [shot for shot in reader.plan.shots() if shot.index in sound]
+    if check_drift and 0 < len(done) < reader.plan.shot_count:
         report = drift.check_drift(rig, reader, drift.pick_reference_shots(done), pattern_image)
         if not report.is_stable:
             raise DriftError(report.message)

@@ -88,8 +88,8 @@ class ScanJob:
         from dsl_core.io.session import SessionReader
 
         reader = SessionReader(self.order.folder)
-        missing = {shot.index for shot in reader.missing()}
-        there = [s for s in reader.plan.shots() if s.role == "spectral" and s.index not in missing]
+        sound = reader.sound()
+        there = [s for s in reader.plan.shots() if s.role == "spectral" and s.index in sound]
         for done, shot in enumerate(there):
             progress.report("read what is there", done, len(there))
             graphs.add(shot, reader.read(shot))

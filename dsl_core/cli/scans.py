@@ -126,7 +126,7 @@ def scan(
         _state(output, fitted, target, devices)
         with output.progress() as progress, _resumable(target):
             status = pipeline.scan(devices, fitted, target, progress, notes)
-    _done(output, target, status.done, status.elapsed_s)
+    _done(output, target, status.total, status.elapsed_s)
 
 
 def resume(
@@ -141,15 +141,25 @@ def resume(
     """Go on with a scan that was stopped, or killed, at its next missing frame."""
     from dsl_core import pipeline, sessions
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io.session import SessionReader
 
     output = Output(json)
-    missing = len(SessionReader(target).missing())
-    output.say(f"{target} lacks {missing} frames.")
+    _say_gaps(output, target)
     opened = open_rig(rig, parse_options(option)) if rig else sessions.reopen_rig(target)
     with opened as devices, output.progress() as progress, _resumable(target):
         status = pipeline.resume(devices, target, progress, drift)
-    _done(output, target, status.done, status.elapsed_s)
+    _done(output, target, status.total, status.elapsed_s)
+
+
+def _say_gaps(output: Output, target: Path) -> None:
+    """Say how many frames a scan lacks, and how many of those it has cannot be used."""
+    from dsl_core.io.session import SessionReader
+
+    reader = SessionReader(target)
+    missing = len(reader.missing())
+    damaged = reader.plan.shot_count - len(reader.sound()) - missing
+    more = f"; damaged, and taken again: {damaged}" if damaged else ""
+    output.say(f"{target} lacks {missing} frames{more}.")
+    output.put(missing=missing, damaged=damaged)
 
 
 def _calibrate(output: Output, devices: DeviceRig, name: str | None, override: bool) -> dict[str, str]:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -122,7 +121,7 @@ class SessionWriter:
             reader = SessionReader(folder)
             refuse_other_scan(folder, reader.manifest, describe_scan(plan or reader.plan, rig))
             remove_partials(reader.store.folder)
-            done = _sound_frames(reader)
+            done = reader.sound()
             check_space(folder, reader.plan, reader.plan.shot_count - len(done))
             writer = cls(folder, reader.manifest, lock)
             writer._done = done
@@ -194,18 +193,3 @@ def _make_folder(folder: Path) -> SessionLock:
         raise StoreError(
             f"The folder {folder} cannot be made ({error.strerror}). Check its parent folder's permissions."
         ) from error
-
-
-def _sound_frames(reader: SessionReader) -> set[int]:
-    """Indices of frames whose line and chunk agree, pixel for pixel."""
-
-    def is_sound(shot: Shot) -> bool:
-        try:
-            reader.read(shot)
-        except StoreError:
-            return False
-        return True
-
-    logged = [shot for shot in reader.plan.shots() if shot.index in reader.entries]
-    with ThreadPoolExecutor(2) as pool:
-        return {shot.index for shot, sound in zip(logged, pool.map(is_sound, logged), strict=True) if sound}

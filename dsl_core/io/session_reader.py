@@ -55,6 +55,20 @@ class SessionReader:
         stored = self.store.stored()
         return [s for s in self.plan.shots() if s.index not in self.entries or s.index not in stored]
 
+    def sound(self) -> set[int]:
+        """Indices of the frames that are there to the bit: every pixel is read and compared."""
+
+        def is_sound(shot: Shot) -> bool:
+            try:
+                self.read(shot)
+            except StoreError:
+                return False
+            return True
+
+        logged = [shot for shot in self.plan.shots() if shot.index in self.entries]
+        with ThreadPoolExecutor(2) as pool:
+            return {s.index for s, sound in zip(logged, pool.map(is_sound, logged), strict=True) if sound}
+
     def read(
         self, shot: Shot, out: NDArray[np.uint16] | None = None, verify: bool = True
     ) -> NDArray[np.uint16]:

@@ -169,6 +169,21 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     assert SessionReader(tmp_path / "first.dsl").missing() == []
 
 
+def test_a_scan_goes_on_over_a_damaged_frame(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, FRAMES - 3)
+        bench.scans.start()
+    reader = SessionReader(tmp_path / "first.dsl")
+    damaged = next(shot for shot in reader.plan.shots() if shot.role == "spectral")
+    path = reader.store.path(damaged.index)
+    path.write_bytes(path.read_bytes()[:-5])
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert len(SessionReader(tmp_path / "first.dsl").sound()) == FRAMES
+
+
 def test_a_scene_that_moved_meanwhile_is_refused(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -93,12 +93,23 @@ def test_damaged_frames(give: Give, scan_copy: Path, damage: Damage, sentence: s
     assert not scan_copy.with_suffix(".zarr").exists()
 
 
-@pytest.mark.parametrize("damage", [_missing, _swapped, _truncated, _wrong_size, _wrong_type])
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (_missing, "lacks 1 frames."),
+        (_swapped, "lacks 0 frames; damaged, and taken again: 2."),
+        (_truncated, "lacks 0 frames; damaged, and taken again: 1."),
+        (_wrong_size, "lacks 0 frames; damaged, and taken again: 1."),
+        (_wrong_type, "lacks 0 frames; damaged, and taken again: 1."),
+    ],
+)
 def test_resume_mends_damaged_frames_to_the_bit(
-    give: Give, scan_copy: Path, finished: Path, damage: Damage
+    give: Give, scan_copy: Path, finished: Path, damage: Damage, says: str
 ) -> None:
     damage(scan_copy)
-    assert give("resume", scan_copy).code == 0
+    ending = give("resume", scan_copy)
+    assert (ending.code, says in ending.out) == (0, True)
+    assert "All 150 frames are stored" in ending.out
     sound, mended = SessionReader(finished / "scan.dsl"), SessionReader(scan_copy)
     for shot in sound.plan.shots():
         np.testing.assert_array_equal(mended.read(shot), sound.read(shot))

@@ -1,0 +1,71 @@
+"""A scan goes on over damaged frames: they are taken again, and the rest still tells what moved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core import pipeline
+from dsl_core.capture.drift import pick_reference_shots
+from dsl_core.capture.sink import MemorySink
+from dsl_core.devices.replay import replay_rig
+from dsl_core.errors import DeviceError
+from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+
+PLAN = CapturePlan(
+    camera_size_px=(24, 16),
+    projector_size_px=(32, 18),
+    code=GrayCode(rows=False),
+    spectral=LineComb(width_px=2, step_px=2, period_px=8),
+    settings=(Setting(exposure_ms=10.0, level=0.4),),
+    code_settings=(0,),
+)
+
+
+def _taken(scene: int) -> MemorySink:
+    """A scan of one of many scenes, the same each time."""
+    sink = MemorySink(PLAN)
+    for shot in PLAN.shots():
+        pixels = np.random.default_rng((scene, shot.index)).integers(200, 4000, (16, 24)).astype(np.uint16)
+        # Frame numbers that no two shots share, as a camera counts them.
+        sink.write(shot, Frame(pixels, shot.exposure_ms, 0.5 * shot.index, shot.index + 1))
+    return sink
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A finished scan of scene 1."""
+    taken = _taken(1)
+    with SessionWriter.create(tmp_path / "scan.dsl", PLAN, replay_rig(taken)) as writer:
+        for shot in PLAN.shots():
+            writer.write(shot, taken.frames[shot.index])
+    return tmp_path / "scan.dsl"
+
+
+def _damage(folder: Path, index: int) -> None:
+    path = SessionReader(folder).store.path(index)
+    path.write_bytes(path.read_bytes()[:-5])
+
+
+def test_a_damaged_frame_that_would_show_drift_is_taken_again(folder: Path) -> None:
+    for shot in pick_reference_shots(PLAN.shots()):
+        _damage(folder, shot.index)
+    SessionReader(folder).store.path(PLAN.shot_count - 1).unlink()
+    pipeline.resume(replay_rig(_taken(1)), folder)
+    assert SessionReader(folder).sound() == set(range(PLAN.shot_count))
+
+
+def test_damage_alone_calls_for_a_look_at_the_scene(folder: Path) -> None:
+    _damage(folder, PLAN.shot_count - 1)
+    with pytest.raises(DeviceError, match="changed since the scan stopped"):
+        pipeline.resume(replay_rig(_taken(2)), folder)
+    assert SessionReader(folder).sound() == set(range(PLAN.shot_count - 1))
+
+
+def test_a_whole_scan_is_left_as_it_is(folder: Path) -> None:
+    pipeline.resume(replay_rig(_taken(2)), folder)
+    assert SessionReader(folder).sound() == set(range(PLAN.shot_count))
