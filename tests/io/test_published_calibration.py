@@ -17,7 +17,10 @@ from dsl_core.io.published import (
     open_first_order_lines,
     save_tables,
 )
-from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.model.column_residual import ColumnResidual
+from dsl_core.model.flat_field import FlatField
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from tests.cases.small_rig import small_rig
 
 BANDS = WavelengthGrid().centres_nm
@@ -44,6 +47,33 @@ def test_a_rig_comes_back_from_the_published_files(tmp_path: Path) -> None:
             again.efficiency[order].at(BANDS), rig.efficiency[order].at(BANDS), rtol=1e-12
         )
     assert {r.status for r in check_calibration(tmp_path)} == {"ok", "missing"}
+
+
+def test_what_the_base_measured_of_its_own_lenses_and_curves_is_left_out(tmp_path: Path) -> None:
+    rig = small_rig()
+    export_calibration(rig, tmp_path)
+    measured = {
+        "residual": ColumnResidual(
+            orders=(1,),
+            degrees=((0, 0, 0, 0),),
+            column_range_px=(0, 63),
+            row_range_px=(0, 47),
+            depth_range_mm=(600, 900),
+            wavelength_range_nm=(400, 700),
+            coefficients_px=((1.0,),),
+        ),
+        "flat_field": FlatField(rows_px=(0.0,), columns_px=(0.0, 63.0), gain=((0.9, 1.0),)),
+        "geometry_covariance": (0.0,) * 576,
+        "column_std_px": 0.011,
+        "chain_rel_std": SpectralCurve.of([400.0, 700.0], [0.002, 0.002]),
+        "white_scale_rel_std": 0.001,
+    }
+    again = load_calibration(tmp_path).rig(rig.model_copy(update=measured))
+    bare = {name: getattr(again, name) for name in measured}
+    assert bare == {name: Rig.model_fields[name].default for name in measured}
+    assert again.film == rig.film
+    assert "without its residual columns, flat field, covariance" in again.provenance.notes
+    assert "without" not in load_calibration(tmp_path).rig(rig).provenance.notes
 
 
 def test_tables_have_the_shapes_that_the_published_code_reads(tmp_path: Path) -> None:

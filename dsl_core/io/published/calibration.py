@@ -20,6 +20,15 @@ from dsl_core.model.spectral import WavelengthGrid
 
 STEREO_NAME = Path("calibration", "calibration_propcam.xml")
 TABLE_FOLDER = Path("dataset", "image_formation")
+#: What a calibrated rig knows only together with its own lenses, pose and curves, and how to call it.
+_MEASURED_OF_BASE = {
+    "residual": "residual columns",
+    "flat_field": "flat field",
+    "geometry_covariance": "covariance of lenses and pose",
+    "column_std_px": "uncertainty of columns",
+    "chain_rel_std": "uncertainty of the spectra",
+    "white_scale_rel_std": "uncertainty of the white scale",
+}
 
 
 @dataclass(frozen=True)
@@ -30,9 +39,16 @@ class PublishedCalibration:
     tables: SpectralTables
 
     def rig(self, base: Rig) -> Rig:
-        """A rig with these lenses, pose and curves; film, sensor and scales are those of ``base``."""
+        """A rig with these lenses, pose and curves; film, sensor and scales are those of ``base``.
+
+        What ``base`` measured of its own lenses and curves does not hold for these, and is left out.
+        """
+        fresh = {field: Rig.model_fields[field].default for field in _MEASURED_OF_BASE}
+        lost = [what for field, what in _MEASURED_OF_BASE.items() if getattr(base, field) != fresh[field]]
+        without = f"; without its {', '.join(lost)}, which hold for its own lenses and curves" if lost else ""
         return base.model_copy(
             update={
+                **fresh,
                 "name": "published",
                 "camera": self.stereo.camera,
                 "projector": self.stereo.projector,
@@ -45,7 +61,7 @@ class PublishedCalibration:
                 "calibrations": (),
                 "provenance": Provenance(
                     source="published calibration layout",
-                    notes=f"film, sensor and scales from {base.name!r}",
+                    notes=f"film, sensor and scales from {base.name!r}{without}",
                 ),
             }
         )
