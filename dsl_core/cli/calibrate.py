@@ -148,8 +148,12 @@ def all_(
     from dsl_core.campaign.products import write_products
     from dsl_core.campaign.recipes import load_recipe
     from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.calibration_library import check_name
 
     output, timer, wanted = Output(json), StageTimer(), _settings_by_name(set_)
+    name = name or campaign.absolute().name
+    if library:
+        check_name(name)  # told before anything is captured
     for each, values in wanted.items():
         load_recipe(each, values)  # wrong settings are told before anything is written
     guide = ConsoleGuide(output, yes, accept_failed)
@@ -163,7 +167,7 @@ def all_(
                 devices,
                 guide,
                 progress,
-                name or "",
+                name,
                 stage=timer.stage,
             )
         made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)

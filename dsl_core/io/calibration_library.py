@@ -64,6 +64,15 @@ def stamp_of(time: str) -> str:
     return datetime.fromisoformat(time).astimezone(UTC).strftime("%Y%m%d-%H%M%S-%f")
 
 
+def check_name(name: str) -> None:
+    """Raise `StoreError` when nothing of the library can be called so; asked before long work too."""
+    if not _NAME.fullmatch(name):
+        raise StoreError(
+            f"A calibration cannot be named {name!r}: use letters, digits, spaces and . + - _, beginning"
+            " with a letter or digit."
+        )
+
+
 def library_home(home: Path | None = None) -> Path:
     """The folder of the library: the one given, that of ``DSL_SCAN_HOME``, or the system's usual place."""
     import platformdirs
@@ -90,11 +99,7 @@ class CalibrationLibrary:
         history: tuple[AcceptedCalibration, ...] = (),
     ) -> LibraryEntry:
         """Add a version of a name and make it the current one; raises `StoreError`."""
-        if not _NAME.fullmatch(name):
-            raise StoreError(
-                f"A calibration cannot be named {name!r}: use letters, digits, spaces and . + - _, beginning"
-                " with a letter or digit."
-            )
+        check_name(name)
         entry = LibraryEntry(name=name, stored=now(), rig=rig, accepted=accepted, history=history)
         folder = self.home / name / "versions"
         try:

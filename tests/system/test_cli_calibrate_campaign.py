@@ -82,6 +82,15 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
     assert SessionReader(tmp_path / "a.dsl").calibration == rig
 
 
+@pytest.mark.parametrize(("folder", "named"), [("lab (1)", []), ("lab", ["--name", "lab/1"])])
+def test_a_name_that_the_library_cannot_take_is_told_before_anything_is_captured(
+    give: Give, tmp_path: Path, folder: str, named: list[str]
+) -> None:
+    ending = give("calibrate", "all", tmp_path / folder, *TWIN, "--yes", *named)
+    assert (ending.code, "A calibration cannot be named 'lab" in ending.sentence) == (2, True)
+    assert not (tmp_path / folder).exists()
+
+
 def test_an_interrupted_campaign_goes_on(give: Give, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder, capture = tmp_path / "campaign", fake_recipe.FakeRecipe.capture
 
