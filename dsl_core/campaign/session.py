@@ -159,11 +159,10 @@ class CalibrationSession:
         """
         self._require_captures()
         record = self.recipe.fit(self.bench, progress or NoProgress())
-        notes = [note for step in self.steps if (note := read_note(self._folder(step)))]
         fitted = AcceptedCalibration(
             name=self.recipe.name,
             title=self.recipe.title,
-            captured=max((note.finished for note in notes), default=""),
+            captured=self._captured(),
             conditions=current_conditions(self.devices),
             settings=self._settings(),
             based_on=self.based_on,
@@ -190,9 +189,12 @@ class CalibrationSession:
         self.campaign.discard(self.recipe.name)
 
     def accepted(self) -> AcceptedCalibration | None:
-        """The accepted calibration while it is good: fitted on those before it and with these settings."""
+        """The accepted calibration while it is good.
+
+        It was fitted on those before it, with these settings, and from the captures that are there now.
+        """
         found = self.campaign.accepted(self.recipe.name)
-        if found is None or found.based_on != self.based_on:
+        if found is None or found.based_on != self.based_on or found.captured != self._captured():
             return None
         # What the session adds to the recipe's settings follows from captures, which are looked at elsewhere.
         own = {name: text for name, text in found.settings.items() if name not in ADDED_SETTINGS}
@@ -200,6 +202,14 @@ class CalibrationSession:
 
     def _folder(self, step: Step) -> Path:
         return self.bench.step_folder(step)
+
+    def _captured(self) -> str:
+        """When the newest captures were finished; empty where there are none, or nobody can say."""
+        try:
+            notes = [read_note(self._folder(step)) for step in self.steps]
+        except StoreError:
+            return ""
+        return max((note.finished for note in notes if note is not None), default="")
 
     def _require_captures(self) -> None:
         lacking = [each for each in self.statuses() if each.state != "captured"]

@@ -110,6 +110,32 @@ def test_the_accepted_one_before_is_history(devices: DeviceRig, campaign: Campai
         run_calibration(one, guide, NoProgress(), redo=["night"])
 
 
+def test_new_captures_whose_fit_nobody_accepted_are_not_passed_over(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    one = session(devices, campaign, FakeRecipe())
+    old = run_calibration(one, Willing(), NoProgress())
+    with pytest.raises(CalibrationError, match="accept with --accept-failed"):
+        run_calibration(one, Willing(accepts=False), NoProgress(), redo=["dim"])
+    again = session(devices, CampaignFolder.open(campaign.path), FakeRecipe())
+    assert again.accepted() is None, "the fit of captures that are gone is called good"
+    guide = Willing()
+    new = run_calibration(again, guide, NoProgress())
+    assert guide.placed == []
+    assert new.captured > old.captured
+    assert again.accepted() == new
+    assert again.candidate() is None
+
+
+def test_a_calibration_with_a_damaged_note_still_opens(devices: DeviceRig, campaign: CampaignFolder) -> None:
+    one = session(devices, campaign, FakeRecipe())
+    run_calibration(one, Willing(), NoProgress())
+    (campaign.home("fake") / "dim" / "capture.json").write_text("{")
+    again = session(devices, campaign, FakeRecipe())
+    assert [each.state for each in again.statuses()] == ["refused", "captured"]
+    assert again.accepted() is None
+
+
 def test_a_fit_may_be_discarded_and_one_that_is_refused_waits(
     devices: DeviceRig, campaign: CampaignFolder
 ) -> None:
