@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import Force, Json, parse_size
+from dsl_core.cli.options import Json, parse_size
 from dsl_core.cli.output import Output
 from dsl_core.errors import StoreError
 
@@ -34,7 +34,9 @@ def import_(
     camera_size: Annotated[
         str, typer.Option("--camera-size", help="Image size of a published calibration.")
     ] = "890x580",
-    force: Force = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace RIG.json; a scan is never replaced.")
+    ] = False,
     json: Json = False,
 ) -> None:
     """Read the published dataset or calibration layout; say what is missing or misnamed."""

@@ -1,0 +1,88 @@
+"""A dataset becomes a scan once: another dataset, or another calibration, never passes for it."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core import exchange
+from dsl_core.errors import Cancelled, StoreError
+from dsl_core.io.published import export_dataset
+from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
+from dsl_core.model.rig import Rig
+from dsl_core.progress import CallbackProgress
+from tests.cases.small_rig import small_rig
+
+RIG = small_rig()
+PLAN = CapturePlan(
+    camera_size_px=(RIG.camera.width_px, RIG.camera.height_px),
+    projector_size_px=(RIG.projector.width_px, RIG.projector.height_px),
+    code=GrayCode(rows=False),
+    spectral=LineComb(width_px=4, step_px=4, period_px=16),
+    settings=(Setting(exposure_ms=10.0, level=0.4),),
+    code_settings=(0,),
+)
+
+
+@dataclass(frozen=True)
+class Noise:
+    """A scan of one of many scenes, the same each time."""
+
+    scene: int
+    plan: CapturePlan = PLAN
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        width, height = self.plan.camera_size_px
+        return np.random.default_rng((self.scene, shot.index)).integers(260, 4000, (height, width), np.uint16)
+
+
+def _dataset(folder: Path, scene: int) -> Path:
+    export_dataset(Noise(scene), folder, bayer=RIG.sensor.bayer, bit_depth=RIG.sensor.bit_depth)
+    return folder
+
+
+def _holds(session: Path, scene: int) -> bool:
+    reader = SessionReader(session)
+    return all(np.array_equal(reader.read(shot), Noise(scene).read(shot)) for shot in PLAN.shots())
+
+
+def test_another_dataset_never_passes_for_the_scan_that_is_there(tmp_path: Path) -> None:
+    session = tmp_path / "scan.dsl"
+    # Two folders of one name, as they lie in the folders of two days.
+    exchange.import_scan(_dataset(tmp_path / "monday" / "chart", 1), session, RIG)
+    with pytest.raises(StoreError, match=r"does not come from the files of .*tuesday.*another name"):
+        exchange.import_scan(_dataset(tmp_path / "tuesday" / "chart", 2), session, RIG)
+    assert _holds(session, 1)
+
+
+def test_another_calibration_is_refused(tmp_path: Path) -> None:
+    session, dataset = tmp_path / "scan.dsl", _dataset(tmp_path / "chart", 1)
+    exchange.import_scan(dataset, session, RIG)
+    other: Rig = RIG.model_copy(update={"white_scale": 2 * RIG.white_scale})
+    with pytest.raises(StoreError, match="imported with another calibration"):
+        exchange.import_scan(dataset, session, other)
+    assert SessionReader(session).calibration == RIG
+
+
+def test_a_scan_of_a_rig_is_not_gone_on_with(tmp_path: Path) -> None:
+    session = tmp_path / "scan.dsl"
+    SessionWriter.create(session, PLAN).close()
+    with pytest.raises(StoreError, match="does not come from the files"):
+        exchange.import_scan(_dataset(tmp_path / "chart", 1), session, RIG)
+
+
+def test_an_interrupted_import_goes_on_also_from_a_folder_that_moved(tmp_path: Path) -> None:
+    session, dataset = tmp_path / "scan.dsl", _dataset(tmp_path / "chart", 1)
+    progress = CallbackProgress(lambda stage, done, total: progress.token.cancel() if done == 3 else None)
+    with pytest.raises(Cancelled):
+        exchange.import_scan(dataset, session, RIG, progress)
+    assert SessionReader(session).missing()
+    moved = Path(shutil.move(dataset, tmp_path / "archive"))
+    exchange.import_scan(moved, session, RIG)
+    assert _holds(session, 1)
