@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,19 +40,17 @@ def tradeoff(
     """Choose the plan that is most accurate in a budget of time, or quickest for an error; predicted."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
-    from dsl_core.planning.candidates import candidate_plans
+    from dsl_core.planning.candidates import possible_plans
     from dsl_core.planning.choice import choose, pareto, weigh
 
     output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
-        latency_ms = devices.projector.info.latency_ms
+        latency_ms, plans = devices.projector.info.latency_ms, possible_plans(devices, known)
     view = _view(known, look)
     with output.progress() as progress:
         limit_s = None if report else budget_s
-        weighed = weigh(
-            known, candidate_plans(known), view, latency_ms=latency_ms, budget_s=limit_s, progress=progress
-        )
+        weighed = weigh(known, plans, view, latency_ms=latency_ms, budget_s=limit_s, progress=progress)
     chosen = choose(weighed, budget_s, error)
     _tell(output, pareto(weighed), chosen)
     if report is not None:
@@ -82,16 +81,20 @@ def design(
     json: Json = False,
 ) -> None:
     """Design patterns for a calibrated rig: the least expected error for so many frames."""
+    from dsl_core.capture.preflight import require_possible
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
     from dsl_core.model.plan import CapturePlan, GrayCode
+    from dsl_core.planning.candidates import sized
     from dsl_core.planning.design import design as search
     from dsl_core.planning.designed import DesignedSet, packed, save_design
 
     output = Output(json)
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
-    base = CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False))
+        base = sized(CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False)), known)
+        if plan is not None:
+            require_possible(replace(devices, calibration=None), base)  # told before the search
     with output.progress() as progress:
         found = search(known, base, frames, orders=orders, progress=progress)
     made = DesignedSet(

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
 
+from dsl_core.capture.preflight import find_obstacles
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
@@ -28,23 +32,44 @@ BRACKETS = (
 
 def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
     """All combinations on a rig, the published plan first."""
-    size = {
-        "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
-        "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
-    }
-    yield CapturePlan(name="published").model_copy(update=size)
+    yield sized(CapturePlan(name="published"), rig)
     for (name, spectral), bracket in product(pattern_sets(rig).items(), BRACKETS):
         settings = tuple(
             Setting(exposure_ms=cycles * rig.frame_period_ms, level=level) for cycles, level in bracket
         )
         words = " + ".join(f"{cycles}@{level:g}" for cycles, level in bracket)
-        yield CapturePlan(
+        plan = CapturePlan(
             name=f"{name}, {words} cycles",
             code=GrayCode(rows=False),
             spectral=spectral,
             settings=settings,
             code_settings=tuple(range(len(settings))),
-        ).model_copy(update=size)
+        )
+        yield sized(plan, rig)
+
+
+def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
+    """The combinations that devices of this calibration can capture; raises `PlanError` if there is none."""
+    # Whether the devices are still as they were calibrated is the scan's question, and can be mended.
+    bare = replace(devices, calibration=None)
+    found = [(plan, find_obstacles(bare, plan)) for plan in candidate_plans(rig)]
+    able = [plan for plan, obstacles in found if not obstacles]
+    if not able:
+        raise PlanError(
+            f"None of {len(found)} plans for the calibration {rig.name!r} is possible on the rig"
+            f" {devices.name!r}: {'; '.join(found[0][1])}. Name a rig and a calibration of one kind."
+        )
+    return able
+
+
+def sized(plan: CapturePlan, rig: Rig) -> CapturePlan:
+    """A plan for the image sizes of a calibrated rig."""
+    return plan.model_copy(
+        update={
+            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
+            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
+        }
+    )
 
 
 def pattern_sets(rig: Rig) -> dict[str, SpectralSet]:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from dsl_core.capture.preflight import find_obstacles
+from dsl_core.cli import main
 from dsl_core.cli.tradeoff import parse_seconds
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.registry import open_rig
 from dsl_core.errors import PlanError, StoreError
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 from dsl_core.planning import sweep
-from dsl_core.planning.candidates import candidate_plans
+from dsl_core.planning.candidates import candidate_plans, possible_plans
 from dsl_core.planning.choice import Weighed, choose, front, pareto, weigh
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
 from dsl_core.planning.prediction import Prediction
@@ -109,6 +114,57 @@ def test_a_designed_set_survives_its_file(tmp_path: Path) -> None:
     path.write_text(json.dumps({"name": "set"}))
     with pytest.raises(StoreError, match="cannot be read"):
         load_design(path)
+
+
+def _limited(longest_ms: float) -> DeviceRig:
+    """A twin whose camera exposes no longer."""
+    rig = open_rig("twin", {"size": "112x72"})
+    info = replace(rig.camera.info, exposure_range_ms=(0.1, longest_ms))
+    rig.camera._info = info  # type: ignore[attr-defined]
+    return rig
+
+
+def test_only_plans_that_the_rig_can_capture_are_weighed() -> None:
+    with _limited(200) as devices:
+        assert devices.calibration is not None
+        able = possible_plans(devices, devices.calibration)
+        everything = list(candidate_plans(devices.calibration))
+        assert 0 < len(able) < len(everything)
+        assert {plan.name for plan in able} == {
+            plan.name for plan in everything if max(each.exposure_ms for each in plan.settings) <= 200
+        }
+        assert all(not find_obstacles(devices, plan) for plan in able)
+
+
+def test_that_no_plan_is_possible_is_told() -> None:
+    with _limited(1) as devices:
+        assert devices.calibration is not None
+        with pytest.raises(PlanError, match=r"None of \d+ plans .* camera can do 0\.1 to 1 ms"):
+            possible_plans(devices, devices.calibration)
+        with pytest.raises(PlanError, match=r"'twin': the plan is for a camera of .* 112 x 72"):
+            possible_plans(devices, published_rig())
+
+
+def test_the_commands_write_no_plan_that_the_rig_refuses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("dsl_core.devices.registry.open_rig", lambda *_: _limited(150))
+    path = tmp_path / "plan.json"
+    assert main(["tradeoff", "--budget", "14s", "--plan", str(path)]) == 0
+    with _limited(150) as devices:
+        assert find_obstacles(devices, load_plan(path)) == []
+    designed = ["design", str(tmp_path / "set.json"), "--plan", str(tmp_path / "designed.json")]
+    assert main(designed) == 2
+    assert "the camera can do 0.1 to 150 ms" in capsys.readouterr().err
+    assert not (tmp_path / "set.json").exists()
+
+
+def test_a_designed_plan_has_the_size_of_the_rig(tmp_path: Path) -> None:
+    path = tmp_path / "plan.json"
+    command = ["design", str(tmp_path / "set.json"), "--frames", "8", "--orders", "1", "-o", "size=112x72"]
+    assert main([*command, "--plan", str(path)]) == 0
+    with open_rig("twin", {"size": "112x72"}) as devices:
+        assert find_obstacles(devices, load_plan(path)) == []
 
 
 def test_candidates_are_named_apart_and_fit_the_rig() -> None:
