@@ -20,6 +20,7 @@ from dsl_core.model.bandpass import BandpassCalibration, FilterSample, OrderSamp
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, passed
+from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import Progress
 
 Floats = NDArray[np.float64]
@@ -51,8 +52,9 @@ def profile_scan(scan: LineScan) -> LineScan:
 def plane_profile(rig: Rig, scan: LineScan, progress: Progress | None = None) -> ZeroOrderFit:
     """Blur and halo from the scan without filter; raises `CalibrationError`."""
     some = profile_scan(scan)
+    reach_px = unlit_px(rig, some.lines.width_px)[1]
     return fit_zero_order(
-        some.lines, some.column_px, some.radiance, some.std, rig.projector_response, progress
+        some.lines, some.column_px, some.radiance, some.std, rig.projector_response, reach_px, progress
     )
 
 
@@ -75,13 +77,6 @@ def plane_pixels(rig: Rig, scan: LineScan, filter_nm: float) -> PlanePixels:
         last = rig.projector.height_px - 1 - ROW_MARGIN_PX
         whole[order] = np.asarray(((at > ROW_MARGIN_PX) & (at < last)).all(0))
     return PlanePixels(scan.column_px, scan.shading, colours_of(rig, scan), place, whole)
-
-
-def first_order_reach_px(rig: Rig) -> tuple[float, float]:
-    """Distances (px) within which first orders of visible light may lie, whatever the film's density."""
-    sine = np.array([390.0, 710.0]) / rig.film.period_nm
-    at = rig.projector.fx_px * np.tan(np.arcsin(sine.clip(max=0.9)))
-    return float(0.85 * at[0]), float(1.15 * at[1])
 
 
 def fit_bandpass(

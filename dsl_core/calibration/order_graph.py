@@ -17,8 +17,6 @@ Ints = NDArray[np.int64]
 
 #: Half window (px) in which the light of the zero order is summed.
 ZERO_HALF_PX = 9.0
-#: Columns on either side of the zero order that no order lights.
-UNLIT_PX = (80.0, 150.0)
 #: Cells of the image, down and across, and pixels that one needs.
 CELLS = (4, 6)
 MIN_PIXELS = 12
@@ -82,16 +80,20 @@ def line_graph(
     std: Floats,
     distance: Floats,
     response: ProjectorResponse,
+    unlit_px: tuple[float, float],
     frame_px: int,
 ) -> tuple[Graph, tuple[float, float]]:
-    """Take dark signal, zero order and halo out; and how far the zero order moved, with deviation (px)."""
+    """Take dark signal, zero order and halo out; and how far the zero order moved, with deviation (px).
+
+    The dark signal is that of lines between the distances ``unlit_px``; zero where there are none.
+    """
     half, small = lines.width_px / 2, 0.01
 
     def profile(shift_px: float) -> Floats:
         return zero_order_profile(torch.as_tensor(shift_px - distance), -half, half, response).numpy()
 
     expected, slope = profile(0.0), (profile(small) - profile(-small)) / (2 * small)
-    unlit = (np.abs(distance) > UNLIT_PX[0]) & (np.abs(distance) < UNLIT_PX[1])
+    unlit = (np.abs(distance) > unlit_px[0]) & (np.abs(distance) < unlit_px[1])
     near = np.abs(distance) < ZERO_HALF_PX
     # Amplitude and dark signal of each pixel from its sums over lit and unlit lines, which hold whatever the
     # blur: lines that tile the frame share a pixel's light out among them.

@@ -75,12 +75,14 @@ def filter_light(
     std: NDArray[np.floating],
     response: ProjectorResponse,
     reach_px: tuple[float, float],
+    unlit_px: tuple[float, float],
     frame_px: int,
 ) -> FilterLight:
     """Measure one filter from ``radiance`` and ``std`` (frames, P), DN per ms; infinite where saturated.
 
     ``reach_px`` are the smallest and largest distance from the zero order at which a first order may lie,
-    whatever the filter; ``frame_px`` is the projector's width.
+    whatever the filter, and ``unlit_px`` those between which none does; ``frame_px`` is the projector's
+    width.
     """
     centres = (lines.width_px - 1) / 2 + lines.step_px * np.arange(len(radiance))
     saturated = ~np.isfinite(std).all(0)
@@ -89,7 +91,7 @@ def filter_light(
     chosen = pixels.at(use)
     signal, error = radiance[:, use].astype(float), std[:, use].astype(float)
     graph, shift = line_graph(
-        lines, chosen, signal, error, centres[:, None] - chosen.column_px, response, frame_px
+        lines, chosen, signal, error, centres[:, None] - chosen.column_px, response, unlit_px, frame_px
     )
     zero, zero_std = _zero_signals(graph)
     orders: dict[int, OrderLight] = {}

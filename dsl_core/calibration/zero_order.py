@@ -23,8 +23,6 @@ from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]
 
-#: Lines this far from the decoded column (px) still show no first order.
-REACH_PX = 150.0
 #: Relative error of the modelled profile within `NEAR_PX` of a line, added to each variance.
 MODEL_ERROR, NEAR_PX = 0.002, 8.0
 #: Steps in all, and those at the start that move columns only, until each is near its own.
@@ -69,14 +67,16 @@ def fit_zero_order(
     radiance: NDArray[np.floating],
     std: NDArray[np.floating],
     start: ProjectorResponse,
+    reach_px: float,
     progress: Progress | None = None,
 ) -> ZeroOrderFit:
     """Fit blur and halo with the columns of some pixels.
 
     ``coarse_px`` (P,) are decoded columns; ``radiance`` and ``std`` (frames, P) are DN per ms, the deviation
-    infinite where saturated. Raises `CalibrationError` when too few pixels follow the model.
+    infinite where saturated. Lines up to ``reach_px`` from a column show no first order. Raises
+    `CalibrationError` when too few pixels follow the model.
     """
-    data = _window(lines, coarse_px, radiance, std)
+    data = _window(lines, coarse_px, radiance, std, reach_px)
     common = np.array([start.blur_px, start.halo_peak_per_px, np.log(start.halo_decay_px or DECAY_PX)])
     column, amplitude, offset = coarse_px.copy(), data.y.max(0), np.zeros(len(coarse_px))
     use = amplitude > 0
@@ -125,9 +125,13 @@ def _require_peaks(use: NDArray[np.bool_]) -> None:
 
 
 def _window(
-    lines: ScanLines, coarse_px: Floats, radiance: NDArray[np.floating], std: NDArray[np.floating]
+    lines: ScanLines,
+    coarse_px: Floats,
+    radiance: NDArray[np.floating],
+    std: NDArray[np.floating],
+    reach_px: float,
 ) -> _Data:
-    half = int(REACH_PX / lines.step_px)
+    half = int(max(reach_px, NEAR_PX) / lines.step_px)
     first = (lines.width_px - 1) / 2
     nearest = np.round((coarse_px - first) / lines.step_px).astype(int)
     index = nearest + np.arange(-half, half + 1)[:, None]

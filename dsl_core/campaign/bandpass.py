@@ -12,7 +12,6 @@ import numpy as np
 
 from dsl_core.calibration.bandpass import (
     SeenFilter,
-    first_order_reach_px,
     fit_bandpass,
     plane_pixels,
     plane_profile,
@@ -36,6 +35,7 @@ from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
+from dsl_core.optics.unlit import first_order_reach_px, unlit_px
 from dsl_core.progress import Progress
 
 PLANE = "plane"
@@ -220,6 +220,7 @@ class BandpassRecipe:
             std,
             rig.projector_response,
             first_order_reach_px(rig),
+            unlit_px(rig, lines.width_px),
             rig.projector.width_px,
         )
         if light.saturated > 0.5:

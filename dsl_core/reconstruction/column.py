@@ -25,8 +25,6 @@ MODEL_ERROR = 0.0015
 COMB_ERROR = 0.05
 #: A refined column this far from the decoded one is not the same peak.
 MAX_SHIFT_PX = 2.0
-#: Columns on either side of the zero order that no order lights, at any wavelength of the projector.
-UNLIT_PX = (80.0, 160.0)
 #: Above this reduced chi-square the profile does not fit (two surfaces in one pixel, motion).
 MAX_CHI_SQUARE = 25.0
 
@@ -89,24 +87,28 @@ def dark_offset(
     std: Tensor,
     lines: LineSet,
     response: ProjectorResponse,
+    unlit_px: tuple[float, float],
 ) -> Tensor:
     """Mean signal (DN per ms) where no order lights a pixel: what its single black frame got wrong.
 
-    Between the zero order and the first orders lie `UNLIT_PX` columns that reach a pixel only through the
-    halo, which is subtracted. A black frame's noise would be common to all lines of a pixel; the mean of
-    dozens of unlit frames takes it out. Zero for pattern sets that leave no frame unlit.
+    Between the zero order and the first orders, at distances ``unlit_px``, lie columns that reach a pixel
+    only through the halo, which is subtracted. A black frame's noise would be common to all lines of a
+    pixel; the mean of dozens of unlit frames takes it out. Zero where a pattern set or the film leaves no
+    frame unlit.
     """
-    if lines.frames != lines.lines:
+    first, last = math.floor(unlit_px[0] / lines.step_px), math.ceil(unlit_px[1] / lines.step_px)
+    if lines.frames != lines.lines or unlit_px[1] <= unlit_px[0]:
         return torch.zeros_like(column_px)
-    first, last = (round(edge / lines.step_px) for edge in UNLIT_PX)
     total = torch.zeros_like(column_px)
     weight = torch.full_like(column_px, 1e-30)
     for side in (-1, 1):
-        line = lines.nearest(column_px) + side * torch.arange(first, last, device=column_px.device)[:, None]
+        away = torch.arange(first, last + 1, device=column_px.device)[:, None]
+        line = lines.nearest(column_px) + side * away
         frame = lines.frame(line)
         distance = column_px - lines.centre_px(line).to(column_px.dtype)
         dark = torch.gather(radiance, 0, frame) - amplitude * halo_of_line(distance, lines, response)
-        w = lines.exists(line) / torch.gather(std, 0, frame).to(dark.dtype).clip(min=1e-9) ** 2
+        unlit = (distance.abs() >= unlit_px[0]) & (distance.abs() <= unlit_px[1])
+        w = (lines.exists(line) & unlit) / torch.gather(std, 0, frame).to(dark.dtype).clip(min=1e-9) ** 2
         total += torch.where(w > 0, dark * w, 0.0).sum(0)
         weight += w.sum(0)
     return total / weight

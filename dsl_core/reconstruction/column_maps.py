@@ -9,7 +9,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.model.rig import Rig
+from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import Column, dark_offset, refine
 from dsl_core.reconstruction.depth import triangulate
@@ -112,12 +113,12 @@ class ColumnFinder:
     def _columns(self, where: Indices | slice, start: Tensor) -> tuple[Column, Tensor]:
         if self.profiles is None:
             return self._of_white(where, start), torch.zeros_like(start)
-        stack, response = self.stack, self.rig.projector_response
+        stack = self.stack
         y = torch.as_tensor(stack.radiance.reshape(len(stack.radiance), -1)[:, where], device=self.device)
         std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, where], device=self.device)
         if self.lines is None:
             return self._of_patterns(where, start, y, std), torch.zeros_like(start)
-        return _on_lines(start, y, std, self.lines, response)
+        return _on_lines(start, y, std, self.lines, self.rig)
 
     def _of_patterns(self, where: Indices | slice, start: Tensor, y: Tensor, std: Tensor) -> Column:
         """Columns from any pattern set, with what the first orders of a grey surface add to its frames."""
@@ -135,8 +136,8 @@ class ColumnFinder:
         return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none)
 
 
-def _on_lines(
-    start: Tensor, y: Tensor, std: Tensor, lines: LineSet, response: ProjectorResponse
-) -> tuple[Column, Tensor]:
+def _on_lines(start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig) -> tuple[Column, Tensor]:
+    response = rig.projector_response
     column = refine(start, y, std, lines, response)
-    return column, dark_offset(column.column_px, column.amplitude, y, std, lines, response)
+    unlit = unlit_px(rig, lines.width_px)
+    return column, dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

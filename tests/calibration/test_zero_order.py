@@ -14,6 +14,7 @@ from dsl_core.optics.light_path import zero_order_profile
 
 LINES = ScanLines(width_px=5, step_px=2)
 TRUTH = ProjectorResponse(blur_px=0.72, halo_peak_per_px=0.0012, halo_decay_px=26.0)
+REACH_PX = 150.0
 START = ProjectorResponse(blur_px=0.5, halo_peak_per_px=0.0, halo_decay_px=35.0)
 
 
@@ -30,7 +31,7 @@ def lines_seen(pixels: int, truth: ProjectorResponse) -> tuple[np.ndarray, np.nd
 
 def test_blur_halo_and_columns_are_found_from_decoded_columns() -> None:
     column, radiance, std = lines_seen(400, TRUTH)
-    fit = fit_zero_order(LINES, np.round(column), radiance, std, START)
+    fit = fit_zero_order(LINES, np.round(column), radiance, std, START, REACH_PX)
     for found, truth, spread in zip(
         (fit.response.blur_px, fit.response.halo_peak_per_px, fit.response.halo_decay_px),
         (TRUTH.blur_px, TRUTH.halo_peak_per_px, TRUTH.halo_decay_px),
@@ -46,7 +47,7 @@ def test_blur_halo_and_columns_are_found_from_decoded_columns() -> None:
 def test_no_halo_is_found_as_none() -> None:
     truth = TRUTH.model_copy(update={"halo_peak_per_px": 0.0})
     column, radiance, std = lines_seen(300, truth)
-    fit = fit_zero_order(LINES, np.round(column), radiance, std, START)
+    fit = fit_zero_order(LINES, np.round(column), radiance, std, START, REACH_PX)
     assert fit.response.halo_peak_per_px < 4 * fit.std[1] + 1e-6
 
 
@@ -54,4 +55,4 @@ def test_noise_without_lines_is_refused() -> None:
     rng = np.random.default_rng(0)
     noise = 0.1 * rng.standard_normal((318, 200))
     with pytest.raises(CalibrationError, match="see the lines as lines"):
-        fit_zero_order(LINES, np.full(200, 300.0), noise, np.full(noise.shape, 0.1), START)
+        fit_zero_order(LINES, np.full(200, 300.0), noise, np.full(noise.shape, 0.1), START, REACH_PX)

@@ -21,6 +21,7 @@ from dsl_core.simulation.scenes import make_scene
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=318, frames=318)
 RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=31.0)
 PIXELS = 4000
+UNLIT_PX = (80.0, 160.0)
 
 
 def peaks(column: torch.Tensor, amplitude: torch.Tensor) -> torch.Tensor:
@@ -85,11 +86,11 @@ def test_pixels_without_a_peak_keep_their_decoded_column() -> None:
 
 def test_dark_offset_is_what_unlit_frames_read_beside_the_halo() -> None:
     column, amplitude, radiance, std = noisy(0.01)
-    offset = dark_offset(column, amplitude, radiance + 0.05, std, LINES, RESPONSE)
+    offset = dark_offset(column, amplitude, radiance + 0.05, std, LINES, RESPONSE, UNLIT_PX)
     assert abs(float(offset.mean()) - 0.05) < 1e-3
     assert float(offset.std()) < 0.01
     comb = LineSet(5, 2, 2.0, 318, 53)
-    assert not dark_offset(column, amplitude, radiance, std, comb, RESPONSE).any()
+    assert not dark_offset(column, amplitude, radiance, std, comb, RESPONSE, UNLIT_PX).any()
 
 
 def test_halo_far_from_a_line_is_the_profile_there() -> None:

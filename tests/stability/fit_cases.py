@@ -126,7 +126,7 @@ def _zero_order(value: float) -> Run:
         seen[:, 133 if value else 0 :] = value
         start = rig.projector_response
         found = fit_zero_order(
-            lines, np.round(column), rounded(seen, dtype), np.full(seen.shape, 0.003), start
+            lines, np.round(column), rounded(seen, dtype), np.full(seen.shape, 0.003), start, 150.0
         )
         off = np.abs(found.response.blur_px - start.blur_px) / found.std[0]
         return Outcome("right" if off < 4 else "wrong", f"blur {off:.1f} sd off, {found.good.sum()} pixels")
