@@ -21,6 +21,7 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Footprint, correspondence, like, zero_order
 from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, OrderPath
+from dsl_core.optics.unlit import unlit_px
 from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel, sideways_shares
 from dsl_core.planning.views import View
 from dsl_core.reconstruction.column import Column, refine
@@ -31,7 +32,13 @@ from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles, refine_by_profiles
 from dsl_core.reconstruction.spectra import COLOUR_ERROR, DEMOSAIC_SPREAD, DIRECT_ERROR, EDGE_PX, MODEL_ERROR
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra
-from dsl_core.reconstruction.spectral_system import ORDERS, Bands, band_halfwidth_px, direct_light
+from dsl_core.reconstruction.spectral_system import (
+    ORDERS,
+    Bands,
+    band_halfwidth_px,
+    direct_light,
+    without_offset,
+)
 from dsl_core.reconstruction.surface import default_window_px
 
 #: Column shift of the finite difference, px.
@@ -94,6 +101,8 @@ class VirtualPixels:
         self.window_px = surface_window_px or default_window_px(rig)
         self.bands, self.bracket, self.lines = Bands.of(rig, grid), Bracket.of(rig, plan), LineSet.of(plan)
         self.single = self.lines is not None and self.lines.lines == self.lines.frames
+        near_px, far_px = unlit_px(rig, self.lines.width_px) if self.lines is not None else (0.0, 0.0)
+        self.has_unlit = far_px > near_px
         self.profiles = radiance_profiles(rig, plan)
         self.pixels = torch.as_tensor(view.pixels)
         self.depth = torch.as_tensor(view.depth_mm, dtype=torch.float64)
@@ -199,6 +208,9 @@ class _Run:
         noise = self._normal(clean.shape) * torch.where(self.saturated, 0.0, spread).sqrt()
         self.noisy = clean + noise + self._black(clean)
         self.variance = owner.bracket.variance(self.noisy, self.black)
+        dark = owner.bracket.variance(torch.zeros_like(self.black), self.black) * self.factors
+        #: Variance of what the black frames shift all frames by, (samples, spectra, 3).
+        self.offset_variance = dark[..., 0]
 
     def _normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
         return torch.randn(shape, generator=self.random)
@@ -250,7 +262,8 @@ class _Run:
         clean = self.first + self.zero
         if owner.single:
             # Zero order and halo are subtracted; the unlit frames between the orders give the dark offset.
-            base, clean = base - self.zero - self._black_again(), clean - self.zero
+            offset = self._black_again() if owner.has_unlit else 0.0
+            base, clean = base - self.zero - offset, clean - self.zero
         amplitude = column.amplitude_std.reshape(error_px.shape)
         found, calm = self._solve(self._weights(error_px), base, clean, error_px, amplitude)
         scale = 1 / (1 + self._shading_error(column, depth_error))
@@ -305,19 +318,30 @@ class _Run:
                 found = owner.column[s].float() + error_px[s]
                 moved = moved + owner.zero_at(found) - owner.matrices.zero[s]
             strength = true.flatten(0, 1).abs().amax(1)
-            used = strength > DARK * strength.max()
+            # Frames without light still say what the black frames were off by.
+            used = (strength > DARK * strength.max()) | (not owner.single)
             change = moved.flatten(1, 2)[:, used] * self.shading[s]
             operator = true.flatten(0, 1)[used] * self.shading[s] + change
-            rows = operator * weight[s].flatten(1)[:, used, None]
+            w = weight[s].flatten(1)[:, used, None]
+            operator = self._without_offset(s, operator, w)
+            rows = operator * w
             matrices.append(rows.mT @ operator)
             shift = (change @ self.nodes[s, :, :, None])[..., 0]
             for out, data in ((rights, noisy[s]), (calm, clean[s])):
                 y = data.flatten(1)[:, used] + (0 if out is rights else shift)
-                out.append((rows.mT @ y[..., None])[..., 0])
+                out.append((rows.mT @ self._without_offset(s, y[..., None], w))[..., 0])
         matrix, right, quiet = (torch.cat(parts) for parts in (matrices, rights, calm))
         if owner.single:
             matrix, right, quiet = self._with_colour(matrix, right, quiet, spread)
         return solve_dense(matrix, right, owner.prior), solve_dense(matrix, quiet, owner.prior)
+
+    def _without_offset(self, sample: int, values: Tensor, weight: Tensor) -> Tensor:
+        """Values (spectra, channels x frames, n) as far as the black frames' noise leaves them known."""
+        if self.owner.single:
+            return values
+        apart = (len(values), 3, self.noisy.shape[3], -1)
+        variance = self.offset_variance[sample]
+        return without_offset(values.reshape(apart), weight.reshape(apart), variance).flatten(1, 2)
 
     def _with_colour(
         self, matrix: Tensor, right: Tensor, quiet: Tensor, spread: Tensor

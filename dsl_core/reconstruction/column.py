@@ -88,19 +88,19 @@ def dark_offset(
     lines: LineSet,
     response: ProjectorResponse,
     unlit_px: tuple[float, float],
-) -> Tensor:
+) -> tuple[Tensor, Tensor]:
     """Mean signal (DN per ms) where no order lights a pixel: what its single black frame got wrong.
 
     Between the zero order and the first orders, at distances ``unlit_px``, lie columns that reach a pixel
     only through the halo, which is subtracted. A black frame's noise would be common to all lines of a
-    pixel; the mean of dozens of unlit frames takes it out. Zero where a pattern set or the film leaves no
-    frame unlit.
+    pixel; the mean of dozens of unlit frames takes it out. With its deviation: zero and infinite where a
+    pattern set or the film leaves no frame unlit.
     """
     first, last = math.floor(unlit_px[0] / lines.step_px), math.ceil(unlit_px[1] / lines.step_px)
     if lines.frames != lines.lines or unlit_px[1] <= unlit_px[0]:
-        return torch.zeros_like(column_px)
+        return torch.zeros_like(column_px), torch.full_like(column_px, torch.inf)
     total = torch.zeros_like(column_px)
-    weight = torch.full_like(column_px, 1e-30)
+    weight = torch.zeros_like(column_px)
     for side in (-1, 1):
         away = torch.arange(first, last + 1, device=column_px.device)[:, None]
         line = lines.nearest(column_px) + side * away
@@ -111,7 +111,7 @@ def dark_offset(
         w = (lines.exists(line) & unlit) / torch.gather(std, 0, frame).to(dark.dtype).clip(min=1e-9) ** 2
         total += torch.where(w > 0, dark * w, 0.0).sum(0)
         weight += w.sum(0)
-    return total / weight
+    return total / weight.clip(min=1e-30), 1 / weight.sqrt()
 
 
 def halo_of_line(distance_px: Tensor, lines: LineSet, response: ProjectorResponse) -> Tensor:

@@ -26,14 +26,16 @@ Floats = NDArray[np.float32]
 Indices = NDArray[np.intp]
 #: Deviation of a column that only a whole pixel is known of.
 WHOLE_PX_STD = 12**-0.5
+#: A dark offset that unlit frames measure to this share of the black frames' own noise counts as known.
+OFFSET_KNOWN = 1 / 3
 
 
 @dataclass(frozen=True)
 class ColumnMaps:
     """What is found of some pixels, each (P,).
 
-    Column and deviation (px), zero-order amplitude and its deviation, dark offset (DN per ms), whether lines
-    refined the column, depth (mm) and its slope (mm per px).
+    Column and deviation (px), zero-order amplitude and its deviation, dark offset (DN per ms) and how far all
+    frames may still be off it, whether lines refined the column, depth (mm) and its slope (mm per px).
     """
 
     column_px: Floats
@@ -41,6 +43,7 @@ class ColumnMaps:
     amplitude: Floats
     amplitude_std: Floats
     offset: Floats
+    offset_std: Floats
     refined: NDArray[np.bool_]
     depth_mm: NDArray[np.float64]
     slope_mm_per_px: NDArray[np.float64]
@@ -48,8 +51,8 @@ class ColumnMaps:
     @classmethod
     def empty(cls, count: int) -> ColumnMaps:
         """Room for so many pixels."""
-        q, dq, a, da, offset = (np.empty(count, np.float32) for _ in range(5))
-        return cls(q, dq, a, da, offset, np.zeros(count, bool), np.empty(count), np.empty(count))
+        q, dq, a, da, dark, dark_std = (np.empty(count, np.float32) for _ in range(6))
+        return cls(q, dq, a, da, dark, dark_std, np.zeros(count, bool), np.empty(count), np.empty(count))
 
     def put(self, where: Indices | slice, other: ColumnMaps) -> None:
         """Replace some pixels by those of other maps."""
@@ -99,26 +102,31 @@ class ColumnFinder:
         # A slice is a view; picking single pixels copies.
         whole = len(pixels) > 0 and pixels[-1] - pixels[0] == len(pixels) - 1
         where = slice(int(pixels[0]), int(pixels[-1]) + 1) if whole else pixels
-        column, offset = self._columns(where, torch.as_tensor(start_px, device=self.device))
+        column, offset, open_offset = self._columns(where, torch.as_tensor(start_px, device=self.device))
         spread = column.std_px.cpu().numpy()
         refined = column.refined.cpu().numpy()
         if std_px is not None:
             spread = np.where(refined, spread, std_px)
         at = torch.as_tensor(pixels, device=self.device)
         depth, slope = triangulate(self.rig, at, column.column_px.double())
-        a, da, dark = (v.cpu().numpy() for v in (column.amplitude, column.amplitude_std, offset))
+        a, da = (v.cpu().numpy() for v in (column.amplitude, column.amplitude_std))
+        dark, dark_std = (v.cpu().numpy() for v in (offset, open_offset))
         q, z, dz = (v.cpu().numpy() for v in (column.column_px, depth, slope))
-        return ColumnMaps(q, spread, a, da, dark, refined, z, dz)
+        return ColumnMaps(q, spread, a, da, dark, dark_std, refined, z, dz)
 
-    def _columns(self, where: Indices | slice, start: Tensor) -> tuple[Column, Tensor]:
+    def _columns(self, where: Indices | slice, start: Tensor) -> tuple[Column, Tensor, Tensor]:
+        """Columns, dark offset, and how far all frames of a pixel may be off it."""
+        black_std = torch.as_tensor(self.stack.black_std.ravel()[where], device=self.device)
         if self.profiles is None:
-            return self._of_white(where, start), torch.zeros_like(start)
+            return self._of_white(where, start), torch.zeros_like(start), black_std
         stack = self.stack
         y = torch.as_tensor(stack.radiance.reshape(len(stack.radiance), -1)[:, where], device=self.device)
         std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, where], device=self.device)
         if self.lines is None:
-            return self._of_patterns(where, start, y, std), torch.zeros_like(start)
-        return _on_lines(start, y, std, self.lines, self.rig)
+            return self._of_patterns(where, start, y, std), torch.zeros_like(start), black_std
+        column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig)
+        known = offset_std < OFFSET_KNOWN * black_std
+        return column, offset, torch.where(known, 0.0, torch.minimum(offset_std, black_std))
 
     def _of_patterns(self, where: Indices | slice, start: Tensor, y: Tensor, std: Tensor) -> Column:
         """Columns from any pattern set, with what the first orders of a grey surface add to its frames."""
@@ -136,8 +144,10 @@ class ColumnFinder:
         return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none)
 
 
-def _on_lines(start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig) -> tuple[Column, Tensor]:
+def _on_lines(
+    start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig
+) -> tuple[Column, Tensor, Tensor]:
     response = rig.projector_response
     column = refine(start, y, std, lines, response)
     unlit = unlit_px(rig, lines.width_px)
-    return column, dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)
+    return column, *dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

@@ -29,7 +29,7 @@ EDGE_STD_PX = 0.15
 
 @dataclass(frozen=True)
 class Geometry:
-    """Maps (rows, columns) of columns, depths and deviations, zero-order amplitude, dark offset and flags."""
+    """Maps (rows, columns) of columns, depths, zero-order amplitudes, dark offsets, deviations, and flags."""
 
     column_px: NDArray[np.float32]
     column_std_px: NDArray[np.float32]
@@ -38,6 +38,7 @@ class Geometry:
     amplitude: NDArray[np.float32]
     amplitude_std: NDArray[np.float32]
     offset: NDArray[np.float32]
+    offset_std: NDArray[np.float32]
     flags: NDArray[np.uint16]
     surface: Surface
 
@@ -79,8 +80,9 @@ def reconstruct_geometry(
     edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
     q = np.where(good, maps.column_px, np.float32(np.nan)).reshape(shape)
     std = np.where(good, dq, np.nan).astype(np.float32).reshape(shape)
-    a, da, offset = (m.reshape(shape) for m in (maps.amplitude, maps.amplitude_std, maps.offset))
-    return Geometry(q, std, depth_mm, depth_std, a, da, offset, flags.reshape(shape) | edge, surface)
+    light = (maps.amplitude, maps.amplitude_std, maps.offset, maps.offset_std)
+    a, da, dark, dark_std = (m.reshape(shape) for m in light)
+    return Geometry(q, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface)
 
 
 def _start(code: DecodedCode) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
@@ -36,9 +36,10 @@ class MergedScan:
             self._shots.setdefault((shot.role, shot.pattern), []).append(shot)
         blacks = [black_frame([source.read(shot)], rig.sensor) for shot in self._shots["black", 0]]
         # The noise of a black frame is common to all frames of a pixel: it does not scatter between them.
-        # What it shifts is measured later, on unlit frames.
+        # What it shifts is measured later, on unlit frames, or stays unknown to `black_std`.
         self.blacks = [BlackFrame(black.mean, np.zeros_like(black.variance)) for black in blacks]
         self.gains_ms = setting_gains_ms(self.plan.settings, rig.projector_response)
+        self.black_std = _merged_std(blacks, self.gains_ms)
         self._local = threading.local()
 
     def merge(self, role: Role, pattern: int, out: MergedFrame | None = None) -> MergedFrame:
@@ -57,10 +58,14 @@ class MergedScan:
 
 @dataclass(frozen=True)
 class LineStack:
-    """Merged line frames (frames, rows, columns): radiance (DN per ms), deviation (infinite: saturated)."""
+    """Merged line frames (frames, rows, columns): radiance (DN per ms), deviation (infinite: saturated).
+
+    ``black_std`` (rows, columns) is the deviation of what the black frames shift all frames of a pixel by.
+    """
 
     radiance: NDArray[np.float32]
     std: NDArray[np.floating]
+    black_std: NDArray[np.float32]
 
 
 def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[DecodedCode, MergedFrame]:
@@ -90,7 +95,7 @@ def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack
     """Read and merge every spectral frame; deviations take half precision wherever it holds them."""
     plan = scan.plan
     shape = (plan.spectral_count, plan.camera_size_px[1], plan.camera_size_px[0])
-    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, _deviation_type(scan)))
+    stack = LineStack(np.empty(shape, np.float32), np.empty(shape, _deviation_type(scan)), scan.black_std)
 
     def load(k: int) -> None:
         buffer = MergedFrame(stack.radiance[k], np.empty(shape[1:], np.float32), np.empty(shape[1:], bool))
@@ -100,6 +105,14 @@ def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack
 
     _each(load, shape[0], "line frames", progress)
     return stack
+
+
+def _merged_std(blacks: Sequence[BlackFrame], gains_ms: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Deviation (DN per ms) that black frames give dark values, by the weights these are merged with."""
+    information = sum(
+        np.float32(gain) ** 2 / black.variance for gain, black in zip(gains_ms, blacks, strict=True)
+    )
+    return np.asarray(1 / np.sqrt(information), np.float32)
 
 
 def _deviation_type(scan: MergedScan) -> type[np.floating]:

@@ -36,6 +36,7 @@ def known_pixels(geometry: Geometry) -> Pixels:
         geometry.amplitude,
         geometry.amplitude_std,
         geometry.offset,
+        geometry.offset_std,
         valid,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import torch
@@ -55,7 +55,8 @@ class Pixels:
     """What is known of every pixel before its spectrum: arrays of shape (rows, columns).
 
     ``amplitude`` and ``amplitude_std`` (DN per ms) are those of the zero order in the pixel's own colour,
-    ``offset`` the residual dark signal; ``valid`` pixels get a spectrum.
+    ``offset`` the residual dark signal and ``offset_std`` how far all frames may be off it; ``valid`` pixels
+    get a spectrum.
     """
 
     column_px: NDArray[np.float32]
@@ -65,6 +66,7 @@ class Pixels:
     amplitude: NDArray[np.float32]
     amplitude_std: NDArray[np.float32]
     offset: NDArray[np.float32]
+    offset_std: NDArray[np.float32]
     valid: NDArray[np.bool_]
 
 
@@ -187,7 +189,9 @@ class SpectralReconstruction:
     ) -> tuple[Spectra, Tensor]:
         assert self.lines is not None
         shading = self._map(self.pixels.shading, flat)
-        system = BandedAccumulator(self.rig, self.bands, self.lines, len(flat), shading)
+        offset_variance = window.offset_variance()
+        unsure = bool(offset_variance.any())
+        system = BandedAccumulator(self.rig, self.bands, self.lines, len(flat), shading, unsure)
         blur = window.blur_px()
         for order, footprint in traced.items():
             # A band just outside the frame still catches the outermost lines.
@@ -200,7 +204,10 @@ class SpectralReconstruction:
         right = system.right * shading
         rows = self._colour_rows(flat, shading, window, right)
         check()
-        spectra = solve_spectra(system.positive_matrix() * shading**2, right, rows, self.prior, check)
+        matrix = system.positive_matrix() * shading**2
+        spectra = solve_spectra(matrix, right, rows, self.prior, check)
+        if system.offset is not None:
+            spectra = with_offset(spectra, matrix, system.offset * shading, offset_variance, self.prior)
         radiance = spectra.nodes * shading
         explained = (radiance * (2 * system.right - multiply(system.matrix, radiance))).sum(0)
         return spectra, (system.square - explained) / (system.samples - PARAMETERS).clip(min=1)
@@ -237,6 +244,7 @@ class SpectralReconstruction:
         width, height = self.plan.projector_size_px
         inside = {order: f.inside(width, height, margin_px=EDGE_PX) for order, f in traced.items()}
         samples = (weight > 0).sum((0, 1))
+        offset_variance = window.offset_variance()
         found, misfit = [], []
         # Full matrices take long: a part of the pixels at a time, so that a cancel need not wait.
         for start in range(0, len(flat), DENSE_PIXELS):
@@ -249,7 +257,7 @@ class SpectralReconstruction:
                 column[part],
                 {order: Footprint(f.columns[:, part], f.rows[:, part]) for order, f in traced.items()},
                 {order: mask[:, part] for order, mask in inside.items()},
-                (radiance[..., part], weight[..., part]),
+                (radiance[..., part], weight[..., part], offset_variance[:, part]),
             )
             found.append(spectra)
             misfit.append(left / (samples[part] - PARAMETERS).clip(min=1))
@@ -263,9 +271,12 @@ class SpectralReconstruction:
         column: Tensor,
         traced: dict[int, Footprint],
         inside: dict[int, Tensor],
-        seen: tuple[Tensor, Tensor],
+        seen: tuple[Tensor, Tensor, Tensor],
     ) -> tuple[Spectra, Tensor]:
-        """Spectra of some pixels, and the weighted squares they leave; ``seen`` is radiance and weight."""
+        """Spectra of some pixels, and the weighted squares they leave.
+
+        ``seen`` is radiance, weight, and the variance of an offset that all frames share.
+        """
         from dsl_core.reconstruction.dense_solver import solve_dense
 
         matrix, right, square = dense_equations(response, self.bands, profiles, column, traced, inside, *seen)
@@ -305,6 +316,16 @@ class SpectralReconstruction:
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
         out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()
         out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
+
+
+def with_offset(spectra: Spectra, matrix: Tensor, offset: Tensor, variance: Tensor, prior: Prior) -> Spectra:
+    """Spectra less sure by an offset of all frames with a variance (3, pixels).
+
+    An offset with the right side ``offset`` (3, bands, pixels) looks like a grey that gives the same.
+    """
+    grey = multiply(matrix, torch.ones_like(spectra.std)) + prior.level_std**-2
+    change = (variance[:, None] * (offset / grey) ** 2).sum(0).sqrt()
+    return replace(spectra, std=torch.hypot(spectra.std, change))
 
 
 def tile_shape(bands: int) -> tuple[int, int]:
@@ -376,6 +397,12 @@ class _Window:
         count = len(images)
         flat = images.reshape(count * 3, -1).index_select(1, self.at)
         return flat.reshape(count, 3, -1).permute(1, 0, 2).contiguous()
+
+    def offset_variance(self) -> Tensor:
+        """Variance of what all frames may be off in three colours, (3, pixels)."""
+        bayer = self.owner.rig.sensor.bayer
+        variance = demosaic_variance(self._part(self.owner.pixels.offset_std) ** 2, bayer)
+        return variance.reshape(3, -1)[:, self.at]
 
     def zero_order_colour(self) -> tuple[Tensor, Tensor]:
         """Zero-order amplitude in three colours and its variance, each (3, pixels)."""

@@ -102,10 +102,15 @@ def band_halfwidth_px(columns: Tensor, step_nm: float, internal_nm: NDArray[np.f
 class BandedAccumulator:
     """Adds the first orders of scan lines, one order and band at a time, over all pixels of a tile."""
 
-    def __init__(self, rig: Rig, bands: Bands, lines: LineSet, pixels: int, other: Tensor) -> None:
+    def __init__(
+        self, rig: Rig, bands: Bands, lines: LineSet, pixels: int, other: Tensor, offsets: bool = False
+    ) -> None:
+        """``offsets`` adds up as well what an offset of all frames does to the right side."""
         self.rig, self.bands, self.lines = rig, bands, lines
         self.matrix = torch.zeros((1, bands.count, pixels), device=other.device, dtype=other.dtype)
         self.right = torch.zeros_like(self.matrix[0])
+        #: Right side of an offset of one DN per ms in each colour, (3, bands, pixels), if it is asked for.
+        self.offset = torch.zeros((3, bands.count, pixels)).to(other) if offsets else None
         #: Bound of the diagonals left out, relative to the main one.
         self.dropped = 1e-6
         #: Weighted sum of squares of the data that entered, and their number, (pixels,).
@@ -221,6 +226,10 @@ class BandedAccumulator:
             profiles *= inside[group[0] : stop, None]
         for i, j in enumerate(group):
             own = profiles[i]
+            if self.offset is not None:
+                self.offset[:, j] += (white[:, j, None, None] * weights.reshape(3, window, pixels) * own).sum(
+                    1
+                )
             self.right[j] += ((white[:, j] @ weighted).reshape(window, pixels) * own).sum(0)
             reach = profiles[i : i + self.matrix.shape[0]]
             pairs = (white[:, j, None] * white[:, j : j + len(reach)]).T
@@ -239,13 +248,14 @@ def dense_equations(
     inside: dict[int, Tensor],
     radiance: Tensor,
     weight: Tensor,
+    offset_variance: Tensor,
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Normal equations of unit shading for any pattern set.
 
     Full matrix (pixels, bands, bands), right side (pixels, bands) and weighted sum of squares (pixels,).
     ``profiles`` (frames, width, LEDs) are radiances relative to full drive; ``radiance`` and ``weight`` are
-    (3, frames, pixels). The zero order is part of the model, as patterns may light a pixel by several orders
-    at once.
+    (3, frames, pixels), ``offset_variance`` (3, pixels) that of an offset which the frames of a colour share.
+    The zero order is part of the model, as patterns may light a pixel by several orders at once.
     """
     everywhere = torch.ones_like(column_px[None], dtype=torch.bool)
     paths = [OrderPath(column_px[None], everywhere, bands.moments[0], 0.0)]
@@ -253,11 +263,24 @@ def dense_equations(
         half = band_halfwidth_px(footprint.columns, bands.step_nm, bands.centres_nm)
         paths.append(OrderPath(footprint.columns, inside[order], bands.moments[order], half))
     model = ImageFormation(response, profiles, paths, torch.ones_like(column_px)).matrix()
-    flat = model.reshape(len(column_px), -1, bands.count)
-    w = weight.permute(2, 0, 1).reshape(len(column_px), -1, 1)
-    y = radiance.permute(2, 0, 1).reshape(len(column_px), -1, 1)
+    w, y = (values.permute(2, 0, 1)[..., None] for values in (weight, radiance))
+    flat, y = (without_offset(values, w, offset_variance.T).flatten(1, 2) for values in (model, y))
+    w = w.flatten(1, 2)
     weighted = flat * w
     return weighted.mT @ flat, (weighted.mT @ y)[..., 0], (w * y * y).sum((1, 2))
+
+
+def without_offset(values: Tensor, weight: Tensor, variance: Tensor) -> Tensor:
+    """Values (..., frames, n) less as much of their mean as an unknown offset of all frames takes of it.
+
+    ``weight`` (..., frames, 1) is theirs, ``variance`` (...) the offset's. The normal equations of such a
+    model and such data are those with the offset as one more unknown, eliminated, and stay positive in any
+    precision.
+    """
+    total = weight.sum(-2, keepdim=True)
+    mean = (weight * values).sum(-2, keepdim=True) / total.clip(min=1e-30)
+    share = 1 - (1 + variance[..., None, None] * total).rsqrt()
+    return values - share * mean
 
 
 def direct_light(light: BlurredProfiles, bands: Bands, column_px: Tensor, colour: Tensor) -> Tensor:

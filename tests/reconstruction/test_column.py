@@ -86,11 +86,24 @@ def test_pixels_without_a_peak_keep_their_decoded_column() -> None:
 
 def test_dark_offset_is_what_unlit_frames_read_beside_the_halo() -> None:
     column, amplitude, radiance, std = noisy(0.01)
-    offset = dark_offset(column, amplitude, radiance + 0.05, std, LINES, RESPONSE, UNLIT_PX)
+    offset, spread = dark_offset(column, amplitude, radiance + 0.05, std, LINES, RESPONSE, UNLIT_PX)
     assert abs(float(offset.mean()) - 0.05) < 1e-3
     assert float(offset.std()) < 0.01
-    comb = LineSet(5, 2, 2.0, 318, 53)
-    assert not dark_offset(column, amplitude, radiance, std, comb, RESPONSE, UNLIT_PX).any()
+    assert 0.9 < float((offset - 0.05).std() / spread.mean()) < 1.1
+
+
+@pytest.mark.parametrize(
+    ("lines", "unlit_px"),
+    [(LineSet(5, 2, 2.0, 318, 53), UNLIT_PX), (LINES, (62.0, 40.0))],
+    ids=["a comb", "a coarse film"],
+)
+def test_where_no_frame_is_unlit_the_dark_offset_is_unknown(
+    lines: LineSet, unlit_px: tuple[float, float]
+) -> None:
+    column, amplitude, radiance, std = noisy(0.01)
+    offset, spread = dark_offset(column, amplitude, radiance, std, lines, RESPONSE, unlit_px)
+    assert not offset.any()
+    assert torch.isinf(spread).all()
 
 
 def test_halo_far_from_a_line_is_the_profile_there() -> None:
