@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.errors import DecodeError, StoreError
+from dsl_core.errors import CalibrationError, DecodeError, StoreError
 from dsl_core.model.rig import Rig
 from dsl_core.progress import NoProgress, Progress
 
@@ -97,16 +97,15 @@ class FrameBlock:
         return True
 
 
-def read_block(folder: Path, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
-    """Read the frames around a pixel (x, y); raises `StoreError`, `CalibrationError`."""
+def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
+    """Read the frames around a pixel (x, y) of a result's scan; raises `StoreError`, `CalibrationError`."""
     from dsl_core.io.session import SessionReader
     from dsl_core.io.session_check import require_complete
-    from dsl_core.pipeline import calibration_of
     from dsl_core.reconstruction.merge import MergedScan
 
-    progress, reader = progress or NoProgress(), SessionReader(folder)
+    progress, reader = progress or NoProgress(), SessionReader(find_session(result))
     require_complete(reader)
-    rig, plan = calibration_of(reader), reader.plan
+    rig, plan = _calibration(reader, result), reader.plan
     width, height = plan.camera_size_px
     # Even corners keep the phase of the Bayer mosaic.
     left, top = (max(at - HALF_PX, 0) // 2 * 2 for at in pixel)
@@ -120,6 +119,27 @@ def read_block(folder: Path, pixel: tuple[int, int], progress: Progress | None =
         merged = scan.merge("spectral", k)
         radiance[k], variance[k] = merged.radiance, merged.variance
     return FrameBlock(radiance, variance, (left, top), rig, plan)
+
+
+def _calibration(reader: SessionReader, result: ResultArrays) -> Rig:
+    """The calibration that a result was made with: the scan's own, or one of the library."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+    from dsl_core.io.origin import calibration_digest, model_of_notes
+    from dsl_core.pipeline import calibration_of
+
+    digest, _ = model_of_notes(result.attributes)
+    own = reader.calibration
+    # Results of older versions do not say; most were made with the scan's own calibration.
+    if digest is None or (own is not None and calibration_digest(own) == digest):
+        return calibration_of(reader)
+    for line in CalibrationLibrary().lines():
+        if line.entry is not None and calibration_digest(line.entry.rig) == digest:
+            return line.entry.rig
+    raise CalibrationError(
+        f"{result.path.name} was made with another calibration than its scan holds, and the library does not"
+        " have it, so that nothing can be expected of a pixel. Import that calibration into the library, or"
+        " reconstruct the scan with its own."
+    )
 
 
 def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, int]) -> IntensityGraph:
@@ -155,6 +175,7 @@ def _expected(
     """The model's signals and where in the frames each order falls, as far as the result knows."""
     import torch
 
+    from dsl_core.io.origin import model_of_notes
     from dsl_core.model.spectral import WavelengthGrid
     from dsl_core.optics.correspondence import correspondence
     from dsl_core.optics.image_formation import ImageFormation, OrderPath
@@ -174,7 +195,7 @@ def _expected(
     size = block.plan.projector_size_px
     flat = torch.tensor([pixel[1] * result.shape[1] + pixel[0]])
     distance, column_px = torch.tensor([depth]), torch.tensor([[column]])
-    model, orders = correspondence(rig), {}
+    model, orders = correspondence(rig, model_of_notes(result.attributes)[1]), {}
     paths = [OrderPath(column_px, torch.ones_like(column_px, dtype=torch.bool), bands.moments[0], 0.0)]
     for order in ORDERS:
         seen = model.trace(flat, distance, order, bands.centroids_nm[order])

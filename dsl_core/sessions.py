@@ -51,6 +51,7 @@ def reconstruct_session(
     that is overridden.
     """
     from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.origin import model_notes
     from dsl_core.io.session import SessionReader
     from dsl_core.io.session_check import require_complete
 
@@ -58,10 +59,12 @@ def reconstruct_session(
     require_complete(reader)
     if calibration is not None and not override_calibration:
         _require_conditions(folder, reader.manifest, calibration)
-    result = reconstruct(reader, calibration_of(reader, calibration), options, progress, timer)
+    rig, options = calibration_of(reader, calibration), options or Options()
+    result = reconstruct(reader, rig, options, progress, timer)
     return result.assign_attrs(
         {
             **reader.manifest.notes,
+            **model_notes(rig, options.correspondence),
             "captured": reader.manifest.created,
             "captured_with": reader.manifest.rig_name,
             "capture_plan": reader.plan.model_dump_json(),

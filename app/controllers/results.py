@@ -19,7 +19,7 @@ from app.state.evented import Event
 from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
 from app.state.undo import UndoStack
 from app.views import Offerer
-from dsl_core.inspection import FrameBlock, IntensityGraph, find_session, intensity_graph, read_block
+from dsl_core.inspection import FrameBlock, IntensityGraph, intensity_graph, read_block
 from dsl_core.io.result_arrays import ResultArrays, load_arrays
 from dsl_core.progress import Progress
 
@@ -284,7 +284,7 @@ class ResultsController:
 
         def work(progress: Progress) -> tuple[FrameBlock, IntensityGraph]:
             near = block if block is not None and block.holds(pixel) else None
-            near = near or read_block(find_session(result), pixel, progress)
+            near = near or read_block(result, pixel, progress)
             return near, intensity_graph(near, result, pixel)
 
         def done(found: tuple[FrameBlock, IntensityGraph]) -> None:

@@ -1,12 +1,18 @@
-"""With which rig and options a scan was taken, kept in its notes and in its result."""
+"""With which rig and options a scan was taken, and what its result was made with, kept as notes."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from dsl_core.model.rig import Rig
 
 _RIG, _OPTIONS = "scanned_with", "scanned_with_options"
+_CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"
 
 
 def rig_notes(name: str, options: Mapping[str, str]) -> dict[str, str]:
@@ -31,3 +37,20 @@ def rig_of_notes(notes: Mapping[str, object]) -> tuple[str, dict[str, str]] | No
     if not isinstance(options, dict):
         return None
     return str(notes[_RIG]), {str(key): str(value) for key, value in options.items()}
+
+
+def model_notes(rig: Rig, correspondence: str) -> dict[str, str]:
+    """Attributes of a result that say which calibration and which correspondence model it was made with."""
+    return {_CALIBRATION: calibration_digest(rig), _CORRESPONDENCE: correspondence}
+
+
+def model_of_notes(notes: Mapping[str, object]) -> tuple[str | None, str]:
+    """Digest of the calibration, None where an older result does not note it, and the correspondence."""
+    digest = notes.get(_CALIBRATION)
+    return None if digest is None else str(digest), str(notes.get(_CORRESPONDENCE, "auto"))
+
+
+def calibration_digest(rig: Rig) -> str:
+    """The same for calibrations that give the same result, whatever they are called and noted to be."""
+    content = rig.model_dump_json(exclude={"name", "provenance", "calibrations"})
+    return hashlib.sha256(content.encode()).hexdigest()[:32]

@@ -7,11 +7,13 @@ import pytest
 
 from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
-from dsl_core.errors import DecodeError, StoreError
+from dsl_core.errors import CalibrationError, DecodeError, StoreError
 from dsl_core.inspection import find_session, intensity_graph, read_block
-from dsl_core.io.origin import rig_notes
+from dsl_core.io.calibration_library import HOME_VARIABLE, CalibrationLibrary
+from dsl_core.io.origin import model_notes, rig_notes
 from dsl_core.io.result_arrays import ResultArrays, load_arrays
 from dsl_core.io.result_file import save_result
+from dsl_core.io.session import SessionReader
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.sessions import reconstruct_session
@@ -38,7 +40,7 @@ def test_the_model_explains_what_a_pixel_saw(result: ResultArrays) -> None:
     solid = np.argwhere(np.isfinite(result["reflectance"][0]) & np.isfinite(result["shading"]))
     y, x = solid[len(solid) // 2].tolist()
     pixel = (x, y)
-    block = read_block(find_session(result), pixel)
+    block = read_block(result, pixel)
     graph = intensity_graph(block, result, pixel)
     assert graph.model is not None
     assert graph.zero is not None
@@ -55,7 +57,7 @@ def test_the_model_explains_what_a_pixel_saw(result: ResultArrays) -> None:
 
 
 def test_a_pixel_at_the_corner_has_a_graph_too(result: ResultArrays) -> None:
-    block = read_block(find_session(result), (0, 0))
+    block = read_block(result, (0, 0))
     assert block.holds((0, 0))
     assert not block.holds((90, 60))
     assert intensity_graph(block, result, (0, 0)).measured.shape[0] == 3
@@ -67,3 +69,29 @@ def test_a_scan_that_is_elsewhere_is_asked_for(result: ResultArrays, tmp_path: P
     moved = ResultArrays(tmp_path / "b.zarr", result.wavelengths_nm, result.arrays, result.attributes)
     with pytest.raises(StoreError, match="not beside it"):
         find_session(moved)
+
+
+def test_the_model_is_that_of_the_calibration_of_the_result(
+    result: ResultArrays, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(HOME_VARIABLE, str(tmp_path))
+    own = SessionReader(find_session(result)).calibration
+    assert own is not None
+    other = own.model_copy(update={"white_scale": own.white_scale * 1.5})
+    attributes = {**result.attributes, **model_notes(other, "grating")}
+    made = ResultArrays(result.path, result.wavelengths_nm, result.arrays, attributes)
+    with pytest.raises(CalibrationError, match="another calibration"):
+        read_block(made, (80, 52))
+    CalibrationLibrary().store("bench", other.model_copy(update={"name": "renamed"}))
+    assert read_block(made, (80, 52)).rig.white_scale == other.white_scale
+    assert read_block(result, (80, 52)).rig == own
+
+
+def test_the_model_is_that_of_the_correspondence_of_the_result(result: ResultArrays) -> None:
+    y, x = np.argwhere(np.isfinite(result["reflectance"][0])).tolist()[0]
+    block = read_block(result, (x, y))
+    assert intensity_graph(block, result, (x, y)).zero is not None
+    attributes = {**result.attributes, "correspondence": "grid"}
+    by_grid = ResultArrays(result.path, result.wavelengths_nm, result.arrays, attributes)
+    with pytest.raises(CalibrationError, match="data-driven"):
+        intensity_graph(block, by_grid, (x, y))
