@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from dsl_core.errors import CalibrationError, DriftError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, GrayCode
+from dsl_core.model.presets import on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.progress import CancelToken, NoProgress, Progress
@@ -55,8 +56,15 @@ class Options:
 
 
 def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
-    """The plan for the image sizes of a rig's camera and projector."""
+    """The plan for the image sizes of a rig's camera and projector.
+
+    Exposures that nobody chose become whole colour cycles, as the calibration measured them or else as the
+    projector claims; others are left as they are.
+    """
     camera, projector = rig.camera.info, rig.projector.info
+    if plan.settings == CapturePlan().settings:
+        known = rig.calibration or projector
+        plan = on_cycles(plan, known.frame_period_ms)
     return plan.model_copy(
         update={
             "camera_size_px": (camera.width_px, camera.height_px),

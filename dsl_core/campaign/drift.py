@@ -14,6 +14,7 @@ from dsl_core.model.figure import Figure
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
+from dsl_core.model.presets import PUBLISHED_PERIOD_MS, on_cycles
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
@@ -32,17 +33,26 @@ LINE_STEP_PX = 40
 PIXELS = 4000
 #: Certified reflectance of a fresh Spectralon over the visible bands.
 SPECTRALON = 0.99
+#: The exposures of the quick shot are not the user's to lower.
+SATURATED_ADVICE = (
+    "The check has exposures of its own. Put aperture, gain and the projector's brightness back to what they"
+    " were at the calibration, dim the room, and do not hold the target nearer than the calibrated depths."
+)
 
 
-def quick_plan() -> CapturePlan:
-    """Columns and rows, white and black at a dark setting, a few lines at two settings."""
-    return CapturePlan(
+def quick_plan(period_ms: float = PUBLISHED_PERIOD_MS) -> CapturePlan:
+    """Columns and rows, white and black at a dark setting, a few lines at two settings.
+
+    Exposures are whole colour cycles of a projector with the period: parts of one would change the colour.
+    """
+    plan = CapturePlan(
         name="drift check",
         code=GrayCode(rows=True),
         spectral=ScanLines(width_px=5, step_px=LINE_STEP_PX, sparse=True),
         settings=(Setting(exposure_ms=500.0 / 3.0, level=0.2), Setting(exposure_ms=1000.0 / 3.0, level=0.8)),
         code_settings=(0,),
     )
+    return on_cycles(plan, period_ms)
 
 
 def measure_drift(
@@ -55,7 +65,8 @@ def measure_drift(
     """
     from dsl_core.io.session import SessionReader
 
-    pipeline.scan(devices, pipeline.fit_plan(quick_plan(), devices), folder, progress)
+    plan = pipeline.fit_plan(quick_plan(rig.frame_period_ms), devices)
+    pipeline.scan(devices, plan, folder, progress)
     return drift_figures(SessionReader(folder), rig, spectralon, progress)
 
 
@@ -77,7 +88,7 @@ def drift_figures(
     plan = check_source(source, rig)
     merged = MergedScan(source, rig)
     code, white = decode_columns(merged, progress)
-    require_light(white.radiance, white.saturated)
+    require_light(white.radiance, white.saturated, SATURATED_ADVICE)
     column, row, depth_mm = _maps(rig, code, white)
     fit = fit_plane(rig, depth_mm, np.isfinite(depth_mm))
     # At random, since any regular step would meet the colours of the mosaic unevenly.

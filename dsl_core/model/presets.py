@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting
@@ -95,9 +96,13 @@ def whole_cycles(exposure_ms: float, period_ms: float) -> int:
 
 
 def on_cycles(plan: CapturePlan, period_ms: float) -> CapturePlan:
-    """The plan with every exposure at whole cycles of a projector's frame period."""
-    settings = tuple(
-        Setting(exposure_ms=whole_cycles(s.exposure_ms, period_ms) * period_ms, level=s.level)
-        for s in plan.settings
-    )
+    """The plan with every exposure at whole cycles of a projector's frame period; what is there stays."""
+    settings = tuple(_on_cycles(setting, period_ms) for setting in plan.settings)
     return plan.model_copy(update={"settings": settings})
+
+
+def _on_cycles(setting: Setting, period_ms: float) -> Setting:
+    exposure_ms = whole_cycles(setting.exposure_ms, period_ms) * period_ms
+    if math.isclose(exposure_ms, setting.exposure_ms):
+        return setting
+    return Setting(exposure_ms=exposure_ms, level=setting.level)

@@ -34,11 +34,13 @@ def require_pixels(flags: NDArray[np.uint16]) -> None:
     )
 
 
-def require_light(white: NDArray[np.float32], saturated: NDArray[np.bool_]) -> None:
-    """Raise `DecodeError` when nearly all of the white frame (rows, columns) is saturated."""
+def require_light(
+    white: NDArray[np.float32], saturated: NDArray[np.bool_], advice: str = _ADVICE[Flag.SATURATED]
+) -> None:
+    """Raise `DecodeError` with advice when nearly all of the white frame (rows, columns) is saturated."""
     share = float(np.mean(saturated | ~np.isfinite(white)))
     if share > 1 - MIN_SHARE:
         raise DecodeError(
             f"The white frame is saturated in {share:.0%} of its pixels at every setting, so that nothing"
-            f" can be measured. {_ADVICE[Flag.SATURATED]}"
+            f" can be measured. {advice}"
         )

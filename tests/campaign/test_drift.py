@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from dsl_core.calibration.drift import smooth_part
 from dsl_core.campaign.drift import drift_figures, quick_plan
-from dsl_core.errors import CalibrationError
+from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.figure import failures
 from dsl_core.model.geometry import Pose
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.cases.twin_scan import MemoryScan, twin_scan
@@ -65,6 +67,26 @@ def test_a_rig_as_it_was_calibrated_passes(shot: tuple[Rig, MemoryScan]) -> None
     assert by_name["column drift on a plane"].value < 0.06
     assert abs(by_name["displacement of order +1"].value) < 0.1
     assert by_name["brightness of order -1, over calibration"].value == pytest.approx(1, abs=0.02)
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 60.0, 120.0, 7.0])
+def test_exposures_of_the_quick_shot_are_whole_colour_cycles(rate_hz: float) -> None:
+    period_ms = 1000 / rate_hz
+    for setting, usual in zip(quick_plan(period_ms).settings, quick_plan().settings, strict=True):
+        cycles = setting.exposure_ms / period_ms
+        assert cycles == pytest.approx(round(cycles))
+        assert setting.exposure_ms == pytest.approx(usual.exposure_ms, abs=period_ms / 2)
+    assert quick_plan(1000 / 60).settings == CapturePlan().settings
+
+
+def test_saturated_white_gets_advice_for_a_shot_without_settings_to_lower(
+    shot: tuple[Rig, MemoryScan],
+) -> None:
+    rig, scan = shot
+    bright = tuple(np.full_like(frame, rig.sensor.full_scale_dn) for frame in scan.frames)
+    with pytest.raises(DecodeError, match="exposures of its own") as found:
+        drift_figures(replace(scan, frames=bright), rig, spectralon=False, pixels=FEW)
+    assert "plan's settings" not in str(found.value)
 
 
 def test_the_light_is_compared_with_a_spectralon(shot: tuple[Rig, MemoryScan]) -> None:
