@@ -179,8 +179,8 @@ def _expected(
     from dsl_core.model.spectral import WavelengthGrid
     from dsl_core.optics.correspondence import correspondence
     from dsl_core.optics.image_formation import ImageFormation, OrderPath
-    from dsl_core.patterns.images import drive_levels, spectral_profiles
     from dsl_core.reconstruction.line_set import LineSet
+    from dsl_core.reconstruction.pattern_column import radiance_profiles
     from dsl_core.reconstruction.spectra import EDGE_PX
     from dsl_core.reconstruction.spectral_system import ORDERS, Bands, band_halfwidth_px
 
@@ -212,12 +212,11 @@ def _expected(
     shading = float(result.at("shading", pixel)) if "shading" in result.arrays else np.nan
     if not np.isfinite(spectrum).all() or not np.isfinite(shading):
         return None, zero, orders
-    drive = drive_levels(spectral_profiles(block.plan), 1.0) / 255.0
     # Demosaicing averages neighbours, which widens every line a little more.
     blur_px = float(np.hypot(rig.projector_response.blur_px, _demosaic_blur_px(result, pixel)))
     response = rig.projector_response.model_copy(update={"blur_px": blur_px})
-    profiles = (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
-    formation = ImageFormation(response, np.asarray(profiles), paths, torch.tensor([shading]))
+    profiles = radiance_profiles(rig, block.plan)
+    formation = ImageFormation(response, profiles, paths, torch.tensor([shading]))
     reflectance = np.interp(bands.centres_nm, nm, spectrum).astype(np.float32)
     signals = formation.forward(torch.as_tensor(reflectance)[:, None])[..., 0]
     return signals.double().numpy(), zero, orders

@@ -29,7 +29,12 @@ from dsl_core.reconstruction.dense_solver import solve_dense
 from dsl_core.reconstruction.depth import triangulate
 from dsl_core.reconstruction.first_orders import first_order_share
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles, refine_by_profiles
+from dsl_core.reconstruction.pattern_column import (
+    one_if_grey,
+    radiance_profiles,
+    refine_by_profiles,
+    rounding_error,
+)
 from dsl_core.reconstruction.spectra import COLOUR_ERROR, DEMOSAIC_SPREAD, DIRECT_ERROR, EDGE_PX, MODEL_ERROR
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra
 from dsl_core.reconstruction.spectral_system import (
@@ -104,6 +109,7 @@ class VirtualPixels:
         near_px, far_px = unlit_px(rig, self.lines.width_px) if self.lines is not None else (0.0, 0.0)
         self.has_unlit = far_px > near_px
         self.profiles = radiance_profiles(rig, plan)
+        self.direct_error = DIRECT_ERROR if self.single else max(DIRECT_ERROR, rounding_error(rig, plan))
         self.pixels = torch.as_tensor(view.pixels)
         self.depth = torch.as_tensor(view.depth_mm, dtype=torch.float64)
         self.column, _ = zero_order(rig, self.pixels, self.depth)
@@ -298,7 +304,7 @@ class _Run:
             found = (owner.column.float()[:, None] + error_px).flatten()
             colour = self._white((0,)).flatten(0, 1).T
             direct = direct_light(owner.modelled, owner.bands, found, colour)
-            spread = spread + (DIRECT_ERROR * direct.permute(2, 0, 1).reshape(spread.shape)) ** 2
+            spread = spread + (owner.direct_error * direct.permute(2, 0, 1).reshape(spread.shape)) ** 2
         return torch.where(self.saturated, 0.0, 1 / spread)
 
     def _solve(

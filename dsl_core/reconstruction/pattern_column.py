@@ -10,6 +10,7 @@ column by a parabola.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import torch
@@ -21,20 +22,52 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.image_formation import BlurredProfiles
 from dsl_core.patterns.images import drive_levels, spectral_profiles
 from dsl_core.reconstruction.column import MAX_CHI_SQUARE, Column
+from dsl_core.reconstruction.hdr import setting_gains_ms
 
 #: Candidates reach this far from the decoded column, in steps of, px.
 REACH_PX, STEP_PX = 1.0, 0.125
 #: Relative error of the zero-order model: first orders of other columns lie under it.
 DIRECT_ERROR = 0.02
+#: Light of a pattern, relative to full drive, that may saturate a setting.
+BRIGHT_SHARE = 0.05
 #: Keeps the amplitudes of LEDs apart that a set cannot tell apart, relative to its strongest.
 RIDGE = 1e-4
 
 
 def radiance_profiles(rig: Rig, plan: CapturePlan) -> NDArray[np.float64]:
-    """Spectral patterns as radiances above black relative to full drive, (frames, width, LEDs)."""
-    drive = drive_levels(spectral_profiles(plan), 1.0) / 255.0
-    response = rig.projector_response
-    return (response.radiance(drive) - response.black_fraction) / (1 - response.black_fraction)
+    """Spectral patterns as radiances above black relative to full drive, (frames, width, LEDs).
+
+    Each setting rounds the drive levels of grey in its own way; what counts is the light of all together, as
+    in a merge of settings whose noise is that of their light.
+    """
+    gains_ms = setting_gains_ms(plan.settings, rig.projector_response)
+    light = sum(
+        setting.exposure_ms * shown for setting, shown in zip(plan.settings, _shown(rig, plan), strict=True)
+    )
+    return np.asarray(light / gains_ms.sum())
+
+
+def rounding_error(rig: Rig, plan: CapturePlan) -> float:
+    """Largest relative error of `radiance_profiles` for the light of a single setting; 0 for lines and combs.
+
+    It counts where the other settings are saturated, so only where patterns are not dark.
+    """
+    merged = radiance_profiles(rig, plan)
+    bright = merged > BRIGHT_SHARE
+    gains_ms = setting_gains_ms(plan.settings, rig.projector_response)
+    errors = [
+        np.abs(setting.exposure_ms * shown[bright] / (gain_ms * merged[bright]) - 1).max(initial=0.0)
+        for setting, shown, gain_ms in zip(plan.settings, _shown(rig, plan), gains_ms, strict=True)
+        if gain_ms > 0
+    ]
+    return max((float(error) for error in errors), default=0.0)
+
+
+def _shown(rig: Rig, plan: CapturePlan) -> Iterator[NDArray[np.float64]]:
+    """Radiance above black that each setting shows, relative to full drive, (frames, width, LEDs)."""
+    profiles, response = spectral_profiles(plan), rig.projector_response
+    for setting in plan.settings:
+        yield response.radiance(drive_levels(profiles, setting.level) / 255.0) - response.radiance(0.0)
 
 
 def one_if_grey(profiles: NDArray[np.float64]) -> NDArray[np.float64]:

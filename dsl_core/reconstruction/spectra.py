@@ -20,7 +20,7 @@ from dsl_core.optics.image_formation import BlurredProfiles
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.column import halo_of_line
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles
+from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles, rounding_error
 from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral_system import (
     ORDERS,
@@ -240,7 +240,8 @@ class SpectralReconstruction:
         response = response.model_copy(update={"blur_px": blur})
         light = BlurredProfiles(response, one_if_grey(profiles), 0.0, column)
         direct = direct_light(light, self.bands, column, colour)
-        weight = 1 / (1 / weight + (DIRECT_ERROR * direct) ** 2)
+        error = max(DIRECT_ERROR, rounding_error(self.rig, self.plan))
+        weight = 1 / (1 / weight + (error * direct) ** 2)
         width, height = self.plan.projector_size_px
         inside = {order: f.inside(width, height, margin_px=EDGE_PX) for order, f in traced.items()}
         samples = (weight > 0).sum((0, 1))

@@ -6,17 +6,23 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, SpectralSet
+from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, ScanLines, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.image_formation import BlurredProfiles
+from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.noise import own_channel
 from dsl_core.planning.views import plane_view
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.reconstruction.column import Column
 from dsl_core.reconstruction.first_orders import first_order_share
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import one_if_grey, radiance_profiles, refine_by_profiles
+from dsl_core.reconstruction.pattern_column import (
+    one_if_grey,
+    radiance_profiles,
+    refine_by_profiles,
+    rounding_error,
+)
 from dsl_core.reconstruction.spectral_system import Bands, direct_light
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.small_rig import small_rig
@@ -118,3 +124,43 @@ def test_an_led_that_is_dark_spoils_no_frame() -> None:
     red, blue = found[0, :, 0] / white[0], found[2, :, 0] / white[2]
     assert float(red[0]) > 0.5
     assert float(blue[0]) < 0.1
+
+
+GREYS = (0.1, 0.25, 0.5, 0.75, 1.0)
+
+
+def grey_plan(*levels: float) -> CapturePlan:
+    """One frame of grey steps across a projector of a few columns, at drive levels of equal exposure."""
+    return CapturePlan(
+        projector_size_px=(len(GREYS), 4),
+        spectral=Columns(levels=(tuple((grey, grey, grey) for grey in GREYS),)),
+        settings=tuple(Setting(exposure_ms=100.0, level=level) for level in levels),
+        code_settings=(0,),
+    )
+
+
+@pytest.mark.parametrize("level", [0.2, 0.8])
+def test_grey_is_as_bright_as_the_drive_level_that_a_setting_rounds_it_to(level: float) -> None:
+    rig = published_rig()
+    radiance, plan = rig.projector_response.radiance, grey_plan(level)
+    drive = pattern_image(plan, next(shot for shot in plan.shots() if shot.role == "spectral"))[0, :, 0]
+    shown = (radiance(drive / 255) - radiance(0.0)) / (radiance(level) - radiance(0.0))
+    assert radiance_profiles(rig, plan)[0, :, 0] == pytest.approx(shown)
+    assert rounding_error(rig, plan) < 1e-9
+
+
+def test_settings_that_round_grey_apart_are_granted_the_difference() -> None:
+    rig, plan = published_rig(), grey_plan(0.1, 0.8)
+    dark, bright, both = (radiance_profiles(rig, p)[0, :, 0] for p in (grey_plan(0.1), grey_plan(0.8), plan))
+    assert (both <= np.maximum(dark, bright) + 1e-12).all()
+    assert (both >= np.minimum(dark, bright) - 1e-12).all()
+    used = both > 0.05
+    assert rounding_error(rig, plan) == pytest.approx(np.abs(dark / both - 1)[used].max())
+    assert rounding_error(rig, plan) > 0.03
+
+
+def test_lines_and_combs_leave_nothing_to_round() -> None:
+    for spectral in (ScanLines(), LineComb()):
+        plan = CapturePlan(spectral=spectral)
+        assert np.isin(radiance_profiles(published_rig(), plan).round(12), (0.0, 1.0)).all()
+        assert rounding_error(published_rig(), plan) < 1e-9
