@@ -10,11 +10,11 @@ from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.
-REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc")
+REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".sli", ".hdr")
 _MARKS = ".marks.json"
 _OPENS = (
     "It opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
-    " campaigns and rigs of calibrations, and text files of reference spectra (.csv, .txt)."
+    " campaigns and rigs of calibrations, and reference spectra (.csv, .txt, ENVI libraries .sli)."
 )
 
 

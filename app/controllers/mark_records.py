@@ -11,6 +11,7 @@ import numpy as np
 from app.state.results import Mark, Spectrum, spectrum_of_pixel
 from dsl_core.errors import DslError
 from dsl_core.io.annotations_file import Annotations, PinRecord, ReferenceRecord, RegionRecord
+from dsl_core.io.reference_file import read_reference
 from dsl_core.io.result_arrays import ResultArrays
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
@@ -19,17 +20,10 @@ from dsl_core.progress import Progress
 NOTHING = Spectrum(np.empty(0), np.empty(0))
 
 
-def read_reference(path: Path) -> SpectralCurve:
-    """The spectrum of a file, whatever range it covers; raises `DslError`."""
-    from dsl_core.io.spectrum_file import read_spectrum
-
-    return read_spectrum(path, covers_nm=(float("inf"), float("-inf")), radiance=False)
-
-
-def mark_of_reference(name: str, colour: int, path: Path, curve: SpectralCurve) -> Mark:
+def mark_of_reference(name: str, colour: int, path: Path, curve: SpectralCurve, entry: str = "") -> Mark:
     """A reference with its spectrum."""
     spectrum = Spectrum(np.array(curve.wavelengths_nm), np.array(curve.values))
-    return Mark("reference", name, colour, spectrum, file=path, curve=curve)
+    return Mark("reference", name, colour, spectrum, file=path, entry=entry, curve=curve)
 
 
 def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
@@ -41,7 +35,7 @@ def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
     mask = mask_of_runs(draft.runs, shape) if draft.runs else mask_of_outline(draft.outline_px, shape)
     found = region_spectrum(result["reflectance"], result["reflectance_std"], result["data_share"], mask)
     spectrum = Spectrum(result.wavelengths_nm, found.mean, found.deviation, found.data_share, sigmas=1.0)
-    return replace(draft, spectrum=spectrum, pixels=found.pixels, used=found.used)
+    return replace(draft, spectrum=spectrum, pixels=found.pixels, used=found.used, pixel_std=found.pixel_std)
 
 
 def marks_of(kept: Annotations, result: ResultArrays, progress: Progress) -> tuple[Mark, ...]:
@@ -70,9 +64,11 @@ def _kept_region(region: RegionRecord, result: ResultArrays, progress: Progress)
 def _kept_reference(reference: ReferenceRecord) -> Mark:
     path = Path(reference.file)
     try:
-        made = mark_of_reference(reference.name, reference.colour, path, read_reference(path))
+        curve = read_reference(path, reference.entry)
+        made = mark_of_reference(reference.name, reference.colour, path, curve, reference.entry)
     except DslError as error:
         made = Mark("reference", reference.name, reference.colour, NOTHING, file=path, trouble=str(error))
+        made = replace(made, entry=reference.entry)
     return replace(made, shown=reference.shown)
 
 
@@ -90,5 +86,7 @@ def annotations_of(marks: Iterable[Mark]) -> Annotations:
                 )
             )
         elif mark.file is not None:
-            references.append(ReferenceRecord(name=name, file=str(mark.file), colour=colour, shown=shown))
+            references.append(
+                ReferenceRecord(name=name, file=str(mark.file), entry=mark.entry, colour=colour, shown=shown)
+            )
     return Annotations(pins=tuple(pins), regions=tuple(regions), references=tuple(references))

@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.controllers.kept_marks import KeptMarks
-from app.controllers.mark_records import NOTHING, fill_region, mark_of_reference, read_reference
+from app.controllers.mark_records import NOTHING, fill_region, mark_of_reference
+from app.controllers.mark_spectra import spectra_of
 from app.jobs.base import Job, JobRunner
-from app.state.results import Mark, Pixel, ResultsState
+from app.state.results import Library, Mark, Pixel, ResultsState
 from app.state.undo import Change, UndoStack
 from app.views import Offerer
 from dsl_core.errors import DslError
 from dsl_core.evaluation.regions import runs_of
+from dsl_core.io.reference_file import Reference, ReferenceFile, read_references
+from dsl_core.progress import Progress
 
 Mask = NDArray[np.bool_]
 #: Colours that are told apart; further marks share them.
@@ -56,13 +59,33 @@ class MarksController:
         self._add_region(Mark("region", "", 0, NOTHING, runs=runs_of(mask)))
 
     def add_reference(self, path: Path) -> None:
-        """Take a file with a spectrum to compare with; says why where it cannot be read."""
-        try:
-            curve = read_reference(path)
-        except DslError as error:
-            self._notifier.tell("error", str(error))
-            return
-        self._kept.when_read(lambda: self._add(mark_of_reference(path.stem, self._colour(), path, curve)))
+        """Take a file with a spectrum to compare with, or let somebody choose where it holds several.
+
+        Says why where it cannot be read.
+        """
+        result = self.state.result.value
+
+        def done(content: ReferenceFile) -> None:
+            if self.state.result.value is not result:
+                return
+            if len(content.references) == 1:
+                self.take_references(path, content.references)
+            else:
+                self.state.library.set(Library(path, content))
+
+        self._runner.submit(
+            Job(f"Read {path.name}", lambda progress: read_references(path), done, self._tell, is_minor=True)
+        )
+
+    def take_references(self, path: Path, chosen: Iterable[Reference]) -> None:
+        """Take spectra of a file to compare with; a library is not asked about any more."""
+        self.state.library.set(None)
+        for each in chosen:
+            self._kept.when_read(lambda each=each: self._add(self._reference(path, each)))  # type: ignore[misc]
+
+    def _reference(self, path: Path, chosen: Reference) -> Mark:
+        name = chosen.name or path.stem
+        return mark_of_reference(name, self._colour(), path, chosen.curve, chosen.name)
 
     def _add_region(self, draft: Mark) -> None:
         result = self.state.result.value
@@ -140,6 +163,42 @@ class MarksController:
         used = [mark.colour for mark in self.state.marks.value]
         return min(range(COLOURS), key=used.count)
 
+    # Hand on ---------------------------------------------------------------------------------------
+
+    def has_shown(self) -> bool:
+        """Whether a spectrum is shown that could be copied or exported; says what to do where none is."""
+        found = bool(spectra_of(self.state.marks.value))
+        if not found:
+            self._notifier.tell("info", "No spectrum is ticked. Pin a pixel, draw a region, or tick one.")
+        return found
+
+    def copy_spectra(self, put: Callable[[str], object]) -> None:
+        """Hand the spectra that are shown to ``put``, as a table with tabs."""
+        from dsl_core.io.export.spectra import spectra_as_text
+
+        if self.has_shown():
+            spectra = spectra_of(self.state.marks.value)
+            put(spectra_as_text(spectra))
+            self._notifier.tell("info", f"Copied {_counted(len(spectra))}. Paste them into a spreadsheet.")
+
+    def export_spectra(self, path: Path, overwrite: bool) -> None:
+        """Write the spectra that are shown as CSV."""
+        result = self.state.result.value
+        if result is None or not self.has_shown():
+            return
+        spectra = spectra_of(self.state.marks.value)
+
+        def work(progress: Progress) -> Path:
+            from dsl_core.io.export.spectra import export_spectra
+
+            progress.report("write spectra", 0, 1)
+            return export_spectra(spectra, path, result.attributes, overwrite=overwrite)
+
+        def done(written: Path) -> None:
+            self._notifier.tell("info", f"Wrote {_counted(len(spectra))} to {written}.")
+
+        self._runner.submit(Job("Export spectra", work, done, self._tell))
+
     # Keep ------------------------------------------------------------------------------------------
 
     def load(self) -> None:
@@ -154,3 +213,7 @@ class MarksController:
 
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", str(error))
+
+
+def _counted(spectra: int) -> str:
+    return "1 spectrum" if spectra == 1 else f"{spectra} spectra"

@@ -49,10 +49,12 @@ def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
             rows.append(f"<tr><td>{name}</td><td colspan='4'>{escape(str(error))}</td></tr>")
             continue
         low, high = found.range_nm
+        # Nothing is made up beyond the ends of a reference.
+        only = "" if found.bands == len(chosen.spectrum.nm) else "only "
         for title, figures in (
             (name, (f"{found.rmse:.4f}", f"{found.angle_rad:.4f}", f"{found.delta_e:.2f}", "1")),
             (
-                f"<span style='color:{theme.muted}'>{low:g}–{high:g} nm, free scale</span>",
+                f"<span style='color:{theme.muted}'>{only}{low:g}–{high:g} nm, free scale</span>",
                 (f"{found.rmse_scaled:.4f}", "", f"{found.delta_e_scaled:.2f}", f"{found.scale:.3f}"),
             ),
         ):

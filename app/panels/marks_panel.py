@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QSize, Qt
-from PySide6.QtGui import QColor, QIcon, QKeySequence, QPixmap, QShortcut
+from PySide6.QtGui import QColor, QGuiApplication, QIcon, QKeySequence, QPixmap, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
@@ -31,7 +31,7 @@ EMPTY = (
     "Click the picture to pin a spectrum, draw a region with the tools above, or drop a file with a reference"
     " spectrum here."
 )
-_FORMATS = "Spectra (*.csv *.txt *.tsv *.dat *.asc);;All files (*)"
+_FORMATS = "Spectra (*.csv *.txt *.tsv *.dat *.asc *.sli *.hdr);;All files (*)"
 
 
 class MarksPanel(QWidget):
@@ -74,12 +74,20 @@ class MarksPanel(QWidget):
         self.below.setFrameShape(QFrame.Shape.NoFrame)
         self.tree.setMinimumHeight(88)
         self.reference = QPushButton("Add reference…")
-        self.reference.setToolTip("Open a spectrum (CSV or text, nm and reflectance) to compare with")
+        self.reference.setToolTip(
+            "Open a spectrum (text, nm and reflectance) or an ENVI library (.sli) to compare with"
+        )
         self.remove = QPushButton("Remove")
         self.remove.setToolTip("Take the selected pin, region or reference away (Delete)")
+        self.copy = QPushButton("Copy spectra")
+        self.copy.setToolTip(
+            "Copy the ticked spectra for a spreadsheet: nm, mean, deviation, n, uncertainty (Ctrl+C)"
+        )
+        self.export = QPushButton("Export spectra…")
+        self.export.setToolTip("Write the same table as CSV, with where the result comes from")
         row = QHBoxLayout()
-        row.addWidget(self.reference)
-        row.addWidget(self.remove)
+        for button in (self.reference, self.remove, self.copy, self.export):
+            row.addWidget(button)
         row.addStretch(1)
         column_box = QVBoxLayout(self)
         column_box.setContentsMargins(0, 0, 0, 0)
@@ -95,7 +103,11 @@ class MarksPanel(QWidget):
         self.reference.clicked.connect(self.choose_reference)
         self.remove.clicked.connect(self.remove_selected)
         delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.tree, self.remove_selected)
-        delete.setContext(Qt.ShortcutContext.WidgetShortcut)
+        copy = QShortcut(QKeySequence(QKeySequence.StandardKey.Copy), self.tree, self.copy_spectra)
+        for shortcut in (delete, copy):
+            shortcut.setContext(Qt.ShortcutContext.WidgetShortcut)
+        self.copy.clicked.connect(self.copy_spectra)
+        self.export.clicked.connect(self.export_spectra)
         self._state.marks.follow(lambda _: self._fill())
         self._state.selected.follow(lambda _: self._show_selection())
 
@@ -109,6 +121,25 @@ class MarksPanel(QWidget):
         """Take the selected mark away."""
         if self._state.selected.value:
             self._commands.remove(self._state.selected.value)
+
+    def copy_spectra(self) -> None:
+        """Copy the spectra that are shown, as a table."""
+        self._commands.copy_spectra(QGuiApplication.clipboard().setText)
+
+    def export_spectra(self) -> None:
+        """Choose a file and write the spectra that are shown."""
+        result = self._state.result.value
+        if result is None or not self._commands.has_shown():
+            return
+        draft = str(result.path.with_name(f"{result.path.stem}_spectra.csv"))
+        name, _ = QFileDialog.getSaveFileName(self, "Export spectra", draft, "Spectra (*.csv)")
+        if name:
+            path = Path(name)
+            # The dialog asked about the name as it was typed, not about one with an ending added.
+            is_whole = path.suffix.lower() == ".csv"
+            self._commands.export_spectra(
+                path if is_whole else path.with_name(f"{path.name}.csv"), overwrite=is_whole
+            )
 
     def _fill(self) -> None:
         self._filling = True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Protocol
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.state.results import Pixel, Seek, View
+from dsl_core.io.reference_file import Reference
 
 
 class MarkCommands(Protocol):
@@ -27,6 +28,9 @@ class MarkCommands(Protocol):
     def add_reference(self, path: Path) -> None:
         """Take a spectrum to compare with."""
 
+    def take_references(self, path: Path, chosen: Iterable[Reference]) -> None:
+        """Take some of a file's spectra; none gives the choice up."""
+
     def remove(self, key: int) -> None:
         """Take a mark away."""
 
@@ -35,6 +39,15 @@ class MarkCommands(Protocol):
 
     def show(self, key: int, shown: bool) -> None:
         """Show or hide a mark."""
+
+    def has_shown(self) -> bool:
+        """Whether a spectrum is shown; says what to do where none is."""
+
+    def copy_spectra(self, put: Callable[[str], object]) -> None:
+        """Hand over the spectra that are shown, as text."""
+
+    def export_spectra(self, path: Path, overwrite: bool) -> None:
+        """Write the spectra that are shown."""
 
 
 class ResultCommands(Protocol):

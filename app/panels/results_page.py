@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 from app.jobs.base import JobRunner
 from app.panels.export_dialog import ExportDialog
 from app.panels.intensity_window import IntensityWindow
+from app.panels.library_dialog import LibraryDialog
 from app.panels.marks_panel import MarksPanel
 from app.panels.readout import Readout
 from app.panels.rendered_words import rendered_words
@@ -29,7 +30,7 @@ from app.panels.scene_panel import ScenePanel
 from app.panels.search_panel import SearchPanel
 from app.panels.spectrum_panel import SpectrumPanel
 from app.panels.view_bar import ViewBar
-from app.state.results import ResultsState, View
+from app.state.results import Library, ResultsState, View
 from app.theme import DARK, Theme
 from app.widgets.forms import label
 from app.widgets.help_window import set_help
@@ -185,6 +186,7 @@ class ResultsPage(PageWidget):
         self._export.clicked.connect(self.export)
         self._inspect.clicked.connect(self.inspect)
         state.graph.changed.connect(self._show_graph)
+        state.library.changed.connect(self._ask_library)
         self.reconstruct.clicked.connect(commands.reconstruct)
         self.scene.pointed.connect(commands.point_at)
         self.scene.pinned.connect(commands.marks.pin)
@@ -240,6 +242,8 @@ class ResultsPage(PageWidget):
             "band_down": lambda: self._commands.step_band(-1),
             "band_up": lambda: self._commands.step_band(1),
             "intensity_graph": self.inspect,
+            "copy_spectra": self.marks.copy_spectra,
+            "export_spectra": self.marks.export_spectra,
             "export": self.export,
         }
 
@@ -267,6 +271,12 @@ class ResultsPage(PageWidget):
                 self._graph.hide()
         elif not self.graph.isVisible():
             self.graph.show()
+
+    def _ask_library(self, library: Library | None) -> None:
+        if library is not None:
+            dialog = LibraryDialog(library, self._commands.marks, self)
+            dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            dialog.open()
 
     def export(self) -> None:
         """Ask for formats and write them."""

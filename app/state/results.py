@@ -15,6 +15,7 @@ from app.state.evented import Value
 from dsl_core.evaluation.similarity import Likeness
 from dsl_core.evaluation.uncertainty import BAND_95
 from dsl_core.inspection import IntensityGraph
+from dsl_core.io.reference_file import ReferenceFile
 from dsl_core.io.result_arrays import ResultArrays
 from dsl_core.model.spectral import SpectralCurve
 
@@ -72,8 +73,10 @@ class Mark:
     """A pin, a region or a reference: anything with a name, a colour and a spectrum.
 
     ``colour`` counts through the theme's colours of pins. A region has an outline, or runs of pixels (row,
-    first column, columns) where it was marked in 3D; ``pixels`` lie in it, ``used`` have a spectrum.
-    ``trouble`` says why a mark that was kept has no spectrum now; empty when it has one.
+    first column, columns) where it was marked in 3D; ``pixels`` lie in it, ``used`` have a spectrum, and
+    ``pixel_std`` is the mean uncertainty that is stated for one of them. A reference has a ``file``, and is
+    called ``entry`` there where the file holds several. ``trouble`` says why a mark that was kept has no
+    spectrum now; empty when it has one.
     """
 
     kind: Literal["pin", "region", "reference"]
@@ -86,10 +89,20 @@ class Mark:
     runs: tuple[tuple[int, int, int], ...] = ()
     pixels: int = 0
     used: int = 0
+    pixel_std: Floats | None = None
     file: Path | None = None
+    entry: str = ""
     curve: SpectralCurve | None = None
     trouble: str = ""
     key: int = field(default_factory=lambda: next(_keys))
+
+
+@dataclass(frozen=True)
+class Library:
+    """A file with several reference spectra, of which some are to be chosen."""
+
+    path: Path
+    content: ReferenceFile
 
 
 class Seek(Enum):
@@ -129,7 +142,7 @@ class ResultsState:
     ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes;
     it follows ``light`` and ``adapted`` once it is computed. ``cloud_by`` is the view that colours the cloud;
     ``busy`` says in words what is being opened (empty: nothing). ``graph`` is what the pixel saw that was
-    last inspected.
+    last inspected; ``library`` waits for somebody to choose of it.
     """
 
     def __init__(self) -> None:
@@ -149,6 +162,7 @@ class ResultsState:
         self.adapted = Value(True)
         self.search: Value[Search | None] = Value(None)
         self.graph: Value[IntensityGraph | None] = Value(None)
+        self.library: Value[Library | None] = Value(None)
 
     @property
     def selected_mark(self) -> Mark | None:

@@ -35,10 +35,11 @@ class RegionRecord(Record):
 
 
 class ReferenceRecord(Record):
-    """A file with a spectrum to compare with."""
+    """A file with a spectrum to compare with; ``entry`` is its name there where the file holds several."""
 
     name: str
     file: str
+    entry: str = ""
     colour: int = 0
     shown: bool = True
 

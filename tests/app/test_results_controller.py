@@ -14,6 +14,7 @@ from app.state.undo import UndoStack
 from app.views import RecordingNotifier
 from dsl_core.io.annotations_file import load_annotations
 from tests.app.small_result import BLUE, DARK, NM, write_reference, write_small_result
+from tests.io.test_reference_file import BRICK, write_library
 
 SQUARE = ((1.5, 5.5), (6.5, 5.5), (6.5, 9.5), (1.5, 9.5))
 
@@ -249,3 +250,48 @@ def test_spectra_carry_what_the_plot_needs(bench: Bench) -> None:
     assert spectrum.share is not None
     assert bench.state.spectrum_at(DARK) is None
     assert bench.state.spectrum_at((99, 0)) is None
+
+
+def test_spectra_are_copied_and_exported_and_come_back_as_references(bench: Bench, tmp_path: Path) -> None:
+    marks, copied, path = bench.control.marks, list[str](), tmp_path / "spectra.csv"
+    marks.copy_spectra(copied.append)
+    assert (copied, marks.has_shown()) == ([], False)
+    assert "No spectrum is ticked" in bench.told
+    marks.add_outline(SQUARE)
+    marks.pin((3, 3))
+    marks.show(bench.state.marks.value[1].key, False)
+    marks.copy_spectra(copied.append)
+    assert "Copied 1 spectrum" in bench.told
+    head, first = (line.split("\t") for line in copied[0].splitlines()[:2])
+    assert head == [
+        "wavelength_nm",
+        "region 1: reflectance (1)",
+        "region 1: deviation of its pixels (1)",
+        "region 1: n (pixels)",
+        "region 1: uncertainty of a pixel (1)",
+    ]
+    assert float(first[4]) == pytest.approx(0.01)
+    marks.export_spectra(path, overwrite=False)
+    assert f"Wrote 1 spectrum to {path}" in bench.told
+    marks.export_spectra(path, overwrite=False)
+    assert "exists already" in bench.told
+    assert bench.control.open(path)
+    reference = bench.state.marks.value[-1]
+    assert reference.kind == "reference"
+    np.testing.assert_allclose(reference.spectrum.mean, BLUE, atol=1e-4)
+
+
+def test_a_library_asks_which_spectrum_and_its_name_brings_it_back(bench: Bench, tmp_path: Path) -> None:
+    path = write_library(tmp_path / "plants.sli")
+    assert bench.control.open(path)
+    library = bench.state.library.value
+    assert library is not None
+    assert bench.names == []
+    bench.control.marks.take_references(path, library.content.references[1:])
+    assert bench.state.library.value is None
+    assert bench.names == ["Brick"]
+    again = Bench(tmp_path / "small.zarr")
+    np.testing.assert_allclose(again.state.marks.value[0].spectrum.mean, BRICK, rtol=1e-6)
+    path.with_suffix(".hdr").unlink()
+    assert bench.control.open(path)
+    assert "lacks its header" in bench.told

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QImage, QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.application import make_window
@@ -28,6 +28,7 @@ from app.panels.artist import SETTLE_S
 from app.panels.easel import graphics_work
 from app.panels.export_dialog import ExportDialog
 from app.panels.intensity_window import ticks
+from app.panels.library_dialog import LibraryDialog
 from app.panels.mark_figures import figures_of
 from app.panels.result_layers import Layers, rgb_of
 from app.panels.results_page import ResultsPage
@@ -44,6 +45,7 @@ from dsl_core.errors import Cancelled
 from dsl_core.evaluation.distance import on_screen
 from dsl_core.inspection import IntensityGraph
 from tests.app.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
+from tests.io.test_reference_file import write_library
 
 
 def move(widget: QWidget, to: QPoint, buttons: Qt.MouseButton = Qt.MouseButton.NoButton) -> None:
@@ -311,6 +313,42 @@ def test_references_are_dropped_and_compared(bench: Bench, qtbot: QtBot, tmp_pat
     assert "tile &lt;b&gt;" in text
     assert "2.000" in text
     assert "ΔE00" in bench.page.marks.figures.text()
+
+
+def test_a_library_that_is_dropped_asks_which_spectrum(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((10, 10))
+    bench.window.open_path(write_library(tmp_path / "plants.sli"))
+    (dialog,) = bench.page.findChildren(LibraryDialog)
+    assert not dialog.take.isEnabled()
+    assert "2 of 2 listed, 0 chosen" in dialog.text.text()
+    dialog.filter.setText("BRI")
+    assert [dialog.list.item(i).isHidden() for i in (0, 1)] == [True, False]
+    dialog.list.selectAll()
+    dialog.take.click()
+    assert [mark.name for mark in bench.marks] == ["pin 1", "Brick"]
+    assert not dialog.isVisible()
+    bench.state.selected.set(bench.marks[0].key)
+    assert "Brick" in bench.page.marks.figures.text()
+    bench.window.open_path(tmp_path / "plants.hdr")
+    again = bench.page.findChildren(LibraryDialog)[-1]
+    again.reject()
+    assert bench.state.library.value is None
+    assert len(bench.marks) == 2
+
+
+def test_spectra_go_to_the_clipboard_and_to_a_file(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.control.marks.pin((10, 10))
+    bench.page.marks.tree.setFocus()
+    QTest.keyClick(bench.page.marks.tree, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    assert QApplication.clipboard().text().startswith("wavelength_nm\tpin 1: reflectance (1)\t")
+    names = iter([str(tmp_path / "a"), "", str(tmp_path / "a.csv")])
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (next(names), ""))
+    for _ in range(3):
+        bench.window.do("export_spectra")
+    assert "Wrote 1 spectrum" in bench.window.toasts.shown[-1].text
+    assert [path.name for path in tmp_path.glob("a*")] == ["a.csv"]
 
 
 def test_the_search_is_shown_with_its_share(bench: Bench) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,10 +46,15 @@ def wavelengths_nm(result: xr.Dataset) -> list[float]:
 
 
 def provenance(result: xr.Dataset) -> dict[str, str]:
-    """Every plain attribute of the result as text, and the version of the program that exports."""
+    """Where a result comes from, as `provenance_of` says it."""
+    return provenance_of({str(key): value for key, value in result.attrs.items()})
+
+
+def provenance_of(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """Every plain attribute of a result as text, and the version of the program that exports."""
     plain = {
-        str(key): " ".join(str(value).split())
-        for key, value in result.attrs.items()
+        key: " ".join(str(value).split())
+        for key, value in attributes.items()
         if isinstance(value, str | int | float | np.number)
     }
     return {**plain, "exported_by": f"dsl-scan {dsl_core.__version__}"}

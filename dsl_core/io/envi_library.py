@@ -1,0 +1,168 @@
+"""Spectral libraries of ENVI: many spectra in ``NAME.sli``, described by ``NAME.hdr``.
+
+The header is read here and not by the `spectral` package, which takes only the system's encoding, fails on
+numbers of bands that differ with an exception that names no file, and leaves out the header's offset.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+
+Floats = NDArray[np.float64]
+LIBRARY = "envi spectral library"
+#: Endings that the data may have; the first is what ENVI writes.
+DATA_SUFFIXES = (".sli", ".SLI", ".dat", ".img", "")
+#: Kinds of numbers by the header's code; complex ones are no reflectance.
+_KINDS = {
+    **{"1": "u1", "2": "i2", "3": "i4", "4": "f4", "5": "f8"},
+    **{"12": "u2", "13": "u4", "14": "i8", "15": "u8"},
+}
+_NANOMETRES = {"nanometers": 1.0, "nanometres": 1.0, "nm": 1.0, "micrometers": 1e3, "micrometres": 1e3}
+_NANOMETRES |= {"um": 1e3, "µm": 1e3, "μm": 1e3, "microns": 1e3}
+_FIELD = re.compile(r"^[ \t]*([^=;{}\n]+?)[ \t]*=[ \t]*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
+#: Below this no instrument measures: such values mark what was deleted, as -1.23e34 does in many libraries.
+DELETED_BELOW = -1e30
+#: Reflectance above this can only be a percentage, above a hundred times this only a count of unstated scale.
+MOST = 2.0
+
+
+def read_library(path: Path) -> tuple[Floats, list[str], Floats]:
+    """Wavelengths (nm, rising), names, and reflectance (spectra, bands) of a library; NaN for no value.
+
+    ``path`` is the header or the data. Micrometres are converted where the header says so, and a stated
+    scale is divided by. Raises `CalibrationError` that names the file.
+    """
+    header_path, data_path = _pair(path)
+    header = _read_header(header_path)
+    if header.get("file type", "").lower() != LIBRARY:
+        raise CalibrationError(
+            f"{header_path.name} describes {header.get('file type') or 'no ENVI file'}, not an ENVI spectral"
+            " library. Choose a library (.sli), or export the spectrum as text in two columns."
+        )
+    values = _read_data(header_path, data_path, header)
+    nm = _wavelengths_nm(header_path, header, values.shape[1])
+    order = np.argsort(nm)
+    if np.any(np.diff(nm[order]) <= 0):
+        raise CalibrationError(f"{header_path.name}: wavelengths occur twice. Correct the header.")
+    return nm[order], _names(header, len(values)), _reflectance(header_path, header, values)[:, order]
+
+
+def _pair(path: Path) -> tuple[Path, Path]:
+    """The header and the data, one of which was chosen."""
+    if path.suffix.lower() == ".hdr":
+        found = [data for suffix in DATA_SUFFIXES if (data := path.with_suffix(suffix)).is_file()]
+        if not found:
+            raise CalibrationError(
+                f"The spectra that {path.name} describes are not beside it. Put {path.stem}.sli there."
+            )
+        return path, found[0]
+    headers = (path.with_suffix(".hdr"), path.with_suffix(".HDR"), path.with_name(f"{path.name}.hdr"))
+    for header in headers:
+        if header.is_file():
+            return header, path
+    raise CalibrationError(
+        f"{path.name} lacks its header, without which nobody knows what it holds. Put {headers[0].name}"
+        " beside it."
+    )
+
+
+def _read_header(path: Path) -> dict[str, str]:
+    """The fields of a header by their names in small letters, lists with their commas but without braces."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise CalibrationError(f"The header {path} cannot be read ({error}). Correct its path.") from error
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    text = text.replace("\r\n", "\n")
+    return {key.lower(): value.strip().strip("{}").strip() for key, value in _FIELD.findall(text)}
+
+
+def _read_data(path: Path, data: Path, header: Mapping[str, str]) -> Floats:
+    bands, spectra = (_whole(path, header, key) for key in ("samples", "lines"))
+    kind = _KINDS.get(header.get("data type", ""))
+    if kind is None or _whole(path, header, "bands", 1) != 1:
+        raise CalibrationError(
+            f"{path.name}: a library of one plane of real numbers is wanted; the header says"
+            f" bands = {header.get('bands', '?')} and data type = {header.get('data type', '?')}."
+            " Export the library anew."
+        )
+    dtype = np.dtype(kind).newbyteorder(">" if header.get("byte order", "0") == "1" else "<")
+    offset, wanted = _whole(path, header, "header offset", 0), bands * spectra
+    try:
+        there = (data.stat().st_size - offset) // dtype.itemsize
+        if there < wanted:
+            raise CalibrationError(
+                f"{data.name} is cut off: {spectra} spectra of {bands} bands are {wanted} values, and it"
+                f" holds {max(there, 0)}. Copy it again."
+            )
+        values = np.fromfile(data, dtype, wanted, offset=offset)
+    except OSError as error:
+        raise CalibrationError(f"The library {data} cannot be read ({error}). Correct its path.") from error
+    return values.reshape(spectra, bands).astype(np.float64)
+
+
+def _whole(path: Path, header: Mapping[str, str], key: str, default: int | None = None) -> int:
+    text = header.get(key, "" if default is None else str(default))
+    if not text.isdecimal() or (default is None and int(text) == 0):
+        raise CalibrationError(
+            f"{path.name}: a whole number is wanted as {key!r}; the header says {text or 'nothing'!r}."
+            " Correct the header."
+        )
+    return int(text)
+
+
+def _wavelengths_nm(path: Path, header: Mapping[str, str], bands: int) -> Floats:
+    try:
+        given = np.array([float(cell) for cell in header.get("wavelength", "").split(",") if cell.strip()])
+    except ValueError as error:
+        raise CalibrationError(f"{path.name}: a wavelength is no number ({error}). Correct it.") from error
+    if len(given) != bands or not np.isfinite(given).all():
+        raise CalibrationError(
+            f"{path.name} names {len(given)} wavelengths for {bands} bands. Add what is missing."
+        )
+    units = header.get("wavelength units", "").lower()
+    factor = _NANOMETRES.get(units)
+    if factor is None and (units not in ("", "unknown") or given.max() < 100):
+        raise CalibrationError(
+            f"{path.name}: wavelengths from {given.min():g} to {given.max():g} {units or 'of unstated unit'};"
+            " nanometres or micrometres are wanted. Add 'wavelength units' to the header."
+        )
+    return given * (factor or 1.0)
+
+
+def _names(header: Mapping[str, str], count: int) -> list[str]:
+    """The names of the spectra, numbers for those without one; all numbers where a comma splits a name."""
+    given = [" ".join(name.split()) for name in header.get("spectra names", "").split(",")]
+    known = given if len(given) == count else [""] * count
+    return [name or f"spectrum {i}" for i, name in enumerate(known, 1)]
+
+
+def _reflectance(path: Path, header: Mapping[str, str], values: Floats) -> Floats:
+    """Values as shares of light; NaN for what the header or an absurd number marks as deleted."""
+    deleted = ~np.isfinite(values) | (values < DELETED_BELOW)
+    try:
+        scale = float(header.get("reflectance scale factor", 1.0))
+        if "data ignore value" in header:
+            deleted |= values == np.float64(header["data ignore value"])
+    except ValueError as error:
+        raise CalibrationError(
+            f"{path.name}: the scale factor or ignore value is no number ({error}). Correct the header."
+        ) from error
+    values = np.where(deleted, np.nan, values / (scale if scale > 0 else 1.0))
+    most = np.nanmax(values, initial=0.0)
+    if most > 100 * MOST:
+        raise CalibrationError(
+            f"{path.name} holds values up to {most:g}; reflectance from 0 to 1 is wanted. Add the factor that"
+            " they were multiplied by to the header, as 'reflectance scale factor'."
+        )
+    return values * (0.01 if most > MOST else 1.0)

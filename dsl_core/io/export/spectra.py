@@ -1,0 +1,96 @@
+"""Spectra of pins, regions and references side by side: a row a band, units in the names of the columns.
+
+Where a spectrum has no value at a wavelength of another one, or no answer, it says ``nan``. Lines that begin
+with ``#`` say where the data come from; ``pandas.read_csv(..., comment="#")`` skips them.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.export.common import provenance_of, require_suffix
+from dsl_core.io.reference_file import MEAN, WAVELENGTH
+from dsl_core.io.staging import staged
+
+Floats = NDArray[np.floating[Any]]
+#: How the other columns of a spectrum are called behind its name.
+DEVIATION, COUNT, UNCERTAINTY = (
+    ": deviation of its pixels (1)",
+    ": n (pixels)",
+    ": uncertainty of a pixel (1)",
+)
+
+
+@dataclass(frozen=True)
+class NamedSpectrum:
+    """A spectrum with its name, all arrays of shape (bands,).
+
+    ``deviation`` is the scatter of the ``pixels`` that it is the mean of, ``uncertainty`` one standard
+    deviation as stated for a single pixel; None where there is no such thing, as for a reference.
+    """
+
+    name: str
+    wavelengths_nm: Floats
+    mean: Floats
+    deviation: Floats | None = None
+    uncertainty: Floats | None = None
+    pixels: int | None = None
+
+
+def export_spectra(
+    spectra: Sequence[NamedSpectrum], path: Path, attributes: Mapping[str, Any], *, overwrite: bool = False
+) -> Path:
+    """Write spectra and where they come from as CSV; raises `StoreError`, also when there are none."""
+    require_suffix(path, ".csv")
+    if not spectra:
+        raise StoreError("A table of spectra needs at least one. Pin a pixel or draw a region first.")
+    with (
+        staged([path], overwrite=overwrite) as (draft,),
+        draft.open("w", newline="", encoding="utf-8") as file,
+    ):
+        file.writelines(f"# {key}: {value}\n" for key, value in provenance_of(attributes).items())
+        csv.writer(file).writerows(_rows(spectra, "nan"))
+    return path
+
+
+def spectra_as_text(spectra: Sequence[NamedSpectrum]) -> str:
+    """The same table with tabs, as spreadsheets take it from the clipboard; what is not there is empty."""
+    text = StringIO()
+    csv.writer(text, delimiter="\t", lineterminator="\n").writerows(_rows(spectra, ""))
+    return text.getvalue()
+
+
+def _rows(spectra: Sequence[NamedSpectrum], missing: str) -> Iterator[list[str]]:
+    head, columns = [WAVELENGTH], []
+    for spectrum in spectra:
+        for title, values in _columns(spectrum):
+            head.append(f"{spectrum.name}{title}")
+            columns.append(dict(zip(spectrum.wavelengths_nm.tolist(), values, strict=True)))
+    yield head
+    for nm in sorted({nm for column in columns for nm in column}):
+        yield [f"{nm:g}", *(column.get(nm) or missing for column in columns)]
+
+
+def _columns(spectrum: NamedSpectrum) -> Iterator[tuple[str, list[str]]]:
+    yield MEAN, _texts(spectrum.mean)
+    if spectrum.deviation is not None:
+        yield DEVIATION, _texts(spectrum.deviation)
+    if spectrum.pixels is not None:
+        yield COUNT, [str(spectrum.pixels)] * len(spectrum.mean)
+    if spectrum.uncertainty is not None:
+        yield UNCERTAINTY, _texts(spectrum.uncertainty)
+
+
+def _texts(values: Floats) -> list[str]:
+    """Shortest texts that read back as the same numbers; empty for no answer."""
+    # Not str(): colour-science sets NumPy's print options for the whole process, which cuts digits.
+    return [np.format_float_positional(v, trim="0") if np.isfinite(v) else "" for v in values]

@@ -1,0 +1,137 @@
+"""References from libraries that another program wrote, from tables of this one, and from text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.export.spectra import NamedSpectrum, export_spectra
+from dsl_core.io.reference_file import read_reference, read_references
+
+NM = np.arange(400.0, 701.0, 10.0)
+GRASS, BRICK = np.linspace(0.05, 0.4, NM.size), np.linspace(0.3, 0.6, NM.size)
+HEADER = {
+    "samples": NM.size,
+    "lines": 2,
+    "bands": 1,
+    "header offset": 0,
+    "file type": "ENVI Spectral Library",
+    "data type": 4,
+    "interleave": "bsq",
+    "byte order": 0,
+    "wavelength units": "Nanometers",
+    "spectra names": "{Grass, Brick}",
+    "wavelength": "{" + ",\n ".join(f"{nm:g}" for nm in NM) + "}",
+}
+
+
+def write_library(
+    path: Path, fields: Mapping[str, object] | None = None, kind: str = "<f4", offset: int = 0
+) -> Path:
+    """A library as ENVI writes it, with some fields of the header replaced (None: left out)."""
+    header = {**HEADER, **(fields or {})}
+    lines = [f"{key} = {value}" for key, value in header.items() if value is not None]
+    path.with_suffix(".hdr").write_text("\n".join(["ENVI", "description = {a = b, c}", *lines]), "utf-8")
+    path.write_bytes(b"x" * offset + np.stack([GRASS, BRICK]).astype(kind).tobytes())
+    return path
+
+
+def test_a_library_of_the_spectral_package(tmp_path: Path) -> None:
+    from spectral.io import envi
+
+    header = {"wavelength": [str(nm / 1000) for nm in NM], "spectra names": ["Grass", "Grass"]}
+    library = envi.SpectralLibrary(np.stack([GRASS, BRICK]), {**header, "wavelength units": "Micrometers"})
+    library.save(str(tmp_path / "usgs"), "Two spectra")
+    for path in (tmp_path / "usgs.sli", tmp_path / "usgs.hdr"):
+        grass, brick = read_references(path).references
+        assert (grass.name, brick.name) == ("Grass", "Grass (2)")
+        np.testing.assert_allclose(grass.curve.wavelengths_nm, NM, rtol=1e-6)
+        np.testing.assert_allclose(grass.curve.values, GRASS, rtol=1e-6)
+        np.testing.assert_allclose(brick.curve.values, BRICK, rtol=1e-6)
+    np.testing.assert_allclose(read_reference(tmp_path / "usgs.sli", "Grass (2)").values, BRICK, rtol=1e-6)
+    with pytest.raises(CalibrationError, match="no spectrum 'Roof'"):
+        read_reference(tmp_path / "usgs.sli", "Roof")
+
+
+def test_byte_order_offset_scale_and_falling_wavelengths_are_understood(tmp_path: Path) -> None:
+    path = write_library(
+        tmp_path / "a.sli", {"data type": 5, "byte order": 1, "header offset": 12}, ">f8", 12
+    )
+    np.testing.assert_allclose(read_reference(path, "Brick").values, BRICK)
+    falling = "{" + ",".join(f"{nm:g}" for nm in NM[::-1]) + "}"
+    path = write_library(tmp_path / "b.sli", {"wavelength": falling, "wavelength units": None})
+    np.testing.assert_allclose(read_reference(path, "Grass").values, GRASS[::-1], rtol=1e-6)
+    path = write_library(tmp_path / "c.sli", {"reflectance scale factor": 10})
+    np.testing.assert_allclose(read_reference(path, "Grass").values, GRASS / 10, rtol=1e-6)
+    header = (tmp_path / "c.hdr").read_text("utf-8").replace("Grass", "Grün")
+    (tmp_path / "c.hdr").write_bytes(header.replace("\n", "\r\n").encode("latin-1"))
+    assert read_references(path).references[0].name == "Grün"
+
+
+def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
+    path = write_library(tmp_path / "a.sli", {"data ignore value": -1})
+    values = np.stack([GRASS, BRICK]).astype("<f4")
+    values[0, [0, 5, 24, 25, 26]] = -1.23e34, -1, -1, -1, -1
+    values[1] = -1
+    path.write_bytes(values.tobytes())
+    found = read_references(path)
+    assert found.empty == ("Brick",)
+    np.testing.assert_array_equal(found.references[0].curve.wavelengths_nm, np.delete(NM[1:24], 4))
+    values[0] = -1
+    path.write_bytes(values.tobytes())
+    with pytest.raises(CalibrationError, match=r"No spectrum of a\.sli"):
+        read_references(path)
+
+
+@pytest.mark.parametrize(
+    ("fields", "told"),
+    [
+        ({"file type": "ENVI Standard"}, "describes ENVI Standard, not an ENVI spectral library"),
+        ({"wavelength": None}, "names 0 wavelengths for 31 bands"),
+        ({"wavelength": "{400, x}"}, "a wavelength is no number"),
+        ({"wavelength units": "Wavenumber"}, "wavenumber; nanometres or micrometres are wanted"),
+        ({"wavelength": "{" + ",".join(["500"] * NM.size) + "}"}, "wavelengths occur twice"),
+        ({"samples": None}, "'samples'; the header says 'nothing'"),
+        ({"lines": 3}, "cut off: 3 spectra of 31 bands are 93 values, and it holds 62"),
+        ({"data type": 6}, "data type = 6"),
+        ({"bands": 4}, "bands = 4"),
+        ({"reflectance scale factor": "0.001"}, "holds values up to 600; reflectance from 0 to 1"),
+        ({"data ignore value": "none"}, "ignore value is no number"),
+    ],
+)
+def test_wrong_libraries_are_named_with_the_reason(
+    tmp_path: Path, fields: dict[str, object], told: str
+) -> None:
+    path = write_library(tmp_path / "a.sli", fields)
+    with pytest.raises(CalibrationError, match=told) as caught:
+        read_references(path)
+    assert "a." in str(caught.value)
+
+
+def test_half_a_library_says_what_is_missing(tmp_path: Path) -> None:
+    path = write_library(tmp_path / "a.sli")
+    (tmp_path / "a.hdr").rename(tmp_path / "b.hdr")
+    with pytest.raises(CalibrationError, match=r"Put a\.hdr beside it"):
+        read_references(path)
+    with pytest.raises(CalibrationError, match=r"Put b\.sli there"):
+        read_references(tmp_path / "b.hdr")
+
+
+def test_a_table_of_this_program_holds_several(tmp_path: Path) -> None:
+    fine = np.arange(500.0, 521.0, 5.0)
+    spectra = [
+        NamedSpectrum("sky", NM, GRASS, GRASS / 9, GRASS / 9, 3),
+        NamedSpectrum("sky", fine, fine / 1000),
+    ]
+    path = export_spectra(spectra, tmp_path / "table.csv", {})
+    first, second = read_references(path).references
+    assert (first.name, second.name) == ("sky", "sky (2)")
+    np.testing.assert_array_equal(first.curve.values, GRASS)
+    np.testing.assert_array_equal(second.curve.wavelengths_nm, fine)
+    path.write_text(path.read_text("utf-8").replace("\n500,", "\nfive,"), "utf-8")
+    with pytest.raises(CalibrationError, match=r"table\.csv: a cell is no number"):
+        read_references(path)
