@@ -47,6 +47,7 @@ class SessionDesk(QObject):
             state.light,
             state.adapted,
             state.cursor,
+            state.depth_limits,
         )
 
     def serve_scan(self, control: ScanController) -> None:

@@ -16,7 +16,6 @@ from app.jobs.base import Job, JobRunner
 from app.state.results import Library, Mark, Pixel, ResultsState
 from app.state.undo import Change, UndoStack
 from app.views import Offerer
-from dsl_core.errors import DslError
 from dsl_core.evaluation.regions import runs_of
 from dsl_core.io.reference_file import Reference, ReferenceFile, read_references
 from dsl_core.progress import Progress

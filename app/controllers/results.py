@@ -16,8 +16,8 @@ from app.controllers.marks import MarksController
 from app.controllers.result_files import expected_files, is_complete, picture_of
 from app.jobs.base import Job, JobRunner
 from app.state.evented import Event
-from app.state.results import Pixel, ResultsState, Search, Seek, Spectrum, View
-from app.state.undo import UndoStack
+from app.state.results import Limits, Pixel, ResultsState, Search, Seek, Spectrum, View
+from app.state.undo import Change, UndoStack
 from app.views import Offerer
 from dsl_core.inspection import FrameBlock, IntensityGraph, intensity_graph, read_block
 from dsl_core.io.result_arrays import ResultArrays, load_arrays
@@ -30,6 +30,7 @@ class ResultsController:
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self.marks = MarksController(state, runner, notifier, undo)
+        self._undo = undo
         #: Tells when a result is there with all its views, so that one may look at it in another way.
         self.opened: Event[ResultArrays] = Event()
         self._block: FrameBlock | None = None
@@ -125,6 +126,7 @@ class ResultsController:
         self._turn += 1
         state.light.set("D65")
         self._lit = "D65", state.adapted.value
+        state.depth_limits.set(None)
         state.picture.set(picture)
         # Every result has this band; that of another one it may not have.
         state.band.set(0)
@@ -182,6 +184,21 @@ class ResultsController:
         result = self.state.result.value
         if pixel is None or (result is not None and result.holds(pixel)):
             self.state.cursor.set(pixel)
+
+    def limit_depth(self, limits: Limits | None) -> None:
+        """Show only what lies between two depths (mm), or all of it; says why where that is nothing."""
+        value, before = self.state.depth_limits, self.state.depth_limits.value
+        if limits == before:
+            return
+        if limits is not None and not limits[0] < limits[1]:
+            self._notifier.tell(
+                "info",
+                f"Nothing lies between {limits[0]:g} and {limits[1]:g} mm. Make the second limit the larger"
+                " one.",
+            )
+            return
+        text = "showing all depths" if limits is None else "limiting depth"
+        self._undo.push(Change(text, partial(value.set, limits), partial(value.set, before)))
 
     # Light -----------------------------------------------------------------------------------------
 

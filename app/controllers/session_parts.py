@@ -40,6 +40,7 @@ def results_part(state: ResultsState) -> ResultsPart | None:
         light=state.light.value,
         adapted=state.adapted.value,
         cursor=state.cursor.value,
+        depth_limits=state.depth_limits.value,
     )
 
 
@@ -54,6 +55,7 @@ def come_back_to_result(part: ResultsPart, control: ResultsController) -> None:
             control.step_band(part.band - state.band.value)
         _set_named(state.cloud_by, View, part.cloud_by)
         _set_named(state.quality, Quality, part.quality)
+        state.depth_limits.set(part.depth_limits)
         view = _named(View, part.view)
         if view is not None:
             control.show(view)

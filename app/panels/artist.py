@@ -56,9 +56,9 @@ class Artist:
             picture, self._picture = self._picture, None
         return picture
 
-    def show(self, points: Points, colours: Colours) -> None:
-        """Show a cloud; other points than before are looked at anew."""
-        self._ask(partial(self._show, points, colours))
+    def show(self, points: Points, colours: Colours, anew: bool = True) -> None:
+        """Show a cloud; other points than before are looked at ``anew``, or from where one is."""
+        self._ask(partial(self._show, points, colours, anew))
 
     def mark(self, name: str, points: Points, colours: Colours, size_px: int, moves: bool = False) -> None:
         """Mark points; the cloud is coarse for a while where the mark ``moves``."""
@@ -158,8 +158,8 @@ class Artist:
             with suppress(RuntimeError):
                 self._drawn()
 
-    def _show(self, points: Points, colours: Colours) -> None:
-        self._easel.show(points, colours)
+    def _show(self, points: Points, colours: Colours, anew: bool) -> None:
+        self._easel.show(points, colours, anew)
         self._is_fresh, self._is_grown = True, False
 
     def _mark(self, name: str, points: Points, colours: Colours, size_px: int, moves: bool) -> None:

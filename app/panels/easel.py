@@ -78,10 +78,14 @@ class Easel:
 
     # What is shown ---------------------------------------------------------------------------------
 
-    def show(self, points: Points, colours: Colours) -> None:
-        """Show a cloud; other points than before are looked at anew."""
-        if self.cloud.show(points, colours):
+    def show(self, points: Points, colours: Colours, anew: bool = True) -> None:
+        """Show a cloud; other points than before are looked at ``anew``, or from where one is."""
+        if not self.cloud.show(points, colours):
+            return
+        if anew:
             self.reset()
+        else:
+            self._plotter.reset_camera_clipping_range()
 
     def set_background(self, colour: str) -> None:
         """The colour behind the cloud."""

@@ -90,7 +90,14 @@ class ResultImage(QWidget):
     def _follow(self) -> None:
         state = self._state
         state.result.follow(self._new_result)
-        for value in (state.view, state.cloud_by, state.band, state.quality, state.picture):
+        for value in (
+            state.view,
+            state.cloud_by,
+            state.band,
+            state.quality,
+            state.picture,
+            state.depth_limits,
+        ):
             value.changed.connect(lambda _: self.paint())
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)

@@ -9,7 +9,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 
-from app.state.results import Quality, ResultsState, View
+from app.state.results import Limits, Quality, ResultsState, View
 from dsl_core.io.result_arrays import ResultArrays
 from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 
@@ -44,6 +44,14 @@ def spread_of(values: NDArray[np.floating[Any]], low: float = 0.5, high: float =
     return bottom, max(top, bottom + 1e-6 * max(abs(bottom), 1.0))
 
 
+def within(depth_mm: NDArray[Any], limits: Limits | None) -> NDArray[np.bool_]:
+    """Where there is a depth that is shown; without limits all that is known."""
+    shown: NDArray[np.bool_] = np.isfinite(depth_mm)
+    if limits is not None:
+        shown &= (depth_mm >= limits[0]) & (depth_mm <= limits[1])
+    return shown
+
+
 class Layers:
     """Makes the layers of one result; what costs time is made once."""
 
@@ -57,11 +65,11 @@ class Layers:
         if view is View.BAND and self.result.has_spectra:
             return self._band(state.band.value)
         if view is View.DEPTH:
-            return self._map("depth_mm", DEPTH, "Depth, mm")
+            return self._depth(state.depth_limits.value)
         if view is View.QUALITY:
             return self._quality(state.quality.value, state.band.value)
         picture = state.picture.value
-        return Layer(picture) if picture is not None else self._map("depth_mm", DEPTH, "Depth, mm")
+        return Layer(picture) if picture is not None else self._depth(state.depth_limits.value)
 
     def _once(self, name: str, make: Any) -> Any:
         if name not in self._known:
@@ -76,6 +84,13 @@ class Layers:
     def _map(self, name: str, colours: str, label: str) -> Layer:
         values = self.result[name]
         return Layer(values, self._once(name, lambda: spread_of(values)), colours, label=label)
+
+    def _depth(self, limits: Limits | None) -> Layer:
+        whole = self._map("depth_mm", DEPTH, "Depth, mm")
+        if limits is None:
+            return whole
+        shown = np.where(within(whole.image, limits), whole.image, np.float32(np.nan))
+        return Layer(shown, limits, DEPTH, label=whole.label)
 
     def _quality(self, what: Quality, band: int) -> Layer | None:
         names = {

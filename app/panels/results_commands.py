@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.state.results import Pixel, Seek, View
+from app.state.results import Limits, Pixel, Seek, View
 from dsl_core.io.reference_file import Reference
 
 
@@ -81,6 +81,9 @@ class ResultCommands(Protocol):
 
     def point_at(self, pixel: Pixel | None) -> None:
         """Put the cursor on a pixel."""
+
+    def limit_depth(self, limits: Limits | None) -> None:
+        """Show only what lies between two depths, or all of it."""
 
     def relight(self, light: str, adapted: bool) -> None:
         """Show the colours under another light."""

@@ -40,8 +40,8 @@ class Scene(Protocol):
 
     widget: QWidget
 
-    def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
-        """Show points (n, 3) in mm with their colours (n, 3); other points are looked at anew."""
+    def show_cloud(self, points: Points, colours: NDArray[np.uint8], anew: bool = True) -> None:
+        """Show points (n, 3) in mm with colours (n, 3); other points are looked at ``anew``, or as is."""
 
     def show_marker(self, point: Points | None, colour: str) -> None:
         """Mark a point; None marks nothing."""
@@ -204,9 +204,9 @@ class TurnedScene:
         """Whether all that was asked for is drawn, with as many points as this machine draws in time."""
         return self._artist.is_at_rest
 
-    def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
+    def show_cloud(self, points: Points, colours: NDArray[np.uint8], anew: bool = True) -> None:
         """Show points with their colours, as many as this machine draws in time."""
-        self._artist.show(points, colours)
+        self._artist.show(points, colours, anew)
 
     def show_marker(self, point: Points | None, colour: str) -> None:
         """Mark a point; the cloud is coarse until it rests."""

@@ -11,13 +11,14 @@ from PySide6.QtGui import QMouseEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.jobs.base import Job, JobRunner
-from app.panels.result_layers import Layers, rgb_of
+from app.panels.result_layers import Layers, rgb_of, within
 from app.panels.scene import Scene, make_scene, normalised, prepare_scene
 from app.state.results import Pixel, ResultsState, Tool, View
 from app.theme import DARK, Theme
 from app.widgets.forms import label
 from dsl_core.evaluation.distance import nearest_on_screen, on_screen
 from dsl_core.evaluation.regions import inside_outline
+from dsl_core.io.result_arrays import ResultArrays
 
 #: Points among which the one under the moving mouse is looked for; a click looks at all.
 HOVER_POINTS = 60_000
@@ -40,6 +41,8 @@ class ScenePanel(QWidget):
         self._layers: Layers | None = None
         self._points = np.empty((0, 3), np.float32)
         self._flat = np.empty(0, np.intp)
+        #: Whether the points are of another result than those that are seen.
+        self._is_new = True
         self._seen: NDArray[np.float64] | None = None
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
@@ -56,6 +59,7 @@ class ScenePanel(QWidget):
         state.result.changed.connect(lambda _: self._new_result())
         for value in (state.cloud_by, state.band, state.quality, state.picture, state.search):
             value.changed.connect(lambda _: self._later.start())
+        state.depth_limits.changed.connect(lambda _: self._limit_points())
         state.cursor.changed.connect(self._show_cursor)
         state.marks.changed.connect(lambda _: self._show_pins())
         state.tool.follow(lambda _: self._show_hint())
@@ -115,10 +119,21 @@ class ScenePanel(QWidget):
             return
         if self._layers is None:
             self._layers = Layers(result)
-            self._flat = np.flatnonzero(np.isfinite(result["points_mm"][2]))
-            self._points = np.ascontiguousarray(result["points_mm"].reshape(3, -1)[:, self._flat].T)
+            self._is_new = True
+            self._choose_points(result)
         self._show_hint()
         QTimer.singleShot(STEP_MS, self, self._show_result)
+
+    def _limit_points(self) -> None:
+        if self._layers is not None:
+            self._choose_points(self._layers.result)
+            self._later.start()
+
+    def _choose_points(self, result: ResultArrays) -> None:
+        """Take the points between the limits; the others can neither be seen nor pointed at."""
+        points = result["points_mm"]
+        self._flat = np.flatnonzero(within(points[2], self._state.depth_limits.value))
+        self._points = np.ascontiguousarray(points.reshape(3, -1)[:, self._flat].T)
 
     def _show_result(self) -> None:
         self._paint()
@@ -136,7 +151,8 @@ class ScenePanel(QWidget):
         if search is not None:
             colours = colours.copy()
             colours[search.found.ravel()[self._flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))
-        self.scene.show_cloud(self._points, colours)
+        self.scene.show_cloud(self._points, colours, self._is_new)
+        self._is_new = False
         self._seen = None
 
     def _show_cursor(self, pixel: Pixel | None) -> None:

@@ -32,8 +32,8 @@ class StillScene:
         column.addWidget(self._text)
         self._background = "#000000"
 
-    def show_cloud(self, points: Points, colours: NDArray[np.uint8]) -> None:
-        """Draw points into a picture without a window."""
+    def show_cloud(self, points: Points, colours: NDArray[np.uint8], anew: bool = True) -> None:
+        """Draw points into a picture without a window; it has one view."""
         picture = still_picture(points, colours, self._background)
         if picture is None:
             return

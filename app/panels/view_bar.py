@@ -15,9 +15,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.panels.result_layers import spread_of
 from app.panels.results_commands import ResultCommands
 from app.state.results import Quality, ResultsState, Tool, View
-from app.widgets.forms import ChoiceBox, label
+from app.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_core.optics.relighting import LIGHTS
 
 VIEWS = (
@@ -70,6 +71,16 @@ class ViewBar(QWidget):
         self.cloud_by = ChoiceBox("Colour of the cloud", "What the points are coloured by")
         for view, text in CLOUD_COLOURS:
             self.cloud_by.addItem(text, view)
+        hides = "what lies {} is hidden in the depth image and the cloud, whatever colours it"
+        self.near, self.far = (
+            NumberBox(f"{name} depth", 0.0, 1e5, 0.0, "mm", 1, f"{name} depth shown; {hides.format(beyond)}")
+            for name, beyond in (("Nearest", "before it"), ("Farthest", "behind it"))
+        )
+        self.automatic = QCheckBox("automatic")
+        self.automatic.setAccessibleName("Automatic limits of depth")
+        self.automatic.setToolTip(
+            "Show all depths; colours cover nearly all pixels, and outliers take the ends"
+        )
         self._lay_out()
         self._connect()
 
@@ -106,6 +117,7 @@ class ViewBar(QWidget):
         self._row.setSpacing(8)
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")
+        self._depth_label, self._to_label = QLabel("Depth"), QLabel("to")
         for widget in (
             self._light_label,
             self.light,
@@ -114,6 +126,11 @@ class ViewBar(QWidget):
             self.quality,
             self._cloud_label,
             self.cloud_by,
+            self._depth_label,
+            self.near,
+            self._to_label,
+            self.far,
+            self.automatic,
             self.nm,
         ):
             self._row.addWidget(widget)
@@ -137,6 +154,10 @@ class ViewBar(QWidget):
         self.adapted.clicked.connect(lambda _: self._relight())
         self.quality.activated.connect(lambda _: state.quality.set(Quality(self.quality.currentData())))
         self.cloud_by.activated.connect(lambda _: state.cloud_by.set(View(self.cloud_by.currentData())))
+        for box in (self.near, self.far):
+            box.valueChanged.connect(lambda _: self._limit_depth())
+        self.automatic.clicked.connect(self._limit_automatically)
+        state.depth_limits.changed.connect(lambda _: self._show_limits())
         state.result.follow(lambda _: self._new_result())
         state.tool.follow(lambda tool: self.tools[tool].setChecked(True))
         state.band.follow(lambda _: self._show_band())
@@ -153,7 +174,30 @@ class ViewBar(QWidget):
     def _relight(self) -> None:
         self._commands.relight(self.light.currentData(), self.adapted.isChecked())
 
+    def _limit_automatically(self, automatic: bool) -> None:
+        if automatic:
+            self._commands.limit_depth(None)
+        else:
+            self._limit_depth()
+
+    def _limit_depth(self) -> None:
+        self._commands.limit_depth((self.near.value(), self.far.value()))
+        # Limits that were refused go back.
+        self._show_limits()
+
+    def _show_limits(self) -> None:
+        """Show the limits of the state; without any, those of the colours."""
+        result, limits = self._state.result.value, self._state.depth_limits.value
+        self.automatic.setChecked(limits is None)
+        if limits is None and result is not None:
+            limits = spread_of(result["depth_mm"])
+        for box, value in zip((self.near, self.far), limits or (), strict=False):
+            box.blockSignals(True)
+            box.setValue(value)
+            box.blockSignals(False)
+
     def _new_result(self) -> None:
+        self._show_limits()
         result = self._state.result.value
         if result is not None and result.has_spectra:
             self.slider.setRange(0, len(result.wavelengths_nm) - 1)
@@ -177,6 +221,10 @@ class ViewBar(QWidget):
             ((self._light_label, self.light, self.adapted), shown is View.COLOUR),
             ((self._quality_label, self.quality), shown is View.QUALITY),
             ((self._cloud_label, self.cloud_by), cloud),
+            (
+                (self._depth_label, self.near, self._to_label, self.far, self.automatic),
+                cloud or shown is View.DEPTH,
+            ),
             (
                 (self.nm, self.slider),
                 shown is View.BAND or (shown is View.QUALITY and state.quality.value in _NEEDS_BAND),

@@ -20,6 +20,8 @@ from dsl_core.io.result_arrays import ResultArrays
 from dsl_core.model.spectral import SpectralCurve
 
 Pixel = tuple[int, int]
+#: The nearest and the farthest of something, mm.
+Limits = tuple[float, float]
 Floats = NDArray[np.floating[Any]]
 _keys = itertools.count(1)
 
@@ -142,7 +144,8 @@ class ResultsState:
     ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes;
     it follows ``light`` and ``adapted`` once it is computed. ``cloud_by`` is the view that colours the cloud;
     ``busy`` says in words what is being opened (empty: nothing). ``graph`` is what the pixel saw that was
-    last inspected; ``library`` waits for somebody to choose of it.
+    last inspected; ``library`` waits for somebody to choose of it. ``depth_limits`` are the depths that are
+    shown, mm; None for all.
     """
 
     def __init__(self) -> None:
@@ -154,6 +157,7 @@ class ResultsState:
         self.tool = Value(Tool.PIN)
         self.band = Value(0)
         self.quality = Value(Quality.FLAGS)
+        self.depth_limits: Value[Limits | None] = Value(None)
         self.cursor: Value[Pixel | None] = Value(None)
         self.marks: Value[tuple[Mark, ...]] = Value(())
         self.selected = Value(0)

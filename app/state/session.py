@@ -25,6 +25,7 @@ class ResultsPart(_Part):
     light: str = "D65"
     adapted: bool = True
     cursor: tuple[int, int] | None = None
+    depth_limits: tuple[float, float] | None = None
 
 
 class ScanPart(_Part):

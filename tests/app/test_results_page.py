@@ -381,6 +381,34 @@ def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
         assert image.image.image.shape[:2] == (24, 36)
 
 
+def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Bench, qtbot: QtBot) -> None:
+    bar, image = bench.page.bar, bench.page.image
+    bench.control.show(View.COLOUR)
+    assert not bar.near.isVisible()
+    bench.control.show(View.DEPTH)
+    assert (bar.automatic.isChecked(), bar.near.isVisible()) == (True, True)
+    automatic = image.bar.levels()
+    np.testing.assert_allclose((bar.near.value(), bar.far.value()), automatic, atol=0.06)
+    bar.near.setValue(705.0)
+    bar.far.setValue(710.0)
+    assert bench.state.depth_limits.value == (705.0, 710.0)
+    assert not bar.automatic.isChecked()
+    assert image.bar.levels() == (705.0, 710.0)
+    # Columns 10 to 20 have depths from 705 to 710 mm.
+    assert np.isfinite(image.image.image).sum(1).tolist() == [11] * 24
+    image.image.render()
+    painted = image.image.qimage
+    alphas = [painted.pixelColor(x, 8).alpha() for x in (9, 10, 20, 21)]
+    assert alphas == [0, 255, 255, 0]
+    bar.far.setValue(700.0)
+    assert bar.far.value() == 710.0
+    bar.automatic.click()
+    assert bar.automatic.isChecked()
+    assert image.bar.levels() == automatic
+    bench.window.do("undo")
+    assert (bar.near.value(), bar.automatic.isChecked()) == (705.0, False)
+
+
 def test_the_band_line_and_the_slider_agree(bench: Bench) -> None:
     bench.control.show(View.BAND)
     bench.page.bar.slider.setValue(10)
@@ -488,6 +516,22 @@ def _cloud(bench: Bench, qtbot: QtBot) -> TurnedScene:
     assert isinstance(scene, TurnedScene)
     qtbot.waitUntil(lambda: scene.shown > 0 and scene.is_at_rest)
     return scene
+
+
+def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: Bench, qtbot: QtBot) -> None:
+    scene = _cloud(bench, qtbot)
+    assert scene.shown == 24 * 36 - 1
+    scene.widget.artist.turn(3, 0)
+    qtbot.waitUntil(lambda: scene.is_at_rest)
+    before = scene.projection()[:, 0].copy()
+    bench.control.limit_depth((705.0, 710.0))
+    qtbot.waitUntil(lambda: scene.shown == 24 * 11)
+    qtbot.waitUntil(lambda: scene.is_at_rest)
+    np.testing.assert_allclose(scene.projection()[:2, 0], before[:2])
+    bench.control.limit_depth((1.0, 2.0))
+    qtbot.waitUntil(lambda: scene.shown == 0)
+    bench.control.limit_depth(None)
+    qtbot.waitUntil(lambda: scene.shown == 24 * 36 - 1)
 
 
 def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) -> None:

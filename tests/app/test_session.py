@@ -114,6 +114,7 @@ def test_a_result_is_looked_at_as_before(tmp_path: Path) -> None:
     first.marks.pin((7, 8))
     first.show(View.QUALITY)
     first.state.quality.set(Quality.SHARE)
+    first.limit_depth((705.0, 710.0))
     first.relight("A", adapted=False)
     part = results_part(first.state)
     assert part is not None
