@@ -23,6 +23,8 @@ def is_complete(session: Path) -> bool:
 
 def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
     """Files that an export writes."""
+    from dsl_core.io.export.common import depth_files
+
     files: list[Path] = []
     for form, path in targets.items():
         if form == "envi":
@@ -30,6 +32,8 @@ def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]
             if "reflectance_std" in result.arrays:
                 headers.append(path.with_name(f"{path.stem}_std.hdr"))
             files += [file for header in headers for file in (header, header.with_suffix(".img"))]
+        elif form in ("tiff", "npy"):
+            files += depth_files(path, "depth_std_mm" in result.arrays, "flags" in result.arrays)
         elif form == "png":
             files += sorted(path.parent.glob(f"{path.stem}_*.png"))
         else:

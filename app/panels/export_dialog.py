@@ -29,6 +29,8 @@ FORMATS = (
     ("envi", ".hdr", "ENVI – spectral cube and its deviation", True),
     ("exr", ".exr", "OpenEXR – spectral image", True),
     ("csv", ".csv", "CSV – spectra of the pins, with deviations", True),
+    ("tiff", ".tiff", "TIFF – depth in mm as numbers, its deviation and flags beside it", False),
+    ("npy", ".npy", "NumPy – the same as arrays", False),
     ("png", ".png", "PNG – pictures of colour, depth, the band shown, and flags", False),
 )
 

@@ -112,7 +112,8 @@ def export(
         ),
     ],
     form: Annotated[
-        str, typer.Argument(metavar="FORMAT", help="ply, envi, exr, csv, png, dataset or calibration.")
+        str,
+        typer.Argument(metavar="FORMAT", help="ply, envi, exr, csv, png, tiff, npy, dataset or calibration."),
     ],
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
     pixel: Annotated[list[str], typer.Option(help="x,y of a pixel for csv; may be repeated.")] = [],  # noqa: B006

@@ -9,7 +9,7 @@ import pytest
 from app.controllers.results import ResultsController
 from app.jobs.base import InlineRunner
 from app.panels.result_layers import Layers, rgb_of
-from app.state.results import ResultsState, Seek, View
+from app.state.results import Limits, ResultsState, Seek, View
 from app.state.undo import UndoStack
 from app.views import RecordingNotifier
 from dsl_core.io.annotations_file import load_annotations
@@ -203,15 +203,20 @@ def test_another_light_changes_the_picture(bench: Bench) -> None:
 
 def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tmp_path: Path) -> None:
     bench.control.marks.pin((3, 3))
-    targets = {"ply": tmp_path / "a.ply", "csv": tmp_path / "a.csv", "envi": tmp_path / "a.hdr"}
+    targets = {
+        "ply": tmp_path / "a.ply",
+        "csv": tmp_path / "a.csv",
+        "envi": tmp_path / "a.hdr",
+        "tiff": tmp_path / "a.tiff",
+    }
     assert bench.control.taken(targets) == []
     bench.control.export(targets, overwrite=False)
-    assert "Wrote 6 files" in bench.told
-    assert len(bench.control.taken(targets)) == 6
+    assert "Wrote 9 files" in bench.told
+    assert len(bench.control.taken(targets)) == 9
     bench.control.export(targets, overwrite=False)
     assert "exists already" in bench.told
     bench.control.export(targets, overwrite=True)
-    assert "Wrote 6 files" in bench.told
+    assert "Wrote 9 files" in bench.told
 
 
 def test_pictures_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path) -> None:
@@ -295,3 +300,18 @@ def test_a_library_asks_which_spectrum_and_its_name_brings_it_back(bench: Bench,
     path.with_suffix(".hdr").unlink()
     assert bench.control.open(path)
     assert "lacks its header" in bench.told
+
+
+def test_limits_of_depth_are_set_refused_taken_back_and_forgotten(bench: Bench, tmp_path: Path) -> None:
+    limits = bench.state.depth_limits
+    found: list[Limits | None] = []
+    limits.changed.connect(found.append)
+    bench.control.limit_depth((705.0, 710.0))
+    bench.control.limit_depth((710.0, 705.0))
+    assert "Nothing lies between 710 and 705 mm" in bench.told
+    bench.control.limit_depth(None)
+    bench.undo.undo()
+    bench.undo.undo()
+    bench.undo.redo()
+    bench.control.open(tmp_path / "small.zarr")
+    assert found == [(705.0, 710.0), None, (705.0, 710.0), None, (705.0, 710.0), None]

@@ -18,6 +18,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 # Import name -> distribution, where they differ.
 DISTRIBUTIONS = {
     "OpenEXR": "openexr",
+    "PIL": "pillow",
     "PySide6": "pyside6-essentials",
     "colour": "colour-science",
     "cv2": "opencv-contrib-python-headless",

@@ -21,7 +21,15 @@ from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import never
 from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result
 
-SUFFIX = {"csv": ".csv", "envi": ".hdr", "exr": ".exr", "ply": ".ply", "png": ".png"}
+SUFFIX = {
+    "csv": ".csv",
+    "envi": ".hdr",
+    "exr": ".exr",
+    "npy": ".npy",
+    "ply": ".ply",
+    "png": ".png",
+    "tiff": ".tiff",
+}
 
 
 def test_ply_in_meshio(tmp_path: Path) -> None:
@@ -151,6 +159,33 @@ def test_exr_keeps_its_own_names_to_itself(tmp_path: Path) -> None:
         assert {key: header[f"dsl_{key}"] for key in own} == {key: str(value) for key, value in own.items()}
         assert header["type"] == OpenEXR.scanlineimage
         assert len(file.channels()) == len(WAVELENGTHS_NM) + 4
+
+
+@pytest.mark.parametrize("name", ["tiff", "npy"])
+def test_depth_in_opencv_and_numpy(tmp_path: Path, name: str) -> None:
+    import cv2
+
+    result = small_result()
+    files = export(result, tmp_path / f"depth.{name}", name)
+    assert [f.name for f in files] == [f"depth.{name}", f"depth_std.{name}", f"depth_flags.{name}"]
+    for file, variable, kind in zip(
+        files, ("depth_mm", "depth_std_mm", "flags"), (np.float32, np.float32, np.uint16), strict=True
+    ):
+        read = np.load(file) if name == "npy" else np.asarray(cv2.imread(str(file), cv2.IMREAD_UNCHANGED))
+        assert read.dtype == kind
+        np.testing.assert_array_equal(read, result[variable].values)
+    assert np.isnan(result["depth_mm"].values).any()
+    (alone,) = export(result[["depth_mm"]], tmp_path / f"alone.{name}", name)
+    assert alone.name == f"alone.{name}"
+
+
+def test_a_tiff_says_what_it_holds_and_where_it_comes_from(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    depth, _, flags = export(small_result(), tmp_path / "depth.tif", "tiff")
+    with image.open(depth) as opened, image.open(flags) as beside:
+        assert opened.tag_v2[270].startswith("Depth along the camera axis, mm; NaN")
+        assert "scan_id: 2026-05-04-chart" in opened.tag_v2[270]
+        assert "1 no light" in beside.tag_v2[270]
 
 
 def test_linear_light_of_srgb() -> None:
@@ -295,14 +330,14 @@ def test_every_format_refuses_wrong_endings_and_places(tmp_path: Path, name: str
             export(small_result(), tmp_path / "file" / f"x{SUFFIX[name]}", name)
 
 
-@pytest.mark.parametrize("name", ["csv", "envi", "exr", "ply"])
+@pytest.mark.parametrize("name", ["csv", "envi", "exr", "npy", "ply", "tiff"])
 def test_every_format_says_what_the_result_lacks(tmp_path: Path, name: str) -> None:
     with pytest.raises(StoreError, match="holds only shading"):
         export(small_result()[["shading"]], tmp_path / f"x{SUFFIX[name]}", name)
 
 
 def test_an_unknown_format(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="csv, envi, exr, ply, png"):
+    with pytest.raises(StoreError, match="csv, envi, exr, npy, ply, png, tiff"):
         export(small_result(), tmp_path / "x.las", "las")
 
 

@@ -154,6 +154,8 @@ def test_evaluate_finds_the_truth_by_itself(give: Give, finished: Path, tmp_path
         ("envi", "a.hdr", [], 4),
         ("exr", "a.exr", [], 1),
         ("png", "a.png", [], 4),
+        ("tiff", "a.tiff", [], 3),
+        ("npy", "a.npy", [], 3),
         ("csv", "a.csv", ["--pixel", "50,30", "--pixel", "60,40"], 1),
     ],
 )

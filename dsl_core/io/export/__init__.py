@@ -15,8 +15,10 @@ from dsl_core.errors import StoreError
 from dsl_core.io.export.csv import export_csv
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr
+from dsl_core.io.export.npy import export_npy
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
+from dsl_core.io.export.tiff import export_tiff
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -28,8 +30,10 @@ __all__ = [
     "export_csv",
     "export_envi",
     "export_exr",
+    "export_npy",
     "export_ply",
     "export_png",
+    "export_tiff",
     "formats",
 ]
 
@@ -49,8 +53,10 @@ def formats() -> dict[str, Exporter]:
         "csv": export_csv,
         "envi": export_envi,
         "exr": export_exr,
+        "npy": export_npy,
         "ply": export_ply,
         "png": export_png,
+        "tiff": export_tiff,
     }
 
 
