@@ -52,6 +52,7 @@ ACTIONS: tuple[Action, ...] = (
     Action("open", "&Open…", "File", "Ctrl+O", "Open a scan, a result, a reference or a calibration"),
     Action("open_last", "Open the &last again", "File", "Ctrl+Shift+O", "Open what was opened last"),
     Action("export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs"),
+    Action("save_figure", "Save &figure…", "File", "", "Save the plot of this page as SVG or PNG"),
     Action(
         "show_command",
         "Show &command line",

@@ -12,6 +12,7 @@ from app.actions import ACTIONS
 from app.paged_window import PagedWindow
 from app.report_bundle import write_report_bundle
 from app.widgets import text_windows
+from app.widgets.figure_file import FORMATS, save_figure
 from app.widgets.help_window import help_of, help_window
 from app.widgets.tour import Tour
 from app.widgets.tour_steps import STEPS, Step
@@ -36,6 +37,7 @@ class WindowActions:
             "open": self._open,
             "open_last": self._open_last,
             "export": self._refuse_export,
+            "save_figure": self._save_figure,
             "report_bundle": self._save_report_bundle,
             "quit": window.close,
             "undo": lambda: self._tell(undo.undo()),
@@ -68,6 +70,26 @@ class WindowActions:
 
     def _refuse_export(self) -> None:
         self._toasts.tell("info", "There is nothing to export on this page. Open a result first.")
+
+    def _save_figure(self) -> None:
+        figure = self._window.page_of(self._window.page).figure()
+        if figure is None:
+            self._toasts.tell(
+                "info",
+                "There is no figure on this page. The spectra of a result can be saved, and on the Scan page"
+                " what accuracy costs in time.",
+            )
+            return
+        draft = str(Path(self._parts.settings.output_folder) / f"{figure.name}.svg")
+        name, _ = QFileDialog.getSaveFileName(self._window, "Save the figure", draft, FORMATS)
+        if not name:
+            return
+        try:
+            save_figure(figure, Path(name), self._window.theme)
+        except DslError as error:
+            self._toasts.tell("error", str(error))
+        else:
+            self._toasts.tell("info", f"Saved as {name}.")
 
     def _save_report_bundle(self) -> None:
         name, _ = QFileDialog.getSaveFileName(

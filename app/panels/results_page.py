@@ -32,6 +32,7 @@ from app.panels.spectrum_panel import SpectrumPanel
 from app.panels.view_bar import ViewBar
 from app.state.results import Library, ResultsState, View
 from app.theme import DARK, Theme
+from app.widgets.figure_file import Figure
 from app.widgets.forms import label
 from app.widgets.help_window import set_help
 from app.widgets.late import Late
@@ -297,6 +298,14 @@ class ResultsPage(PageWidget):
     def command_line(self) -> str:
         """The command that makes or exports what is open."""
         return self._commands.command_line()
+
+    def figure(self) -> Figure | None:
+        """The spectra, while there are any."""
+        result, spectra = self._state.result.value, self._spectra.made
+        if result is None or not result.has_spectra or spectra is None:
+            return None
+        name = f"{result.path.stem}_spectra"
+        return Figure(name, spectra.plot, spectra.apply_theme, spectra.named_curves)
 
     def release(self) -> None:
         """Let go of the graphics context and of the recent files."""

@@ -28,6 +28,7 @@ from app.state.effects import EffectsState
 from app.state.scan import Phase, Rescue, ScanState
 from app.theme import Theme
 from app.widgets.banner import Banner
+from app.widgets.figure_file import Figure
 from app.widgets.help_window import set_help
 from app.widgets.late import Late
 from app.widgets.page import PageWidget
@@ -196,6 +197,11 @@ class ScanPage(PageWidget):
     def command_line(self) -> str:
         """The command that takes this scan."""
         return self._commands.command_line()
+
+    def figure(self) -> Figure | None:
+        """What accuracy costs in time, once it is drawn."""
+        curve = self.forecast.curve.made
+        return None if curve is None else Figure("accuracy-against-time", curve.plot, curve.apply_theme)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -95,6 +97,11 @@ class SpectrumPanel(QWidget):
     def _colour(self, curve: SpectrumCurve, mark: Mark) -> None:
         colour = self._theme.pins[mark.colour % len(self._theme.pins)]
         curve.set_colour(colour, dashed=mark.kind == "reference")
+
+    @property
+    def named_curves(self) -> tuple[tuple[Any, str], ...]:
+        """The curves of what is shown, each with its name."""
+        return tuple((curve.solid, mark.name) for mark, curve in self._curves.values())
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

@@ -57,6 +57,7 @@ class ViewBar(QWidget):
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName("Band")
         self.slider.setToolTip("Wavelength of the band (comma and full stop step it)")
+        self.slider.setMinimumWidth(64)
         self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.nm = label("")
         self.nm.setMinimumWidth(self.nm.fontMetrics().horizontalAdvance("000.0 nm"))
@@ -76,7 +77,11 @@ class ViewBar(QWidget):
             NumberBox(f"{name} depth", 0.0, 1e5, 0.0, "mm", 1, f"{name} depth shown; {hides.format(beyond)}")
             for name, beyond in (("Nearest", "before it"), ("Farthest", "behind it"))
         )
-        self.automatic = QCheckBox("automatic")
+        for box in (self.near, self.far):
+            # All controls of the cloud stand in one row: arrow keys step as well as buttons would.
+            box.setButtonSymbols(NumberBox.ButtonSymbols.NoButtons)
+            box.setFixedWidth(box.fontMetrics().horizontalAdvance("00000.0 mm") + 16)
+        self.automatic = QCheckBox("auto")
         self.automatic.setAccessibleName("Automatic limits of depth")
         self.automatic.setToolTip(
             "Show all depths; colours cover nearly all pixels, and outliers take the ends"

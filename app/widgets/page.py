@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtWidgets import QWidget
 
 from app.theme import Theme
+from app.widgets.figure_file import Figure
 
 
 class PageWidget(QWidget):
@@ -20,6 +21,10 @@ class PageWidget(QWidget):
     def command_line(self) -> str:
         """The command that does what the page does now; empty when there is none."""
         return ""
+
+    def figure(self) -> Figure | None:
+        """The plot of the page that can be saved as a figure; None when there is none."""
+        return None
 
     def open_path(self, path: Path) -> bool:
         """Open a file or folder that was chosen or dropped; False when it is none of the page's."""

@@ -66,6 +66,8 @@ class SpectrumCurve:
         solid, dashed = split_by_share(spectrum.mean, spectrum.share)
         self.solid.setData(spectrum.nm, solid)
         self.dashed.setData(spectrum.nm, dashed)
+        # A path without points is no valid drawing in a figure.
+        self.dashed.setVisible(bool(np.isfinite(dashed).any()))
         if self.band is None:
             return
         self.band.setVisible(spectrum.std is not None)

@@ -9,9 +9,11 @@ import numpy as np
 from PySide6.QtWidgets import QTabWidget
 
 from app.panels.export_dialog import ExportDialog
+from app.panels.library_dialog import LibraryDialog
 from app.panels.results_page import ResultsPage
 from app.panels.scene import TurnedScene
 from app.state.results import Quality, ResultsState, Seek, View
+from tests.io.test_reference_file import write_library
 from tests.screens.stage import Stage
 
 
@@ -102,6 +104,34 @@ def marks(stage: Stage) -> None:
     stage.shoot("undo")
 
 
+def library(stage: Stage) -> None:
+    """Which spectra of a library to compare with."""
+    page, _ = opened(stage)
+    page._commands.point_at((60, 40))
+    stage.window.open_path(write_library(stage.folder / "plants.sli"))
+    stage.idle()
+    dialog = stage.dialog(LibraryDialog)
+    dialog.list.item(1).setSelected(True)
+    stage.shoot()
+
+
+def limits(stage: Stage) -> None:
+    """Depth between two limits, in the picture and in the cloud."""
+    page, state = opened(stage)
+    stage.window.do("view_depth")
+    result = state.result.value
+    assert result is not None
+    low, high = np.nanpercentile(result["depth_mm"], (20, 60))
+    page.bar.near.setValue(low)
+    page.bar.far.setValue(high)
+    stage.shoot("picture")
+    stage.window.do("view_cloud")
+    state.cloud_by.set(View.QUALITY)
+    state.quality.set(Quality.SHARE)
+    _wait_for_cloud(stage, page)
+    stage.shoot("cloud")
+
+
 def light(stage: Stage) -> None:
     """The colours under another light."""
     page, _ = opened(stage)
@@ -150,6 +180,8 @@ SCENES: dict[str, Callable[[Stage], None]] = {
     "results-nothing": nothing,
     "results-view": views,
     "results-marks": marks,
+    "results-library": library,
+    "results-limits": limits,
     "results-light": light,
     "results-graph": graph,
     "results-search": search,
