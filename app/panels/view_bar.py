@@ -31,6 +31,7 @@ VIEWS = (
 TOOLS = (
     (Tool.PIN, "Pin", "Click to pin the spectrum of a pixel; drag to pan"),
     (Tool.RECTANGLE, "Rectangle", "Drag a rectangle: mean and deviation of its pixels"),
+    (Tool.ELLIPSE, "Ellipse", "Drag the box around an ellipse: mean and deviation of its pixels"),
     (
         Tool.POLYGON,
         "Polygon",

@@ -41,6 +41,7 @@ class Tool(Enum):
 
     PIN = "pin"
     RECTANGLE = "rectangle"
+    ELLIPSE = "ellipse"
     POLYGON = "polygon"
     LASSO = "lasso"
 

@@ -1,7 +1,8 @@
-"""A view box on which outlines are drawn: rectangles and lassos by dragging, polygons by clicks."""
+"""A view box on which outlines are drawn: rectangles, ellipses, lassos by dragging, polygons by clicks."""
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pyqtgraph as pg
@@ -9,6 +10,8 @@ from PySide6.QtCore import Qt, Signal
 
 #: A lasso takes a corner whenever the mouse has moved this far, screen px.
 LASSO_STEP_PX = 3.0
+#: Corners of an ellipse: less than a thousandth of its radius is cut off.
+ELLIPSE_CORNERS = 90
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -16,7 +19,7 @@ Corners = tuple[tuple[float, float], ...]
 class OutlineBox(pg.ViewBox):  # type: ignore[misc]
     """Emits ``clicked`` with image coordinates, or ``drawn`` with a closed outline; Escape gives up.
 
-    ``tool`` is empty (clicks only; dragging pans), ``rectangle``, ``polygon`` or ``lasso``.
+    ``tool`` is empty (clicks only; dragging pans), ``rectangle``, ``ellipse``, ``polygon`` or ``lasso``.
     """
 
     clicked = Signal(float, float)
@@ -74,14 +77,14 @@ class OutlineBox(pg.ViewBox):  # type: ignore[misc]
 
     def mouseDragEvent(self, event: Any, axis: Any = None) -> None:
         """Draw with the left button where the tool wants it; else pan as usual."""
-        if self.tool not in ("rectangle", "lasso") or event.button() != Qt.MouseButton.LeftButton:
+        if self.tool not in (*_BETWEEN, "lasso") or event.button() != Qt.MouseButton.LeftButton:
             super().mouseDragEvent(event, axis)
             return
         event.accept()
         at = self.mapSceneToView(event.scenePos())
-        if self.tool == "rectangle":
+        if self.tool in _BETWEEN:
             start = self.mapSceneToView(event.buttonDownScenePos())
-            self._corners = list(rectangle((start.x(), start.y()), (at.x(), at.y())))
+            self._corners = list(_BETWEEN[self.tool]((start.x(), start.y()), (at.x(), at.y())))
         else:
             self._follow(event, (at.x(), at.y()))
         self._show(self._corners)
@@ -108,3 +111,17 @@ def rectangle(a: tuple[float, float], b: tuple[float, float]) -> Corners:
     x0, x1 = sorted((round(a[0]), round(b[0])))
     y0, y1 = sorted((round(a[1]), round(b[1])))
     return ((x0 - 0.5, y0 - 0.5), (x1 + 0.5, y0 - 0.5), (x1 + 0.5, y1 + 0.5), (x0 - 0.5, y1 + 0.5))
+
+
+def ellipse(a: tuple[float, float], b: tuple[float, float]) -> Corners:
+    """An ellipse that fills the rectangle of whole pixels between two points, as a polygon."""
+    (x0, y0), _, (x1, y1), _ = rectangle(a, b)
+    steps = (2 * math.pi * i / ELLIPSE_CORNERS for i in range(ELLIPSE_CORNERS))
+    return tuple(
+        ((x0 + x1 + (x1 - x0) * math.cos(turn)) / 2, (y0 + y1 + (y1 - y0) * math.sin(turn)) / 2)
+        for turn in steps
+    )
+
+
+#: What is drawn between the two ends of a drag.
+_BETWEEN = {"rectangle": rectangle, "ellipse": ellipse}

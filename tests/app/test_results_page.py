@@ -237,6 +237,16 @@ def test_regions_are_drawn_with_every_tool(bench: Bench, qtbot: QtBot) -> None:
     assert bench.marks[2].used == pytest.approx(40, abs=12)
 
 
+def test_an_ellipse_holds_pi_quarters_of_its_box(bench: Bench) -> None:
+    bench.page.bar.tools[Tool.ELLIPSE].click()
+    bench.drag([(19, 3), (25, 9), (33, 17)])
+    (region,) = bench.marks
+    # A box of 15 x 15 pixels.
+    assert region.used == pytest.approx(np.pi / 4 * 225, rel=0.03)
+    outline = np.array(region.outline_px)
+    np.testing.assert_allclose([outline.min(0), outline.max(0)], [(18.5, 2.5), (33.5, 17.5)], atol=0.02)
+
+
 def test_the_list_names_hides_and_selects(bench: Bench) -> None:
     bench.control.marks.pin((10, 10))
     bench.control.marks.pin((20, 10))
