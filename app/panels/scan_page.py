@@ -199,9 +199,11 @@ class ScanPage(PageWidget):
         return self._commands.command_line()
 
     def figure(self) -> Figure | None:
-        """What accuracy costs in time, once it is drawn."""
+        """What accuracy costs in time, once that is predicted."""
         curve = self.forecast.curve.made
-        return None if curve is None else Figure("accuracy-against-time", curve.plot, curve.apply_theme)
+        if curve is None or not curve.front():
+            return None
+        return Figure("accuracy-against-time", curve.plot, curve.apply_theme)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

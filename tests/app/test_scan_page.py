@@ -22,7 +22,8 @@ from app.state.effects import EffectsState
 from app.state.forecast import ForecastState
 from app.state.rig import Link
 from app.state.scan import LivePicture, Phase
-from app.theme import LIGHT
+from app.theme import DARK, LIGHT
+from app.widgets.figure_file import save_figure
 from dsl_core.errors import DeviceError
 from dsl_core.io.session import SessionReader
 from dsl_core.model.frames import Frame
@@ -382,3 +383,15 @@ def test_arrow_keys_come_back_into_a_smaller_picture(qtbot: QtBot) -> None:
     with qtbot.waitSignal(picture.pointed) as pointed:
         QTest.keyClick(picture, Qt.Key.Key_Left)
     assert pointed.args == [(55, 10)]
+
+
+def test_the_curve_is_saved_as_a_figure(qtbot: QtBot, ready: Bench, predicted: None, tmp_path: Path) -> None:
+    page, _, _ = ready
+    plot = page.curve.plot
+    assert page.figure() is None
+    begin(qtbot, page)
+    figure = page.figure()
+    assert figure is not None
+    save_figure(figure, tmp_path / "curve.svg", DARK)
+    assert "Time on the rig" in (tmp_path / "curve.svg").read_text("utf-8")
+    assert plot.backgroundBrush().color().name() == DARK.base
