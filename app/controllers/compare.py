@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -28,15 +29,25 @@ class CompareController:
 
     def __init__(self, state: CompareState, runner: JobRunner, notifier: Notifier) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
+        #: Results that were opened while another one was being read.
+        self._waiting: deque[Path] = deque()
 
     # Sides -----------------------------------------------------------------------------------------
 
     def open(self, path: Path) -> bool:
-        """Put a result on the first side that is free, else in place of B; False for anything else."""
+        """Put a result on the first side that is free, else in place of B; False for anything else.
+
+        Results that are opened together follow one after the other.
+        """
         if not (path / RESULT).is_file():
             return False
-        self.open_side(path, second=self.state.first.value is not None)
+        self._waiting.append(path)
+        self._open_next()
         return True
+
+    def _open_next(self) -> None:
+        if self._waiting and not self.state.busy.value:
+            self.open_side(self._waiting.popleft(), second=self.state.first.value is not None)
 
     def open_side(self, path: Path, second: bool) -> None:
         """Read a result as A, or as B."""
@@ -92,14 +103,20 @@ class CompareController:
         def ended(result: T) -> None:
             self.state.busy.set("")
             done(result)
+            self._open_next()
 
-        self._runner.submit(Job(title, work, ended, self._failed, lambda: self.state.busy.set("")))
+        self._runner.submit(Job(title, work, ended, self._failed, self._cancelled))
+
+    def _cancelled(self) -> None:
+        self._waiting.clear()
+        self.state.busy.set("")
 
     def _failed(self, error: Exception) -> None:
         self.state.busy.set("")
         text = str(error) if isinstance(error, DslError) else f"{type(error).__name__}: {error}"
         self.state.trouble.set(text)
         self._notifier.tell("error", text)
+        self._open_next()
 
     # Compare ---------------------------------------------------------------------------------------
 

@@ -1,12 +1,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from app.controllers.compare import CompareController
-from app.jobs.base import InlineRunner
+from app.jobs.base import InlineRunner, Job
 from app.state.compare import CompareState, Shown
 from app.views import RecordingNotifier
 from tests.app.compare_bench import make_result
@@ -27,6 +28,25 @@ def controller() -> tuple[CompareController, RecordingNotifier]:
     return CompareController(CompareState(), InlineRunner(), notifier), notifier
 
 
+class Later:
+    """Runs jobs when it is told to, as a thread ends them some time."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Job[Any]] = []
+
+    @property
+    def active(self) -> tuple[Job[Any], ...]:
+        return tuple(self.waiting)
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        self.waiting.append(job)
+        return job
+
+    def run_all(self) -> None:
+        while self.waiting:
+            self.waiting.pop(0).run()()
+
+
 def test_two_results_fill_both_sides_and_are_compared(results: tuple[Path, Path, Path]) -> None:
     compare, _ = controller()
     assert compare.open(results[0])
@@ -40,6 +60,28 @@ def test_two_results_fill_both_sides_and_are_compared(results: tuple[Path, Path,
         float(np.nanmean(first - second)), abs=0.001
     )
     assert compare.command_line() == f"dsl-scan compare {results[0]} {results[1]}"
+
+
+def test_results_opened_together_follow_each_other(results: tuple[Path, Path, Path]) -> None:
+    notifier, runner = RecordingNotifier(), Later()
+    compare = CompareController(CompareState(), runner, notifier)
+    assert all(compare.open(path) for path in results[:2])
+    runner.run_all()
+    pair = compare.state.pair.value
+    assert pair is not None
+    assert (pair.first.name, pair.second.name) == ("chart", "box")
+    assert notifier.told == []
+
+
+def test_who_cancels_wants_none_of_what_waits(results: tuple[Path, Path, Path]) -> None:
+    runner = Later()
+    compare = CompareController(CompareState(), runner, RecordingNotifier())
+    for path in results[:2]:
+        compare.open(path)
+    runner.waiting[0].cancel()
+    runner.run_all()
+    assert compare.state.first.value is None
+    assert not compare.state.busy.value
 
 
 def test_a_result_is_judged_against_the_truth_of_its_twin(
