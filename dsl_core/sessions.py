@@ -68,9 +68,16 @@ def reconstruct_session(
             "captured": reader.manifest.created,
             "captured_with": reader.manifest.rig_name,
             "capture_plan": reader.plan.model_dump_json(),
+            "capture_seconds": _capture_seconds(reader.manifest),
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def _capture_seconds(manifest: Manifest) -> float:
+    """Exposures and, where the projector is known, its latencies; pauses and retries are not counted."""
+    latency_ms = 0.0 if manifest.projector is None else manifest.projector.latency_ms
+    return round(manifest.plan.duration_s(latency_ms), 3)
 
 
 def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:

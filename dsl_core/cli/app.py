@@ -7,7 +7,19 @@ from typing import Annotated
 import typer
 
 import dsl_core
-from dsl_core.cli import calibrate, calibrations, compare, demo, effects, files, gui, results, scans, tradeoff
+from dsl_core.cli import (
+    calibrate,
+    calibrations,
+    compare,
+    demo,
+    effects,
+    files,
+    gui,
+    results,
+    scans,
+    series,
+    tradeoff,
+)
 
 app = typer.Typer(
     name="dsl-scan",
@@ -28,6 +40,8 @@ for command in (
     results.reconstruct,
     results.evaluate,
     compare.compare,
+    series.depth_test,
+    series.sweep,
     results.export,
 ):
     app.command()(command)

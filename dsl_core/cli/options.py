@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -184,6 +185,30 @@ def parse_size(name: str, text: str) -> tuple[int, int]:
     """Width and height from ``890x580``; raises `PlanError`."""
     width, height = _numbers(name, text, "WIDTHxHEIGHT", 2)
     return width, height
+
+
+def parse_numbers(name: str, text: str) -> list[float]:
+    """Finite numbers with commas between them; raises `PlanError`.
+
+    >>> parse_numbers("--positions", "695.2, 707")
+    [695.2, 707.0]
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not numbers or not all(math.isfinite(number) for number in numbers):
+        raise PlanError(f"{name} must be numbers with commas, like 695.2,707,719, not {text!r}.")
+    return numbers
+
+
+def parse_region(name: str, text: str) -> tuple[int, int, int, int]:
+    """Column, row, width and height from ``10,20,300,200``; raises `PlanError`."""
+    try:
+        x, y, width, height = (int(part) for part in text.split(","))
+    except ValueError as error:
+        raise PlanError(f"{name} must be X,Y,WIDTH,HEIGHT in whole pixels, not {text!r}.") from error
+    return x, y, width, height
 
 
 def _numbers(name: str, text: str, form: str, count: int) -> list[int]:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass
 from io import BytesIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.flag_classes import FLAG_COLOURS, GRAVITY
 from dsl_core.model.result import REASONS, Flag
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64] | NDArray[np.float32]
 Rgba = NDArray[np.uint8]
@@ -50,6 +54,20 @@ def png_uri(rgba: Rgba) -> str:
     step = -(-rgba.shape[1] // _MAX_WIDTH_PX)
     buffer = BytesIO()
     imsave(buffer, np.ascontiguousarray(rgba[::step, ::step]), format="png")
+    return _png_uri(buffer)
+
+
+def figure_uri(figure: Figure) -> str:
+    """A PNG data URI of a drawing."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    buffer = BytesIO()
+    FigureCanvasAgg(figure)
+    figure.savefig(buffer, format="png")
+    return _png_uri(buffer)
+
+
+def _png_uri(buffer: BytesIO) -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 

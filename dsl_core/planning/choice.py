@@ -11,6 +11,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.planning.prediction import Prediction, predict
 from dsl_core.planning.views import View, plane_view
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.solve.front import front
 
 
 @dataclass(frozen=True)
@@ -39,16 +40,6 @@ def weigh(
         found.append(Weighed(plan, predict(rig, plan, view, latency_ms=latency_ms, peaks=False)))
         progress.report("plans", done, len(todo))
     return found
-
-
-def front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Indices of points (cost, error) that no other beats in both, from cheap to dear."""
-    order = sorted(range(len(points)), key=lambda i: points[i])
-    kept: list[int] = []
-    for i in order:
-        if not kept or points[i][1] < points[kept[-1]][1]:
-            kept.append(i)
-    return kept
 
 
 def pareto(weighed: Sequence[Weighed]) -> list[Weighed]:

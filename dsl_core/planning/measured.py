@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from dsl_core.errors import StoreError
 from dsl_core.evaluation.pages import render_page
 from dsl_core.io.staging import staged
-from dsl_core.planning.choice import front
 from dsl_core.planning.sweep import Case, Point
+from dsl_core.solve.front import front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.evaluation.pages import render_page
+from dsl_core.evaluation.pictures import figure_uri
 from dsl_core.io.staging import staged
-from dsl_core.planning.choice import Weighed, front, pareto
+from dsl_core.planning.choice import Weighed, pareto
+from dsl_core.solve.front import front
 
 if TYPE_CHECKING:
     from dsl_core.planning.sweep import Point
@@ -43,9 +44,6 @@ def write_tradeoff_report(
 
 def plot_uri(weighed: Sequence[Weighed], chosen: Weighed, measured: Sequence[Point] = ()) -> str:
     """Error of a pixel over seconds of capture, both logarithmic, as a PNG data URI."""
-    import base64
-
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(SIZE_IN, dpi=100, layout="constrained")
@@ -64,7 +62,4 @@ def plot_uri(weighed: Sequence[Weighed], chosen: Weighed, measured: Sequence[Poi
     axes.set(xscale="log", yscale="log", xlabel="capture, s", ylabel="reflectance error of a pixel (RMSE)")
     axes.legend()
     axes.grid(alpha=0.3)
-    buffer = BytesIO()
-    FigureCanvasAgg(figure)
-    figure.savefig(buffer, format="png")
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    return figure_uri(figure)

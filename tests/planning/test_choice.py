@@ -19,12 +19,13 @@ from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
 from dsl_core.planning import sweep
 from dsl_core.planning.candidates import candidate_plans, possible_plans
-from dsl_core.planning.choice import Weighed, choose, front, pareto, weigh
+from dsl_core.planning.choice import Weighed, choose, pareto, weigh
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
 from dsl_core.planning.prediction import Prediction
 from dsl_core.planning.report import write_tradeoff_report
 from dsl_core.planning.views import plane_view
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve.front import front
 
 
 def weighed(seconds: float, error: float) -> Weighed:
