@@ -38,7 +38,12 @@ IMPORTS = {
         "app.panels.scan_page",
     ),
     "results": (*_SHARED, "app.controllers.results", "app.panels.results_page"),
-    "compare": (*_SHARED, "app.controllers.compare", "app.panels.compare_page"),
+    "compare": (
+        *_SHARED,
+        "app.controllers.compare",
+        "app.controllers.series",
+        "app.panels.compare_page",
+    ),
 }
 #: How long the first page is on screen before the rig is asked for, ms.
 CONNECT_AFTER_MS = 200
@@ -249,13 +254,16 @@ class Composition(QObject):
 
     def _compare_page(self, window: MainWindow) -> PageWidget:
         from app.controllers.compare import CompareController
+        from app.controllers.series import SeriesController
         from app.panels.compare_page import ComparePage
         from app.state.compare import CompareState
+        from app.state.series import SeriesState
 
-        state = CompareState()
-        controller = CompareController(state, window.parts.runner, window.toasts)
+        parts, state, several = window.parts, CompareState(), SeriesState()
+        controller = CompareController(state, parts.runner, window.toasts)
         self.session(window).serve_comparison(controller)
-        page = ComparePage(state, controller)
+        series = SeriesController(several, parts.runner, window.toasts, parts.undo)
+        page = ComparePage(state, controller, several, series)
         page.apply_theme(window.theme)
         return page
 

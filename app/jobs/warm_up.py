@@ -35,6 +35,7 @@ STEPS = (
     "app.controllers.calibrate",
     "app.panels.calibrate_page",
     "app.controllers.compare",
+    "app.controllers.series",
     "app.panels.compare_page",
     "app.wizards.wizard",
     "pandas",

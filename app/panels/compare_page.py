@@ -1,190 +1,101 @@
-"""The Compare page: A, B and their difference above, spectra under the cursor and figures below."""
+"""The Compare page: two results beside each other, or several as a series."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
 from pathlib import Path
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QPushButton, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QTabWidget, QVBoxLayout
 
-from app.panels.compare_bar import CompareBar
 from app.panels.compare_commands import CompareCommands
-from app.panels.compare_figures import CompareFigures
-from app.panels.compare_view import CompareView
-from app.state.compare import CompareState, Pair, Side
+from app.panels.compare_pair import ComparePair
+from app.panels.series_commands import SeriesCommands
+from app.panels.series_panel import SeriesPanel
+from app.state.compare import CompareState
+from app.state.series import SeriesState
 from app.theme import Theme
-from app.widgets.forms import label, set_role
+from app.widgets.drops import dropped_paths
 from app.widgets.late import Late
 from app.widgets.page import PageWidget
 
-NOTHING = (
-    "Open a result as A, then another one as B, or take the truth of its twin as B."
-    " Results (folders NAME.zarr) can be dropped here."
-)
-
 
 class ComparePage(PageWidget):
-    """Follows a `CompareState` and asks a controller."""
+    """Two tabs; what is opened or dropped goes to the one that is seen."""
 
-    def __init__(self, state: CompareState, commands: CompareCommands) -> None:
+    def __init__(
+        self,
+        state: CompareState,
+        commands: CompareCommands,
+        series_state: SeriesState,
+        series_commands: SeriesCommands,
+    ) -> None:
         super().__init__()
-        self._state, self._commands = state, commands
+        self._commands, self._series_commands = commands, series_commands
         self.setAcceptDrops(True)
-        self.names = [label("A: –", "heading"), label("B: –", "heading")]
-        self.open_first = _button("Open &A…", "Choose the result to look at")
-        self.open_second = _button("Open &B…", "Choose the result to compare it with")
-        self.truth = _button(
-            "&Truth as B", "Take what the twin knows of the scene of A, where a twin took it"
-        )
-        self.swap = _button("&Swap", "Let A and B change places")
-        self.report = _button("Write &report…", "Figures and pictures of A against the truth as an HTML page")
-        self.hint = label(NOTHING, "muted")
-        self.hint.setWordWrap(True)
-        self._view = Late(self._make_view)
-        self.bar = CompareBar(state, commands)
-        self._figures = Late(lambda: CompareFigures(state))
-        self._stops: list[Callable[[], None]] = []
-        self._lay_out()
-        self._connect()
+        self.pair = ComparePair(state, commands)
+        self._series = Late(lambda: SeriesPanel(series_state, series_commands))
+        self.tabs = QTabWidget()
+        self.tabs.setDocumentMode(True)
+        self.tabs.tabBar().setDrawBase(False)
+        self.tabs.tabBar().setAccessibleName("Two results or a series")
+        for tab, title, tip in (
+            (self.pair, "T&wo results", "Two results, or one against the truth, pixel by pixel"),
+            (self._series, "S&eries", "Depth over positions of a stage, or accuracy over time"),
+        ):
+            self.tabs.setTabToolTip(self.tabs.addTab(tab, title), tip)
+        QVBoxLayout(self).addWidget(self.tabs)
 
     @property
-    def view(self) -> CompareView:
-        """The three pictures, made when somebody looks."""
-        return self._view.part
+    def series(self) -> SeriesPanel:
+        """The series, made when somebody looks."""
+        return self._series.part
 
     @property
-    def figures(self) -> CompareFigures:
-        """Spectra and figures, made when somebody looks."""
-        return self._figures.part
+    def _shows_series(self) -> bool:
+        return self.tabs.currentWidget() is self._series
 
-    def _make_view(self) -> CompareView:
-        made = CompareView(self._state)
-        made.pointed.connect(self._commands.point_at)
-        return made
+    def page_actions(self) -> dict[str, Callable[[], object]]:
+        """Actions of the table that this page does."""
+        return {"series_add": self._add_to_series}
 
-    def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.addWidget(self.names[0])
-        head.addWidget(self.open_first)
-        head.addSpacing(24)
-        head.addWidget(self.names[1])
-        for button in (self.open_second, self.truth):
-            head.addWidget(button)
-        head.addStretch(1)
-        for button in (self.swap, self.report):
-            head.addWidget(button)
-        above = QWidget()
-        upper = QVBoxLayout(above)
-        upper.setContentsMargins(0, 0, 0, 0)
-        upper.addWidget(self._view, 1)
-        upper.addWidget(self.bar)
-        self.parts = QSplitter(Qt.Orientation.Vertical)
-        self.parts.setChildrenCollapsible(False)
-        for i, (widget, stretch) in enumerate(((above, 5), (self._figures, 4))):
-            self.parts.addWidget(widget)
-            self.parts.setStretchFactor(i, stretch)
-        column = QVBoxLayout(self)
-        column.addLayout(head)
-        column.addWidget(self.hint)
-        column.addWidget(self.parts, 1)
-
-    def _connect(self) -> None:
-        state, commands = self._state, self._commands
-        self.open_first.clicked.connect(lambda: self._choose(second=False))
-        self.open_second.clicked.connect(lambda: self._choose(second=True))
-        self.truth.clicked.connect(commands.use_truth)
-        self.swap.clicked.connect(commands.swap)
-        self.report.clicked.connect(self._choose_report)
-        self._stops = [
-            *self.bar.stops,
-            state.first.follow(lambda side: self._show_side(0, side)),
-            state.second.follow(lambda side: self._show_side(1, side)),
-            state.pair.follow(self._show_pair),
-            state.busy.follow(lambda _: self._show_hint()),
-            state.trouble.follow(lambda _: self._show_hint()),
-        ]
-
-    # Ask -------------------------------------------------------------------------------------------
-
-    def _choose(self, second: bool) -> None:
-        name = QFileDialog.getExistingDirectory(self, f"Open a result as {'B' if second else 'A'}")
-        if name:
-            self._commands.open_side(Path(name), second)
-
-    def _choose_report(self) -> None:
-        pair = self._state.pair.value
-        if pair is None:
-            return
-        start = pair.first.arrays.path.with_suffix(".html")
-        name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
-        if name:
-            self._commands.write_report(Path(name))
-
-    # Show ------------------------------------------------------------------------------------------
-
-    def _show_side(self, i: int, side: Side | None) -> None:
-        self.names[i].setText(f"{'AB'[i]}: {'–' if side is None else side.name}")
-        self._show_hint()
-
-    def _show_hint(self) -> None:
-        state = self._state
-        pair = state.pair.value
-        text = state.trouble.value or (f"{state.busy.value}…" if state.busy.value else "")
-        if not text and pair is None:
-            text = NOTHING
-        self.hint.setText(text)
-        self.hint.setVisible(bool(text))
-        set_role(self.hint, "bad" if state.trouble.value else "muted")
-        idle = not state.busy.value
-        truth = state.second.value is not None and state.second.value.truth is not None
-        for button in (self.open_first, self.open_second):
-            button.setEnabled(idle)
-        self.truth.setEnabled(idle and state.first.value is not None)
-        self.swap.setEnabled(idle and pair is not None and not truth)
-        self.report.setEnabled(idle and pair is not None and truth)
-
-    def _show_pair(self, pair: Pair | None) -> None:
-        self.parts.setEnabled(pair is not None)
-        self._show_hint()
-
-    # Page ------------------------------------------------------------------------------------------
+    def _add_to_series(self) -> None:
+        self.tabs.setCurrentWidget(self._series)
+        self.series.choose()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Take folders."""
-        if event.mimeData().hasUrls():
+        if dropped_paths(event.mimeData()):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Put what is dropped on a free side."""
-        for url in event.mimeData().urls():
-            path = Path(url.toLocalFile())
+        """Add to the series, or put what is dropped on a free side."""
+        paths = dropped_paths(event.mimeData())
+        if self._shows_series:
+            self._series_commands.add(paths)
+            return
+        for path in paths:
             if not self._commands.open(path):
                 self._commands.open_side(path, second=False)
 
     def open_path(self, path: Path) -> bool:
-        """Take a result, on a free side."""
+        """Take a result: for the series, or on a free side."""
+        if self._shows_series and self._series_commands.knows(path):
+            self._series_commands.add([path])
+            return True
         return self._commands.open(path)
 
     def command_line(self) -> str:
-        """The command that compares A with its truth."""
-        return self._commands.command_line()
+        """The command that does what the tab shows."""
+        return (self._series_commands if self._shows_series else self._commands).command_line()
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        self._view.apply_theme(theme)
-        self._figures.apply_theme(theme)
+        self.pair.apply_theme(theme)
+        self._series.apply_theme(theme)
 
     def release(self) -> None:
         """Follow nothing more."""
-        late = [part.stops for part in (self._view.made, self._figures.made) if part is not None]
-        for stop in (*self._stops, *chain.from_iterable(late)):
-            stop()
-
-
-def _button(text: str, tip: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
-    return button
+        self.pair.release()
+        if self._series.made is not None:
+            self._series.made.release()

@@ -12,7 +12,7 @@ from dsl_core.evaluation.flat_target import FlatTarget
 from dsl_core.evaluation.pages import render_page
 from dsl_core.evaluation.pictures import Picture, figure_uri, value_picture
 from dsl_core.evaluation.stage_test import StageTest, stage_table
-from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint, best_points
+from dsl_core.evaluation.time_sweep import FIGURES, SweepPoint, best_points
 from dsl_core.evaluation.uncertainty import BAND_95
 
 if TYPE_CHECKING:
@@ -108,14 +108,12 @@ def sweep_rows(points: Sequence[SweepPoint]) -> Table:
     best = [set(best_points(points, figure)) for figure in FIGURES]
     rows = []
     for i in sorted(range(len(points)), key=lambda i: points[i].seconds):
-        errors = [_error(points[i], each, i in kept) for each, kept in zip(FIGURES, best, strict=True)]
+        errors = [
+            points[i].words(each) + (" *" if i in kept else "")
+            for each, kept in zip(FIGURES, best, strict=True)
+        ]
         rows.append((points[i].name, f"{points[i].seconds:.1f}", *errors))
     return Table(heads, tuple(rows))
-
-
-def _error(point: SweepPoint, figure: SweepFigure, is_best: bool) -> str:
-    error = point.error(figure)
-    return "–" if error is None else f"{error:{figure.form}}{' *' if is_best else ''}"
 
 
 def _residual(name: str, position_mm: float, target: FlatTarget) -> Picture:

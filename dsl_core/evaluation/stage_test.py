@@ -154,6 +154,6 @@ def stage_table(found: StageTest) -> tuple[Verdict, ...]:
         Verdict("Single pixels about their plane (RMS)", f"{found.pixel_rms_mm:.3f}", "mm"),
     ]
     if found.patch_rms_mm is not None:
-        words = f"Means of {found.patches} patches, slopes free (RMS, as published)"
+        words = f"Means of {found.patches} patches (RMS, as published)"
         rows.append(Verdict(words, f"{found.patch_rms_mm:.4f}", "mm"))
     return (*rows, Verdict("Positions", str(len(found.positions_mm))))

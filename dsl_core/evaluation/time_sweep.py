@@ -53,6 +53,14 @@ class SweepPoint:
         value = getattr(self, figure.field)
         return None if value is None else float(value)
 
+    def words(self, figure: SweepFigure) -> str:
+        """The error of a figure, with its standard deviation where that is known."""
+        error = self.error(figure)
+        if error is None:
+            return "–"
+        std = self.depth_std_mm if figure.field == "depth_mm" else None
+        return f"{error:{figure.form}}" + ("" if std is None else f" ± {std:{figure.form}}")
+
 
 def point_against_truth(
     name: str, seconds: float, found: Evaluation, depth_error_mm: Floats | None

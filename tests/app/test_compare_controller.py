@@ -1,16 +1,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from app.controllers.compare import CompareController
-from app.jobs.base import InlineRunner, Job
+from app.jobs.base import InlineRunner
 from app.state.compare import CompareState, Shown
 from app.views import RecordingNotifier
 from tests.app.compare_bench import make_result
+from tests.app.later import Later
 
 
 @pytest.fixture(scope="module")
@@ -26,25 +26,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Path]
 def controller() -> tuple[CompareController, RecordingNotifier]:
     notifier = RecordingNotifier()
     return CompareController(CompareState(), InlineRunner(), notifier), notifier
-
-
-class Later:
-    """Runs jobs when it is told to, as a thread ends them some time."""
-
-    def __init__(self) -> None:
-        self.waiting: list[Job[Any]] = []
-
-    @property
-    def active(self) -> tuple[Job[Any], ...]:
-        return tuple(self.waiting)
-
-    def submit(self, job: Job[Any]) -> Job[Any]:
-        self.waiting.append(job)
-        return job
-
-    def run_all(self) -> None:
-        while self.waiting:
-            self.waiting.pop(0).run()()
 
 
 def test_two_results_fill_both_sides_and_are_compared(results: tuple[Path, Path, Path]) -> None:

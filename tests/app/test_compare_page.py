@@ -10,13 +10,13 @@ from pytestqt.qtbot import QtBot
 
 from app.controllers.compare import CompareController
 from app.jobs.qt_runner import QtRunner
-from app.panels.compare_page import NOTHING, ComparePage
+from app.panels.compare_pair import NOTHING, ComparePair
 from app.state.compare import CompareState, Shown
 from app.theme import DARK, LIGHT
 from app.views import RecordingNotifier
 from tests.app.compare_bench import make_result
 
-Bench = tuple[ComparePage, CompareState, CompareController]
+Bench = tuple[ComparePair, CompareState, CompareController]
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def chart(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def bench(qtbot: QtBot) -> Iterator[Bench]:
     runner, state = QtRunner(), CompareState()
     commands = CompareController(state, runner, RecordingNotifier())
-    page = ComparePage(state, commands)
+    page = ComparePair(state, commands)
     qtbot.addWidget(page)
     page.apply_theme(LIGHT)
     page.resize(1100, 700)
@@ -39,8 +39,8 @@ def bench(qtbot: QtBot) -> Iterator[Bench]:
 
 
 def with_truth(qtbot: QtBot, bench: Bench, chart: Path) -> None:
-    page, state, _ = bench
-    assert page.open_path(chart)
+    page, state, commands = bench
+    assert commands.open(chart)
     qtbot.waitUntil(lambda: state.first.value is not None and not state.busy.value, timeout=20_000)
     QTest.mouseClick(page.truth, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: state.pair.value is not None, timeout=20_000)

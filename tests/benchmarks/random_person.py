@@ -213,8 +213,8 @@ class RandomPerson:
         self.done.append("first comparison")
         for second in (False, True):
             page._commands.open_side(result.path, second)
-            self._wait(lambda: not page._state.busy.value)
-        self._wait(lambda: len(page.view.bars) == 2)
+            self._wait(lambda: not page.pair._state.busy.value)
+        self._wait(lambda: len(page.pair.view.bars) == 2)
 
     def _busy_all_workers(self) -> None:
         """Let each worker calculate once: the last of them, and its own helpers, else come after hours."""

@@ -294,7 +294,7 @@ class WindowJobs:
             for name, second in (("chart.zarr", False), ("chart-again.zarr", True)):
                 page._commands.open_side(self.stage.material.scans / name, second=second)
                 self.stage.idle()
-            self._wait(lambda: page._state.pair.value is not None)
+            self._wait(lambda: page.pair._state.pair.value is not None)
         with self._job("compare with truth"):
             page._commands.use_truth()
             self.stage.idle()

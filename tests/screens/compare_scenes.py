@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from app.panels.compare_page import ComparePage
 from app.state.compare import Shown
+from app.state.series import Kind
+from tests.cases.stage_series import write_stage, write_sweep
 from tests.screens.stage import Stage
+
+#: Where the published depth test was measured.
+POSITIONS_MM = np.linspace(695.2, 859.2, 15).tolist()
 
 
 def compared(stage: Stage) -> ComparePage:
@@ -31,7 +38,7 @@ def truth(stage: Stage) -> None:
     page = compared(stage)
     stage.shoot("one")
     page._commands.use_truth()
-    stage.wait(lambda: page._state.pair.value is not None)
+    stage.wait(lambda: page.pair._state.pair.value is not None)
     page._commands.point_at((60, 40))
     stage.shoot()
 
@@ -40,15 +47,51 @@ def two(stage: Stage) -> None:
     """Two results, by depth and by band."""
     page = compared(stage)
     page._commands.open_side(stage.material.scans / "chart-again.zarr", second=True)
-    stage.wait(lambda: page._state.pair.value is not None)
+    stage.wait(lambda: page.pair._state.pair.value is not None)
     page._commands.point_at((60, 40))
     stage.shoot()
     page._commands.show(Shown.BAND)
     stage.shoot("band")
 
 
+def series_page(stage: Stage) -> ComparePage:
+    """The page with its series."""
+    stage.open()
+    page = stage.window.open_page("compare")
+    assert isinstance(page, ComparePage)
+    page.tabs.setCurrentIndex(1)
+    return page
+
+
+def series(stage: Stage) -> None:
+    """No series yet, then a flat target at the published positions, and one with a region."""
+    page = series_page(stage)
+    stage.shoot("empty")
+    for i, position in enumerate(POSITIONS_MM):
+        write_stage(stage.folder, round(position, 1), seed=i, bend_mm=0.02 * (-1) ** i)
+    page._series_commands.add([stage.folder])
+    stage.wait(lambda: page.series._state.test.value is not None and not page.series._state.busy.value)
+    stage.shoot()
+    stage.press("Region")
+    stage.idle()
+    stage.shoot("region")
+
+
+def sweep(stage: Stage) -> None:
+    """Scans of one scene against the longest one."""
+    page = series_page(stage)
+    reference, *_ = write_sweep(stage.folder)
+    page._series_commands.ask(Kind.SWEEP)
+    page._series_commands.compare_with(reference)
+    page._series_commands.add([stage.folder])
+    stage.wait(lambda: len(page.series._state.points) == 3 and not page.series._state.busy.value)
+    stage.shoot()
+
+
 SCENES: dict[str, Callable[[Stage], None]] = {
     "compare-empty": empty,
     "compare-truth": truth,
     "compare-two": two,
+    "compare-series": series,
+    "compare-sweep": sweep,
 }
