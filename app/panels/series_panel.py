@@ -66,6 +66,7 @@ class SeriesPanel(QWidget):
         self.report = _button("Write &report…", "Table, figures, plot and pictures as an HTML page")
         self.hint = label("", "muted")
         self.hint.setWordWrap(True)
+        self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.table = SeriesTable(state, commands)
         self.figures = ReadTable(
             "Figures of the series", "What all positions say together", ("Figure", "Value", "Unit")
@@ -160,7 +161,7 @@ class SeriesPanel(QWidget):
         self.hint.setText(text if rows else NOTHING[kind])
         self.hint.setVisible(bool(self.hint.text()))
         self.kind.setCurrentIndex(self.kind.findData(kind))
-        self.parts.setEnabled(bool(rows))
+        self.parts.setVisible(bool(rows))
         self.remove.setEnabled(state.selected_row is not None)
         self.report.setEnabled(is_answered and not state.busy.value)
         for widget, is_seen in (

@@ -134,8 +134,8 @@ def _stage_plot(found: StageTest) -> str:
     order = np.argsort(found.positions_mm)
     at, half = np.array(found.positions_mm)[order], BAND_95 * np.array(found.std_mm)[order]
     for line, key, words in (
-        (found.free, "free", f"slope free, RMS {found.free.rms_mm:.3f} mm"),
-        (found.fixed, "fixed", f"slope 1, RMS {found.fixed.rms_mm:.3f} mm"),
+        (found.free, "free", f"slope free, RMS {found.free.rms_mm:.4f} mm"),
+        (found.fixed, "fixed", f"slope 1, RMS {found.fixed.rms_mm:.4f} mm"),
     ):
         off = np.array(line.deviations_mm)[order]
         axes.errorbar(at, off, half, fmt="o-", ms=4, lw=0.8, capsize=2, color=_COLOURS[key], label=words)

@@ -100,7 +100,7 @@ def test_an_empty_series_says_what_to_do(qtbot: QtBot, bench: Bench) -> None:
     panel = bench.see()
     assert panel.hint.text() == NOTHING[Kind.STAGE]
     qtbot.waitUntil(panel.hint.isVisible)
-    assert not panel.parts.isEnabled()
+    assert not panel.parts.isVisible()
     assert not panel.report.isEnabled()
     panel.kind.setCurrentIndex(1)
     panel.kind.activated.emit(1)
