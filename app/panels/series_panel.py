@@ -175,19 +175,16 @@ class SeriesPanel(QWidget):
         self._show_figures()
 
     def _show_choices(self) -> None:
-        wanted = [("Truth of the twin", None), *((row.name, row.path) for row in self._state.rows.value)]
-        if wanted != [
-            (self.against.itemText(i), self.against.itemData(i)) for i in range(self.against.count())
-        ]:
-            self.against.clear()
+        paths, against = [row.path for row in self._state.rows.value], self._state.against.value
+        # Its row may have been removed; it is compared with all the same.
+        others = [] if against is None or against in paths else [against]
+        wanted = [("Truth of the twin", None), *((path.stem, path) for path in (*paths, *others))]
+        box = self.against
+        if wanted != [(box.itemText(i), box.itemData(i)) for i in range(box.count())]:
+            box.clear()
             for text, path in wanted:
-                self.against.addItem(text, path)
-        at = [path for _, path in wanted].index(self._state.against.value) if self._is_offered else 0
-        self.against.setCurrentIndex(at)
-
-    @property
-    def _is_offered(self) -> bool:
-        return self._state.against.value in [row.path for row in self._state.rows.value]
+                box.addItem(text, path)
+        box.setCurrentIndex([path for _, path in wanted].index(against))
 
     def _show_figures(self) -> None:
         test = self._state.test.value

@@ -189,6 +189,8 @@ def test_accuracy_over_time_and_its_report(
     assert remarks["slow"] == ""
     assert remarks["reference"] == "The others are compared with it."
     assert not panel.figures.isVisible()
+    bench.page._series_commands.remove(paths[0])
+    assert panel.against.currentText() == "reference"
     panel.figure.setCurrentIndex(1)
     panel.figure.activated.emit(1)
     assert "Reflectance" in panel.plot.plot.getPlotItem().getAxis("left").labelText
