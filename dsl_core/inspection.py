@@ -7,9 +7,10 @@ graph shows at a glance what is wrong with a pixel.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,16 +50,21 @@ class IntensityGraph:
 
 def find_session(result: ResultArrays) -> Path:
     """The scan beside a result that it was made of; raises `StoreError` when it is not there."""
+    return session_of(result.path, result.attributes)
+
+
+def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
+    """The scan beside a result with these attributes; raises `StoreError` when it is not there."""
     from dsl_core.io.file_names import MANIFEST_NAME
     from dsl_core.io.session_manifest import read_manifest
 
-    captured = result.attributes.get("captured")
-    for folder in sorted(result.path.parent.glob("*.dsl")):
+    captured = attributes.get("captured")
+    for folder in sorted(path.parent.glob("*.dsl")):
         if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
             return folder
     raise StoreError(
-        f"The scan of {result.path.name} is not beside it, so that its frames cannot be shown."
-        f" Move the scan of {captured or 'this result'} to {result.path.parent}."
+        f"The scan of {path.name} is not beside it, so that its frames cannot be read."
+        f" Move the scan of {captured or 'this result'} to {path.parent}."
     )
 
 

@@ -151,10 +151,12 @@ def reconstruct(
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
     from dsl_core.reconstruction.sanity import require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
-    from dsl_core.reconstruction.solvers import solve_spectra
+    from dsl_core.reconstruction.solvers import check_solver, solve_spectra
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
     plan = check_source(source, rig)
+    if options.spectra:
+        check_solver(options.solver, rig, plan, options.correspondence)
     with timer.stage("read, merge, decode the binary code"):
         merged = MergedScan(source, rig)
         code, white = decode_columns(merged, progress)

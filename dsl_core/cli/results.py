@@ -18,15 +18,12 @@ from dsl_core.cli.options import (
     parse_pixels,
 )
 from dsl_core.cli.output import Output
-from dsl_core.errors import DecodeError, PlanError
+from dsl_core.errors import PlanError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from dsl_core.evaluation.summary import Evaluation
-
-MODELS = ("auto", "grating", "hybrid", "grid")
-DEVICES = ("cpu", "cuda", "auto")
 
 Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of 'reconstruct'.")]
 
@@ -40,6 +37,7 @@ def reconstruct(
     override: OverrideCalibration = False,
     bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
     model: Annotated[str, typer.Option(help="Correspondence: auto, grating, hybrid or grid.")] = "auto",
+    solver: Annotated[str, typer.Option(help="best, published, nearest-line or colour-basis.")] = "best",
     refine: Annotated[bool, typer.Option("--refine/--no-refine", help="Columns below one pixel.")] = True,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="No spectra.")] = False,
     device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda where there is one.")] = "cpu",
@@ -51,16 +49,19 @@ def reconstruct(
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.result_file import RESULT_FOLDER, save_result
     from dsl_core.io.staging import check_targets
+    from dsl_core.model.spectral_choices import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
+    from dsl_core.reconstruction.torch_device import DEVICES, torch_device
     from dsl_core.sessions import reconstruct_session
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
-    if model not in MODELS:
-        raise PlanError(f"--model must be one of {', '.join(MODELS)}, not {model!r}.")
+    _require_one_of("--model", model, names(MODELS))
+    _require_one_of("--solver", solver, names(SOLVERS))
+    _require_one_of("--device", device, DEVICES)
     grid = parse_bands(bands)
     check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
-    options = Options(grid, model, refine, not depth_only, _torch_device(device))
+    options = Options(grid, model, refine, not depth_only, torch_device(device), solver=solver)
     with output.progress() as progress:
         result = reconstruct_session(session, rig, options, progress, timer, override)
         with timer.stage("save the result"):
@@ -166,15 +167,6 @@ def print_figures(output: Output, evaluation: Evaluation) -> None:
     output.table(("figure", "value", "unit"), [(v.figure, v.value, v.unit) for v in verdicts(evaluation)])
 
 
-def _torch_device(name: str) -> str:
-    """``cpu`` or ``cuda``; raises `DecodeError` when the one asked for is not there."""
-    if name not in DEVICES:
-        raise PlanError(f"--device must be one of {', '.join(DEVICES)}, not {name!r}.")
-    if name == "cpu":
-        return name
-    import torch
-
-    found = torch.cuda.is_available()
-    if name == "cuda" and not found:
-        raise DecodeError("There is no CUDA device, or torch was built without CUDA. Use --device cpu.")
-    return "cuda" if found else "cpu"
+def _require_one_of(option: str, given: str, wanted: tuple[str, ...]) -> None:
+    if given not in wanted:
+        raise PlanError(f"{option} must be one of {', '.join(wanted)}, not {given!r}.")

@@ -68,6 +68,17 @@ class Measured:
     kappa: Tensor
 
 
+def require_single_lines(plan: CapturePlan) -> LineSet:
+    """The lines of a plan that shows one line a frame; raises `PlanError` for any other."""
+    lines = LineSet.of(plan)
+    if lines is None or lines.frames != lines.lines:
+        raise PlanError(
+            f"The published reconstruction reads one line per frame; the plan {plan.name!r} projects"
+            f" {plan.spectral.kind!r}. Scan with single lines, or use the best solver."
+        )
+    return lines
+
+
 class PublishedReconstruction:
     """One scan's spectra by the published objective; the input is that of `SpectralReconstruction`.
 
@@ -87,13 +98,8 @@ class PublishedReconstruction:
         options: AdamOptions | None = None,
         device: str = "cpu",
     ) -> None:
-        lines = LineSet.of(plan)
-        if lines is None or lines.frames != lines.lines:
-            raise PlanError(
-                f"The published reconstruction reads one line per frame; the plan {plan.name!r} projects"
-                f" {plan.spectral.kind!r}. Scan with single lines, or use the banded solver."
-            )
-        self.rig, self.plan, self.grid, self.model, self.lines = rig, plan, grid, model, lines
+        self.lines = require_single_lines(plan)
+        self.rig, self.plan, self.grid, self.model = rig, plan, grid, model
         self.radiance, self.saturated, self.pixels = radiance, ~np.isfinite(std), pixels
         self.options, self.device = options or AdamOptions(), torch.device(device)
 

@@ -220,6 +220,7 @@ def test_frames_that_show_nothing(
         ("reconstruct absent.dsl --bands 430-660", "--bands must be START:STOP:STEP"),
         ("reconstruct absent.dsl --bands 430:660:7", "does not end on a band"),
         ("reconstruct absent.dsl --model magic", "--model must be one of auto, grating, hybrid, grid"),
+        ("reconstruct absent.dsl --solver magic", "--solver must be one of best, published, nearest-line"),
         ("reconstruct absent.dsl --device tpu", "--device must be one of"),
         ("reconstruct absent.dsl -o folder", "exists already"),
         ("reconstruct absent.dsl --calibration absent.json", "There is no file absent.json"),

@@ -171,6 +171,24 @@ def test_export_of_a_result(
     assert give("export", finished / "scan.zarr", form, tmp_path / name, *more, "--force").code == 0
 
 
+def test_reconstruct_by_another_solver(give: Give, finished: Path, tmp_path: Path) -> None:
+    target = tmp_path / "again.zarr"
+    options = ("--solver", "colour-basis", "--bands", "450:650:50", "-o", target)
+    assert give("reconstruct", finished / "scan.dsl", *options).code == 0
+    result = load_result(target)
+    assert result["wavelength_nm"].values.tolist() == [450, 500, 550, 600, 650]
+    assert bool(result["reflectance_std"].isnull().all())
+
+
+def test_what_the_calibration_lacks_is_said_before_a_frame_is_read(
+    give: Give, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(SessionReader, "read")
+    ending = give("reconstruct", finished / "scan.dsl", "--model", "grid", "-o", tmp_path / "a.zarr")
+    assert ending.code == 2
+    assert "holds no data-driven correspondence" in ending.sentence
+
+
 def test_a_scan_goes_out_and_comes_back_in_the_published_layout(
     give: Give, finished: Path, tmp_path: Path
 ) -> None:

@@ -1,0 +1,42 @@
+"""Ways to spectra by name, as the command line and the window offer them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SpectralChoice:
+    """A way with its name on the command line, its title in the window, and what it does and costs."""
+
+    name: str
+    title: str
+    about: str
+
+
+#: How the place of each wavelength is computed.
+MODELS: tuple[SpectralChoice, ...] = (
+    SpectralChoice("auto", "The best that the calibration holds", "hybrid, else the grid, else the grating"),
+    SpectralChoice("grating", "Grating equation alone", "needs no depth stage; knows no bend of the film"),
+    SpectralChoice("hybrid", "Grating equation and measured residual", "needs a calibrated depth stage"),
+    SpectralChoice("grid", "Measured grid", "as published; needs a grid measured on the depth stage"),
+)
+
+#: How spectra are solved for.
+SOLVERS: tuple[SpectralChoice, ...] = (
+    SpectralChoice("best", "Best estimate", "every frame by its noise, with a deviation for each band"),
+    SpectralChoice(
+        "published", "As published", "Adam on the published objective; many times slower, no deviations"
+    ),
+    SpectralChoice("nearest-line", "Nearest line", "one frame a band; quick, noisy, no deviations"),
+    SpectralChoice("colour-basis", "Colour alone", "from three colours; quickest, a guess, no deviations"),
+)
+
+
+def names(choices: tuple[SpectralChoice, ...]) -> tuple[str, ...]:
+    """The names of choices, in their order.
+
+    >>> names(MODELS)
+    ('auto', 'grating', 'hybrid', 'grid')
+    """
+    return tuple(choice.name for choice in choices)
