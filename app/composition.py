@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
 
+from app.again_desk import AgainDesk
 from app.calibration_desk import CalibrationDesk, calibration_commands
 from app.main_window import Command, MainWindow, PageMaker
 from app.settings import data_folder
@@ -74,6 +75,7 @@ class Composition(QObject):
         self._demo: DemoController | None = None
         self._session: SessionDesk | None = None
         self._desk: CalibrationDesk | None = None
+        self._again: AgainDesk | None = None
 
     @property
     def pages(self) -> dict[str, PageMaker]:
@@ -92,6 +94,7 @@ class Composition(QObject):
         return {
             "demo": lambda window: self.demo(window).show(),
             "live_demo": lambda window: self.demo(window).scan_live(),
+            "reconstruct_again": lambda window: self.again(window).begin(),
             **calibration_commands(),
         }
 
@@ -173,6 +176,12 @@ class Composition(QObject):
             self._desk = CalibrationDesk(window, self.rig(window))
         return self._desk
 
+    def again(self, window: MainWindow) -> AgainDesk:
+        """What reconstructs scans again."""
+        if self._again is None:
+            self._again = AgainDesk(window)
+        return self._again
+
     def _calibrate_page(self, window: MainWindow) -> PageWidget:
         return self.desk(window).page()
 
@@ -234,6 +243,7 @@ class Composition(QObject):
             effects,
             window.open_path,
         )
+        page.again_wanted.connect(lambda: window.do("reconstruct_again"))
         page.apply_theme(window.theme)
         return page
 
@@ -249,6 +259,7 @@ class Composition(QObject):
         self.session(window).serve_results(controller)
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)
+        page.again_wanted.connect(lambda: window.do("reconstruct_again"))
         page.apply_theme(window.theme)
         return page
 

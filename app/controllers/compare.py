@@ -61,6 +61,20 @@ class CompareController:
             lambda opened: self._take(side, opened),
         )
 
+    def open_both(self, first: Path, second: Path) -> None:
+        """Read two results as A and B."""
+
+        def work(progress: Progress) -> list[Side]:
+            return [Side(path.stem, load_arrays(path, progress)) for path in (first, second)]
+
+        def done(sides: list[Side]) -> None:
+            # Each alone would be compared with what was there before.
+            self.state.first.set(sides[0])
+            self.state.second.set(sides[1])
+            self._compare()
+
+        self._start(f"Open {first.name} and {second.name}", work, done)
+
     def use_truth(self) -> None:
         """Take what the twin knows of the scene of A as B."""
         first = self.state.first.value

@@ -169,6 +169,7 @@ class ScanController:
     def _finished(self, status: Status) -> None:
         folder = self._end(Phase.DONE)
         self.state.interrupted.set(None)
+        self.state.finished.set(folder)
         self.state.check_drift.set(True)
         self.state.note.set(f"All {status.total} frames are stored in {folder}.")
         self._aim_anew()

@@ -18,6 +18,9 @@ class CompareCommands(Protocol):
     def open_side(self, path: Path, second: bool) -> None:
         """Read a result as A or B."""
 
+    def open_both(self, first: Path, second: Path) -> None:
+        """Read two results as A and B."""
+
     def use_truth(self) -> None:
         """Take the truth of A as B."""
 

@@ -78,6 +78,10 @@ class ComparePage(PageWidget):
             if not self._commands.open(path):
                 self._commands.open_side(path, second=False)
 
+    def compare(self, first: Path, second: Path) -> None:
+        """Compare two results."""
+        self._commands.open_both(first, second)
+
     def open_path(self, path: Path) -> bool:
         """Take a result: for the series, or on a free side."""
         if self._shows_series and self._series_commands.knows(path):

@@ -45,9 +45,14 @@ WAITING, CONTENT, WELCOME = range(3)
 
 
 class ResultsPage(PageWidget):
-    """Follows a `ResultsState` and asks a controller; ``open_chosen`` tells a folder to open."""
+    """Follows a `ResultsState` and asks a controller.
+
+    ``open_chosen`` tells a folder to open, ``again_wanted`` that its scan is to be reconstructed
+    in another way.
+    """
 
     open_chosen = Signal(object)
+    again_wanted = Signal()
 
     def __init__(
         self, state: ResultsState, commands: ResultCommands, runner: JobRunner, welcome: Welcome
@@ -81,6 +86,7 @@ class ResultsPage(PageWidget):
         self.stack = QStackedWidget()
         self._open, self._export = QPushButton("Open…"), QPushButton("Export…")
         self._inspect = QPushButton("Intensity graph")
+        self.again = QPushButton("Reconstruct again…")
         self._lay_out()
         self._connect()
 
@@ -111,10 +117,14 @@ class ResultsPage(PageWidget):
         self._inspect.setToolTip("What the pixel under the cursor saw line by line, against the model (I)")
         self._open.setToolTip("Open a result or a finished scan (Ctrl+O opens any file)")
         self._export.setToolTip("Write the result in formats of other programs (Ctrl+E)")
+        self.again.setToolTip(
+            "Make another result of the same frames, with other bands, another solver or calibration (Ctrl+R)"
+        )
         head = QHBoxLayout()
         head.addWidget(self.title)
         head.addSpacing(10)
         head.addWidget(self.about, 1)
+        head.addWidget(self.again)
         head.addWidget(self._inspect)
         head.addWidget(self._open)
         head.addWidget(self._export)
@@ -138,11 +148,14 @@ class ResultsPage(PageWidget):
         self.reconstruct.setToolTip(
             "Turn the frames into depth and spectra; the result is saved beside the scan"
         )
+        self.otherwise = QPushButton("With other parameters…")
+        self.otherwise.setToolTip("Choose bands, solver, calibration and name first (Ctrl+R)")
         column = QVBoxLayout(waiting)
         column.addStretch(1)
         column.addWidget(self.message)
         column.addSpacing(8)
-        column.addWidget(self.reconstruct, 0, Qt.AlignmentFlag.AlignHCenter)
+        for button in (self.reconstruct, self.otherwise):
+            column.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
         column.addStretch(2)
         return waiting
 
@@ -186,6 +199,8 @@ class ResultsPage(PageWidget):
             button.clicked.connect(self.choose)
         self._export.clicked.connect(self.export)
         self._inspect.clicked.connect(self.inspect)
+        for button in (self.again, self.otherwise):
+            button.clicked.connect(self.again_wanted)
         state.graph.changed.connect(self._show_graph)
         state.library.changed.connect(self._ask_library)
         self.reconstruct.clicked.connect(commands.reconstruct)
@@ -203,7 +218,9 @@ class ResultsPage(PageWidget):
         state, result = self._state, self._state.result.value
         waiting = bool(state.busy.value) or state.offer.value is not None
         self.stack.setCurrentIndex(WAITING if waiting else WELCOME if result is None else CONTENT)
-        self.reconstruct.setVisible(state.offer.value is not None and not state.busy.value)
+        for button in (self.reconstruct, self.otherwise):
+            button.setVisible(state.offer.value is not None and not state.busy.value)
+        self.again.setEnabled(result is not None)
         self._export.setEnabled(result is not None)
         self._inspect.setEnabled(result is not None)
         if state.busy.value:
@@ -285,6 +302,11 @@ class ResultsPage(PageWidget):
             dialog = ExportDialog(self._state, self._commands, self)
             dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             dialog.open()
+
+    def subject(self) -> Path | None:
+        """The scan that is offered, or the result that is open."""
+        result = self._state.result.value
+        return self._state.offer.value or (None if result is None else result.path)
 
     def open_path(self, path: Path) -> bool:
         """Open a result, a scan or a reference."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -42,7 +42,12 @@ PLANS = "Plans and pattern sets (*.json)"
 
 
 class ScanPage(PageWidget):
-    """Follows a `ScanState` and asks a controller; ``open_result`` shows a finished scan elsewhere."""
+    """Follows a `ScanState` and asks a controller; ``open_result`` shows a finished scan elsewhere.
+
+    ``again_wanted`` tells that the finished scan is to be reconstructed in another way.
+    """
+
+    again_wanted = Signal()
 
     def __init__(
         self,
@@ -111,6 +116,7 @@ class ScanPage(PageWidget):
         state, commands = self._state, self._commands
         self.banner.action.clicked.connect(commands.resume)
         self.stop.clicked.connect(commands.stop_reconnecting)
+        self.run.again.clicked.connect(self.again_wanted)
         self.plan.preset_chosen.connect(commands.plans.choose_preset)
         self.plan.plan_changed.connect(self._change_plan)
         self.plan.open_wanted.connect(self._open_plan)
@@ -189,6 +195,10 @@ class ScanPage(PageWidget):
         if not self._state.phase.value.is_busy:
             self._commands.plans.refresh()
             self._commands.plans.load_library()
+
+    def subject(self) -> Path | None:
+        """The scan that was finished last."""
+        return self._state.finished.value
 
     def open_path(self, path: Path) -> bool:
         """Take an interrupted scan, a plan or a pattern set."""

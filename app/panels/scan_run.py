@@ -141,6 +141,8 @@ class RunBox(QGroupBox):
         self.cancel.setToolTip("End after the frame at hand; what is stored can be resumed")
         self.renew = QPushButton("Plan a &new scan")
         self.renew.setToolTip("Leave the interrupted scan as it is on disk")
+        self.again = QPushButton("Reconstruct a&gain…")
+        self.again.setToolTip("Make a result of the finished scan with other parameters, without scanning")
         self.drift = QCheckBox("Compare old frames first")
         self.drift.setToolTip(
             "Take two old frames again before going on. Without it the scan goes on although scene or light"
@@ -167,6 +169,7 @@ class RunBox(QGroupBox):
             state.interrupted.follow(lambda _: self._show()),
             state.facts.follow(lambda _: self._show()),
             state.note.follow(lambda _: self._show()),
+            state.finished.follow(lambda _: self._show()),
             state.status.follow(self._show_status),
         ]
 
@@ -180,6 +183,7 @@ class RunBox(QGroupBox):
         column.addWidget(self.start)
         column.addLayout(buttons)
         column.addWidget(self.renew)
+        column.addWidget(self.again)
         for widget in (self._phase, self._bar, self._what, self._time, self._text):
             column.addWidget(widget)
 
@@ -201,6 +205,7 @@ class RunBox(QGroupBox):
         self.cancel.setEnabled(phase.is_busy and phase is not Phase.STOPPING)
         for widget in (self.renew, self.drift):
             widget.setVisible(session is not None and not phase.is_busy)
+        self.again.setVisible(self._state.finished.value is not None and not phase.is_busy)
         ready = phase is not Phase.PLANNING or not obstacles
         self._phase.setText(f"● {phase.value}" if ready else "● not ready")
         set_role(self._phase, _PHASE_ROLES.get(phase, "muted"))

@@ -113,7 +113,8 @@ class ScanState:
     it. ``rescue`` is what becomes of the rig where a lost device was it. ``plan_file`` holds the plan at
     hand, where it was saved or opened and is still the same.
     ``check_drift`` compares two old frames before an interrupted scan goes on. ``period_ms`` is the LED cycle
-    of the rig's projector. ``result`` fires with each new result.
+    of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
+    result.
     """
 
     def __init__(self, plan: CapturePlan, target: Path) -> None:
@@ -126,6 +127,7 @@ class ScanState:
         self.check_drift = Value(True)
         self.then_reconstruct = Value(True)
         self.interrupted: Value[Interrupted | None] = Value(None)
+        self.finished: Value[Path | None] = Value(None)
         self.facts: Value[Facts | None] = Value(None)
         self.period_ms = Value(1000.0 / 60.0)
         self.latency_ms = Value(0.0)

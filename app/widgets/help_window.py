@@ -31,6 +31,7 @@ ORDER = (
     "accuracy-against-time",
     "designed-patterns",
     "effects-of-the-twin",
+    "reconstructing-again",
     "numbers",
     "hard-cases",
     "reading-an-intensity-graph",

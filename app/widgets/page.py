@@ -26,6 +26,10 @@ class PageWidget(QWidget):
         """The plot of the page that can be saved as a figure; None when there is none."""
         return None
 
+    def subject(self) -> Path | None:
+        """The scan or result that the page is about, for who acts on it; None when there is none."""
+        return None
+
     def open_path(self, path: Path) -> bool:
         """Open a file or folder that was chosen or dropped; False when it is none of the page's."""
         return False

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from PySide6.QtWidgets import QTabWidget
+from PySide6.QtWidgets import QDialog, QTabWidget
 
+from app.panels.again_dialog import AgainDialog
 from app.panels.export_dialog import ExportDialog
 from app.panels.library_dialog import LibraryDialog
 from app.panels.results_page import ResultsPage
@@ -176,6 +177,26 @@ def export(stage: Stage) -> None:
     stage.shoot("taken")
 
 
+def again(stage: Stage) -> None:
+    """Reconstruct again: the dialog, a bad order, the work, and the offer to compare."""
+    opened(stage)
+    stage.window.do("reconstruct_again")
+    dialog = stage.dialog(AgainDialog)
+    stage.shoot()
+    dialog.step.setValue(7)
+    stage.shoot("refused")
+    dialog.step.setValue(46)
+    dialog.name.setText("chart-coarse")
+    stage.press("Show command line", dialog)
+    stage.shoot("command")
+    for text in dialog.findChildren(QDialog):
+        text.close()
+    stage.press("Reconstruct", dialog)
+    stage.wait(lambda: stage.window.toasts.shown)
+    stage.idle()
+    stage.shoot("done")
+
+
 SCENES: dict[str, Callable[[Stage], None]] = {
     "results-nothing": nothing,
     "results-view": views,
@@ -186,4 +207,5 @@ SCENES: dict[str, Callable[[Stage], None]] = {
     "results-graph": graph,
     "results-search": search,
     "results-export": export,
+    "results-again": again,
 }
