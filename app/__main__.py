@@ -41,6 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         theme=wanted.theme,
         commands=composition.commands,
         imports=IMPORTS,
+        takers=composition.takers,
     )
     keep_house(window)
     hook = ExceptionHook(window.toasts)

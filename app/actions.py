@@ -54,6 +54,13 @@ ACTIONS: tuple[Action, ...] = (
     Action("export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs"),
     Action("save_figure", "Save &figure…", "File", "", "Save the plot of this page as SVG or PNG"),
     Action(
+        "import",
+        "&Import…",
+        "File",
+        "Ctrl+I",
+        "Take in a folder of images or a calibration of another program; says what is missing or misnamed",
+    ),
+    Action(
         "show_command",
         "Show &command line",
         "File",

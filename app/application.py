@@ -15,11 +15,12 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
+from app.controllers.known_files import Kind
 from app.jobs.base import Job
 from app.jobs.housekeeping import LOOK_MS, Housekeeper, share_heaps
 from app.jobs.qt_runner import QtRunner
 from app.jobs.warm_up import import_early
-from app.main_window import Command, MainWindow, PageMaker
+from app.main_window import Command, MainWindow, PageMaker, Taker
 from app.paged_window import Parts
 from app.panels.log import LogRecords
 from app.settings import load_settings, settings_folder
@@ -93,6 +94,7 @@ def make_window(
     theme: Literal["system", "light", "dark"] | None = None,
     commands: dict[str, Command] | None = None,
     imports: Mapping[str, Sequence[str]] | None = None,
+    takers: dict[Kind, Taker] | None = None,
 ) -> MainWindow:
     """The window with its settings of a folder (default: the system's); told troubles become toasts.
 
@@ -106,7 +108,7 @@ def make_window(
     logging.getLogger().addHandler(records)
     logging.getLogger("dsl_core").setLevel(logging.INFO)
     parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme, RecentFiles(settings))
-    window = MainWindow(parts, pages, commands)
+    window = MainWindow(parts, pages, commands, takers)
     records.setParent(window)
     parts.runner.setParent(window)
     window.setWindowIcon(app_icon(window.theme))

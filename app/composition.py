@@ -11,9 +11,11 @@ from PySide6.QtCore import QObject, QTimer
 
 from app.again_desk import AgainDesk
 from app.calibration_desk import CalibrationDesk, calibration_commands
-from app.main_window import Command, MainWindow, PageMaker
+from app.controllers.known_files import Kind
+from app.main_window import Command, MainWindow, PageMaker, Taker
 from app.settings import data_folder
 from app.state.rig import Link, RigChoice, RigState
+from app.take_in_desk import TakeInDesk
 from app.widgets.page import PageWidget
 
 if TYPE_CHECKING:
@@ -76,6 +78,7 @@ class Composition(QObject):
         self._session: SessionDesk | None = None
         self._desk: CalibrationDesk | None = None
         self._again: AgainDesk | None = None
+        self._importer: TakeInDesk | None = None
 
     @property
     def pages(self) -> dict[str, PageMaker]:
@@ -89,11 +92,17 @@ class Composition(QObject):
         }
 
     @property
+    def takers(self) -> dict[Kind, Taker]:
+        """What takes files and folders that no page opens, by what they are."""
+        return {Kind.PUBLISHED: lambda window, path: self.importer(window).look(path)}
+
+    @property
     def commands(self) -> dict[str, Command]:
         """Actions of the whole application, by key."""
         return {
             "demo": lambda window: self.demo(window).show(),
             "live_demo": lambda window: self.demo(window).scan_live(),
+            "import": lambda window: self.importer(window).begin(),
             "reconstruct_again": lambda window: self.again(window).begin(),
             **calibration_commands(),
         }
@@ -181,6 +190,12 @@ class Composition(QObject):
         if self._again is None:
             self._again = AgainDesk(window)
         return self._again
+
+    def importer(self, window: MainWindow) -> TakeInDesk:
+        """What imports folders of other programs."""
+        if self._importer is None:
+            self._importer = TakeInDesk(window)
+        return self._importer
 
     def _calibrate_page(self, window: MainWindow) -> PageWidget:
         return self.desk(window).page()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget
 
 from app.actions import ACTIONS, Action
+from app.controllers.known_files import Kind
 from app.paged_window import PagedWindow, Parts
 from app.panels.log import LogPanel
 from app.widgets.layout_memory import restore_layout
@@ -19,19 +21,28 @@ from app.window_actions import THEMES, WindowActions
 
 PageMaker = Callable[["MainWindow"], PageWidget]
 Command = Callable[["MainWindow"], object]
+Taker = Callable[["MainWindow", Path], object]
 
 
 class MainWindow(PagedWindow):
     """The application's window.
 
     ``pages`` makes the widget of each page of the rail; ``commands`` do the actions of the table that neither
-    a page nor the window itself can do.
+    a page nor the window itself can do; ``takers`` take what is opened or dropped and no page's.
     """
 
     def __init__(
-        self, parts: Parts, pages: dict[str, PageMaker], commands: dict[str, Command] | None = None
+        self,
+        parts: Parts,
+        pages: dict[str, PageMaker],
+        commands: dict[str, Command] | None = None,
+        takers: dict[Kind, Taker] | None = None,
     ) -> None:
-        super().__init__(parts, {key: partial(make, self) for key, make in pages.items()})
+        super().__init__(
+            parts,
+            {key: partial(make, self) for key, make in pages.items()},
+            {kind: partial(take, self) for kind, take in (takers or {}).items()},
+        )
         self._log_dock = self._make_log_dock()
         self._acts: dict[str, Callable[[], object]] = {
             **WindowActions(self).all(),

@@ -44,7 +44,7 @@ class Parts:
 
 
 class PagedWindow(QMainWindow):
-    """Pages are made by ``makers`` when they are first opened.
+    """Pages are made by ``makers`` when they are first opened; ``takers`` take files that are no page's.
 
     ``opened`` tells the key of the page that is open now, ``painted`` once that the window is on screen,
     ``closed`` that it ends well.
@@ -54,8 +54,14 @@ class PagedWindow(QMainWindow):
     painted = Signal()
     closed = Signal()
 
-    def __init__(self, parts: Parts, makers: Mapping[str, Callable[[], PageWidget]]) -> None:
+    def __init__(
+        self,
+        parts: Parts,
+        makers: Mapping[str, Callable[[], PageWidget]],
+        takers: Mapping[Kind, Callable[[Path], object]],
+    ) -> None:
         super().__init__()
+        self._takers = takers
         self.parts = parts
         self.theme: Theme = DARK
         self._is_painted = False
@@ -123,6 +129,9 @@ class PagedWindow(QMainWindow):
         """Open a file or folder on the page that knows it, the open page first; says why when none does."""
         path = meant_by(path)
         kind = kind_of(path)
+        if kind in self._takers:
+            self._takers[kind](path)
+            return
         if kind not in (Kind.MISSING, Kind.UNKNOWN):
             for key in (self.page, *(key for key in self._makers if key != self.page)):
                 if self.page_of(key).open_path(path):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from dsl_core.errors import StoreError
+from dsl_core.errors import DslError, StoreError
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.pipeline import calibration_of, scan
 from dsl_core.progress import Progress
@@ -31,6 +33,61 @@ def export_scan(
     sensor = calibration_of(reader).sensor
     return export_dataset(
         reader, target, bayer=sensor.bayer, bit_depth=sensor.bit_depth, overwrite=overwrite, progress=progress
+    )
+
+
+@dataclass(frozen=True)
+class FolderLook:
+    """What a folder of another program holds: its table of files, and what keeps it from being imported."""
+
+    kind: Literal["scan", "calibration"]
+    table: Sequence[FileRecord]
+    obstacle: str = ""
+
+
+def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None) -> FolderLook:
+    """Look at a folder in the published layout, or one that should be, without writing anything.
+
+    ``base`` as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder.
+    """
+    from dsl_core.io.published import check_calibration, holds_calibration
+
+    if not root.is_dir():
+        raise StoreError(f"{root} is not a folder. Choose the folder of a published dataset or calibration.")
+    if not holds_calibration(root):
+        return _look_at_scan(root, base)
+    try:
+        import_calibration(root, base, camera_size_px)
+    except DslError as error:
+        return FolderLook("calibration", check_calibration(root), str(error))
+    return FolderLook("calibration", check_calibration(root))
+
+
+def _look_at_scan(root: Path, base: Rig) -> FolderLook:
+    from dsl_core.capture.preflight import require_possible
+    from dsl_core.devices.replay import replay_rig
+    from dsl_core.io.published import PUBLISHED_SETTINGS, check_dataset, open_dataset
+
+    try:
+        source = open_dataset(root, bayer=base.sensor.bayer, bit_depth=base.sensor.bit_depth)
+    except DslError as error:
+        # All that the layout wants is then missing, which the table says.
+        plan = CapturePlan(name=root.name, settings=PUBLISHED_SETTINGS)
+        return FolderLook("scan", check_dataset(root, plan), f"{error}{_poses_hint(root)}")
+    try:
+        source.require_frames()
+        require_possible(replay_rig(source, base), source.plan)
+    except DslError as error:
+        return FolderLook("scan", source.table, str(error))
+    return FolderLook("scan", source.table)
+
+
+def _poses_hint(root: Path) -> str:
+    """What to do with a folder of calibration pictures, which is easily taken for a dataset."""
+    if not any(root.glob("*/graycode_*.*")):
+        return ""
+    return (
+        f" Its folders may be poses of a board: 'dsl-scan calibrate geometry {root} --pictures' reads them."
     )
 
 
@@ -71,8 +128,11 @@ def _refuse_other_scan(target: Path, fingerprint: str, calibration: Rig, root: P
     raise StoreError(f"{target} holds a scan {why}. A scan is never replaced: choose another name.")
 
 
-def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int]) -> Rig:
-    """A rig from published lenses, pose and curves on the film, sensor and scales of ``base``."""
+def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int] | None) -> Rig:
+    """A rig from published lenses, pose and curves on the film, sensor and scales of ``base``.
+
+    Without a size of the camera's images, that of the file is taken.
+    """
     from dsl_core.io.published import load_calibration
 
     size = (base.projector.width_px, base.projector.height_px)

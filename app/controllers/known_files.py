@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 from enum import Enum
 from pathlib import Path
 
-from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME
+from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.
@@ -15,6 +16,7 @@ _MARKS = ".marks.json"
 _OPENS = (
     "It opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
     " campaigns and rigs of calibrations, and reference spectra (.csv, .txt, ENVI libraries .sli)."
+    " File, Import takes folders of images."
 )
 
 
@@ -28,6 +30,7 @@ class Kind(Enum):
     PLAN = "plan"
     PATTERNS = "pattern set"
     REFERENCE = "reference spectrum"
+    PUBLISHED = "folder in the published layout"
     MISSING = "missing"
     UNKNOWN = "unknown"
 
@@ -43,10 +46,23 @@ def kind_of(path: Path) -> Kind:
     ):
         if (path / name).is_file():
             return kind
+    if path.is_dir() and _is_published(path):
+        return Kind.PUBLISHED
     suffix = path.suffix.lower()
     if suffix == ".json" and path.is_file():
         return _kind_of_json(path)
     return Kind.REFERENCE if suffix in REFERENCE_SUFFIXES and path.is_file() else Kind.UNKNOWN
+
+
+def _is_published(folder: Path) -> bool:
+    """Whether another program laid a folder out as published; it need not be complete."""
+    if any((folder / place).exists() for place in PUBLISHED_PLACES):
+        return True
+    try:
+        names = [each.name.lower() for each in folder.iterdir() if each.is_dir()]
+    except OSError:
+        return False
+    return any(re.sub("[^a-z0-9]", "", name).startswith(PUBLISHED_STARTS) for name in names)
 
 
 def _kind_of_json(path: Path) -> Kind:
@@ -88,6 +104,8 @@ def refusal(path: Path) -> str:
                 f"{path.name} is a calibration. Import it into the library, by the Calibrate page or"
                 f" 'dsl-scan calibrations import {path.name}', then choose it on the Scan page."
             )
+        case Kind.PUBLISHED:
+            return f"{path.name} was laid out by another program. Take it in by File, Import."
         case Kind.UNKNOWN:
             return (
                 f"{path.name} is no scan, result, reference spectrum or calibration that this program knows."

@@ -37,6 +37,7 @@ ORDER = (
     "reading-an-intensity-graph",
     "comparing",
     "exporting",
+    "importing",
     "how-it-measures",
 )
 _PROPERTY = "help"

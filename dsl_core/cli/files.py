@@ -41,15 +41,14 @@ def import_(
 ) -> None:
     """Read the published dataset or calibration layout; say what is missing or misnamed."""
     from dsl_core import exchange
-    from dsl_core.io.published import check_calibration
-    from dsl_core.io.published.calibration import STEREO_NAME, TABLE_FOLDER
+    from dsl_core.io.published import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
 
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
     output, rig = Output(json), load_rig(base) if base else published_rig()
-    if (source / STEREO_NAME.parent).is_dir() or (source / TABLE_FOLDER).is_dir():
+    if holds_calibration(source):
         _print_files(output, "calibration", check_calibration(source))
         if target is not None:
             imported = exchange.import_calibration(source, rig, parse_size("--camera-size", camera_size))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.application import make_window
@@ -36,6 +36,8 @@ def window(
 ) -> Iterator[MainWindow]:
     """A window with a result of a scan beside it."""
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
+    # What is still read when the window closes is not asked about.
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
     composition = Composition(Wish())
     made = make_window(composition.pages, tmp_path / "home", commands=composition.commands)
     qtbot.addWidget(made)

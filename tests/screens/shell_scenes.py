@@ -11,8 +11,10 @@ from PySide6.QtWidgets import QMenu
 
 from app.actions import PAGES
 from app.controllers.session_keeper import SessionKeeper
+from app.panels.take_in_dialog import TakeInDialog
 from app.state.session import ResultsPart, Session
 from app.widgets.tour import Tour
+from tests.app.published_folders import make_folders
 from tests.screens.results_scenes import marked
 from tests.screens.stage import Stage
 
@@ -105,6 +107,35 @@ def _crash(folder: Path, session: Session) -> None:
     assert not keeper.save()
 
 
+def take_in(stage: Stage) -> None:
+    """Import: a folder with flaws, one that can be imported, a calibration, and one that is none of them."""
+    folders = make_folders(stage.folder)
+    lines = folders.scene / "ldr_exposure1"
+    gone = lines / "capture_0002.png"
+    kept = gone.read_bytes()
+    gone.unlink()
+    (lines / "capture_0004.png").rename(lines / "line 4.png")
+    (lines / "white.png").write_bytes(kept)
+    stage.open()
+    stage.window.open_path(folders.scene)
+    dialog = stage.dialog(TakeInDialog)
+    stage.shoot("flaws")
+    gone.write_bytes(kept)
+    stage.composition.importer(stage.window).control.change(base=str(folders.own))
+    stage.idle()
+    stage.shoot("ready")
+    for name, folder in (("calibration", folders.rig), ("nothing", folders.folder)):
+        stage.composition.importer(stage.window).look(folder)
+        stage.idle()
+        stage.shoot(name)
+    stage.composition.importer(stage.window).look(folders.scene)
+    stage.idle()
+    stage.press("Import", dialog)
+    stage.wait(lambda: stage.window.page == "results", 60)
+    stage.idle()
+    stage.shoot("done")
+
+
 def menus(stage: Stage) -> None:
     """Every menu, open over a result."""
     marked(stage)
@@ -124,5 +155,6 @@ SCENES: dict[str, Callable[[Stage], None]] = {
     "shell-toasts": toasts,
     "shell-tour": tour,
     "shell-recovery": recovery,
+    "shell-import": take_in,
     "shell-menu": menus,
 }

@@ -63,6 +63,7 @@ class Stage:
             self._look.theme,
             commands=self.composition.commands,
             imports=IMPORTS if page_waits else None,
+            takers=self.composition.takers,
         )
         QCursor.setPos(QGuiApplication.primaryScreen().geometry().bottomRight())
         self.window.show()

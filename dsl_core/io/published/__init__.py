@@ -12,14 +12,21 @@ from dsl_core.io.published.calibration import (
     PublishedCalibration,
     check_calibration,
     export_calibration,
+    holds_calibration,
     load_calibration,
 )
-from dsl_core.io.published.dataset import PublishedScan, export_dataset, open_dataset
+from dsl_core.io.published.dataset import (
+    PUBLISHED_SETTINGS,
+    PublishedScan,
+    export_dataset,
+    open_dataset,
+)
 from dsl_core.io.published.layout import FileRecord, check_dataset
 from dsl_core.io.published.stereo import Stereo, load_stereo, save_stereo
 from dsl_core.io.published.tables import SpectralTables, load_tables, open_first_order_lines, save_tables
 
 __all__ = [
+    "PUBLISHED_SETTINGS",
     "FileRecord",
     "PublishedCalibration",
     "PublishedScan",
@@ -29,6 +36,7 @@ __all__ = [
     "check_dataset",
     "export_calibration",
     "export_dataset",
+    "holds_calibration",
     "load_calibration",
     "load_stereo",
     "load_tables",

@@ -88,6 +88,11 @@ def export_calibration(
     ]
 
 
+def holds_calibration(root: Path) -> bool:
+    """Whether a folder is laid out as a published calibration, complete or not."""
+    return (root / STEREO_NAME.parent).is_dir() or (root / TABLE_FOLDER).is_dir()
+
+
 def check_calibration(root: Path) -> list[FileRecord]:
     """What of a published calibration is there, missing or misnamed, and what to do."""
     records = [_stereo_record(root)]
