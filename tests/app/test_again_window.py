@@ -96,8 +96,8 @@ def test_a_second_result_is_made_opened_and_compared(
     QTest.mouseClick(compare, Qt.MouseButton.LeftButton)
     page = window.page_of("compare")
     assert isinstance(page, ComparePage)
-    qtbot.waitUntil(lambda: page._state.pair.value is not None, timeout=PATIENCE_MS)
-    assert [name.text() for name in page.names] == ["A: small", "B: coarse"]
+    qtbot.waitUntil(lambda: page.pair._state.pair.value is not None, timeout=PATIENCE_MS)
+    assert [name.text() for name in page.pair.names] == ["A: small", "B: coarse"]
 
 
 def test_the_dialog_shows_what_it_asks_for(
