@@ -92,13 +92,13 @@ def reconstruct(
 ) -> Path:
     """Carry an order out; raises what the engine raises, and then writes nothing."""
     from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.result_file import save_result
+    from dsl_core.io.result_file import RESULT_FOLDER, save_result
     from dsl_core.io.staging import check_targets
     from dsl_core.pipeline import Options
     from dsl_core.reconstruction.torch_device import torch_device
     from dsl_core.sessions import reconstruct_session
 
-    check_targets([target], overwrite=order.replace)
+    check_targets([target], overwrite=order.replace, kind=RESULT_FOLDER)
     rig = None if order.calibration == OWN else load_calibration(order.calibration, library)
     options = Options(
         # Depth has no bands; those of the order need not make sense then.

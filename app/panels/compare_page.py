@@ -79,7 +79,8 @@ class ComparePage(PageWidget):
                 self._commands.open_side(path, second=False)
 
     def compare(self, first: Path, second: Path) -> None:
-        """Compare two results."""
+        """Compare two results, where one sees it."""
+        self.tabs.setCurrentWidget(self.pair)
         self._commands.open_both(first, second)
 
     def open_path(self, path: Path) -> bool:

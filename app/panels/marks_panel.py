@@ -85,15 +85,17 @@ class MarksPanel(QWidget):
         )
         self.export = QPushButton("Export spectra…")
         self.export.setToolTip("Write the same table as CSV, with where the result comes from")
-        row = QHBoxLayout()
-        for button in (self.reference, self.remove, self.copy, self.export):
-            row.addWidget(button)
-        row.addStretch(1)
         column_box = QVBoxLayout(self)
         column_box.setContentsMargins(0, 0, 0, 0)
         for widget in (self.hint, self.tree):
             column_box.addWidget(widget, 1 if widget is self.tree else 0)
-        column_box.addLayout(row)
+        # Two rows of buttons, as the smallest window has no room for one.
+        for buttons in ((self.reference, self.remove), (self.copy, self.export)):
+            row = QHBoxLayout()
+            for button in buttons:
+                row.addWidget(button)
+            row.addStretch(1)
+            column_box.addLayout(row)
         column_box.addWidget(self.below, 1)
         self._connect()
 

@@ -82,7 +82,7 @@ class ResultsPage(PageWidget):
         set_help(self.search, "numbers#look-for")
         self._graph: IntensityWindow | None = None
         self._theme = DARK
-        self._panels = (self._image, self.scene, self._spectra, self.marks)
+        self._panels = (self.bar, self._image, self.scene, self._spectra, self.marks)
         self.stack = QStackedWidget()
         self._open, self._export = QPushButton("Open…"), QPushButton("Export…")
         self._inspect = QPushButton("Intensity graph")

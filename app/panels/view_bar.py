@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QButtonGroup,
     QCheckBox,
@@ -18,7 +18,9 @@ from PySide6.QtWidgets import (
 from app.panels.result_layers import spread_of
 from app.panels.results_commands import ResultCommands
 from app.state.results import Quality, ResultsState, Tool, View
+from app.theme import Theme
 from app.widgets.forms import ChoiceBox, NumberBox, label
+from app.widgets.icons import icon
 from dsl_core.optics.relighting import LIGHTS
 
 VIEWS = (
@@ -41,6 +43,8 @@ TOOLS = (
 )
 #: What the cloud can be coloured by.
 CLOUD_COLOURS = ((View.COLOUR, "sRGB"), (View.BAND, "Band"), (View.DEPTH, "Depth"), (View.QUALITY, "Quality"))
+#: Sides of the tools' icons, and how narrow a choice may become, px.
+ICON_PX, CHOICE_PX = 18, 110
 _NEEDS_BAND = (Quality.ORDERS, Quality.SHARE, Quality.SPREAD)
 
 
@@ -53,7 +57,10 @@ class ViewBar(QWidget):
         self.views = {
             view: self._button(text, f"{tip} ({i})") for i, (view, text, tip) in enumerate(VIEWS, 1)
         }
-        self.tools = {tool: self._button(text, tip) for tool, text, tip in TOOLS}
+        # Drawn and not written, as the smallest window has no room for the words.
+        self.tools = {tool: self._button(text, f"{text}. {tip}") for tool, text, tip in TOOLS}
+        for view, text, _ in VIEWS:
+            self.views[view].setText(text)
         self._groups = [self._group(list(each.values())) for each in (self.views, self.tools)]
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName("Band")
@@ -79,7 +86,7 @@ class ViewBar(QWidget):
             for name, beyond in (("Nearest", "before it"), ("Farthest", "behind it"))
         )
         for box in (self.near, self.far):
-            # All controls of the cloud stand in one row: arrow keys step as well as buttons would.
+            # Narrow, with the choice of a colour beside them: arrow keys step as well as buttons would.
             box.setButtonSymbols(NumberBox.ButtonSymbols.NoButtons)
             box.setFixedWidth(box.fontMetrics().horizontalAdvance("00000.0 mm") + 16)
         self.automatic = QCheckBox("auto")
@@ -87,14 +94,23 @@ class ViewBar(QWidget):
         self.automatic.setToolTip(
             "Show all depths; colours cover nearly all pixels, and outliers take the ends"
         )
+        for choice in (self.light, self.quality):
+            # They may be narrower than their longest words; the list that opens is not.
+            choice.setMinimumWidth(CHOICE_PX)
+            choice.view().setMinimumWidth(choice.sizeHint().width())
         self._lay_out()
         self._connect()
 
-    def _button(self, text: str, tip: str) -> QToolButton:
+    def apply_theme(self, theme: Theme) -> None:
+        """Draw the tools in the colours of a theme."""
+        for tool, button in self.tools.items():
+            button.setIcon(icon(tool.value, theme.text, theme.on_accent))
+            button.setIconSize(QSize(ICON_PX, ICON_PX))
+
+    def _button(self, name: str, tip: str) -> QToolButton:
         button = QToolButton()
-        button.setText(text)
         button.setToolTip(tip)
-        button.setAccessibleName(text)
+        button.setAccessibleName(name)
         button.setProperty("role", "choice")
         button.setCheckable(True)
         button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -119,35 +135,30 @@ class ViewBar(QWidget):
         for button in self.tools.values():
             top.addWidget(button)
         top.addStretch(1)
-        self._row = QHBoxLayout()
-        self._row.setSpacing(8)
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")
-        self._depth_label, self._to_label = QLabel("Depth"), QLabel("to")
-        for widget in (
-            self._light_label,
-            self.light,
-            self.adapted,
-            self._quality_label,
-            self.quality,
-            self._cloud_label,
-            self.cloud_by,
-            self._depth_label,
-            self.near,
-            self._to_label,
-            self.far,
-            self.automatic,
-            self.nm,
-        ):
-            self._row.addWidget(widget)
-        self._row.addWidget(self.slider, 1000)
-        self._row.addStretch(1)
-        # Without controls the row keeps its height, so that the picture does not jump between views.
-        self._row.addStrut(self.light.sizeHint().height())
+        depth, colours = QWidget(), QWidget()
+        self._rows = depth, colours
+        cloud = (self._cloud_label, self.cloud_by)
+        limits = (QLabel("Depth"), self.near, QLabel("to"), self.far, self.automatic)
+        light = (self._light_label, self.light, self.adapted)
+        quality = (self._quality_label, self.quality)
+        for holder, widgets in ((depth, (*cloud, *limits)), (colours, (*light, *quality, self.nm))):
+            row = QHBoxLayout(holder)
+            row.setContentsMargins(0, 0, 0, 0)
+            row.setSpacing(8)
+            for widget in widgets:
+                row.addWidget(widget)
+            if holder is colours:
+                row.addWidget(self.slider, 1000)
+            row.addStretch(1)
+            # Both have one height, so that the picture does not jump between views.
+            row.addStrut(self.light.sizeHint().height())
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addLayout(top)
-        column.addLayout(self._row)
+        for holder in self._rows:
+            column.addWidget(holder)
 
     def _connect(self) -> None:
         state = self._state
@@ -228,13 +239,12 @@ class ViewBar(QWidget):
             ((self._quality_label, self.quality), shown is View.QUALITY),
             ((self._cloud_label, self.cloud_by), cloud),
             (
-                (self._depth_label, self.near, self._to_label, self.far, self.automatic),
-                cloud or shown is View.DEPTH,
-            ),
-            (
                 (self.nm, self.slider),
                 shown is View.BAND or (shown is View.QUALITY and state.quality.value in _NEEDS_BAND),
             ),
         ):
             for widget in widgets:
                 widget.setVisible(visible)
+        depth, colours = self._rows
+        depth.setVisible(cloud or shown is View.DEPTH)
+        colours.setVisible(shown is not View.DEPTH)

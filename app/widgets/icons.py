@@ -15,12 +15,19 @@ SIZE_PX = 96
 
 
 @lru_cache(maxsize=64)
-def icon(name: str, colour: str) -> QIcon:
-    """The icon ``resources/icons/NAME.svg`` with its lines in a colour (``#rrggbb``)."""
+def icon(name: str, colour: str, checked_colour: str = "") -> QIcon:
+    """The icon ``resources/icons/NAME.svg``, its lines in a colour (``#rrggbb``) or, checked, in another."""
+    made = QIcon(_picture(name, colour))
+    if checked_colour:
+        made.addPixmap(_picture(name, checked_colour), QIcon.Mode.Normal, QIcon.State.On)
+    return made
+
+
+def _picture(name: str, colour: str) -> QPixmap:
     drawing = resource_path(f"icons/{name}.svg").read_text(encoding="utf-8").replace("COLOR", colour)
     picture = QPixmap(SIZE_PX, SIZE_PX)
     picture.fill(Qt.GlobalColor.transparent)
     painter = QPainter(picture)
     QSvgRenderer(QByteArray(drawing.encode())).render(painter, QRectF(0, 0, SIZE_PX, SIZE_PX))
     painter.end()
-    return QIcon(picture)
+    return picture

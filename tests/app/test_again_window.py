@@ -92,10 +92,12 @@ def test_a_second_result_is_made_opened_and_compared(
     qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=PATIENCE_MS)
     assert results(window).subject() == tmp_path / "coarse.zarr"
     assert window.parts.settings.recent[0] == str(tmp_path / "coarse.zarr")
+    page = window.open_page("compare")
+    assert isinstance(page, ComparePage)
+    page.tabs.setCurrentIndex(1)
     (compare,) = [each for each in said.findChildren(QPushButton) if each.text() == "Compare both"]
     QTest.mouseClick(compare, Qt.MouseButton.LeftButton)
-    page = window.page_of("compare")
-    assert isinstance(page, ComparePage)
+    assert page.tabs.currentWidget() is page.pair
     qtbot.waitUntil(lambda: page.pair._state.pair.value is not None, timeout=PATIENCE_MS)
     assert [name.text() for name in page.pair.names] == ["A: small", "B: coarse"]
 

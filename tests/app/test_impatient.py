@@ -22,7 +22,9 @@ from app.application import ExceptionHook, make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
 from app.paged_window import SMALLEST
+from app.panels.results_page import ResultsPage
 from app.panels.scan_page import ScanPage
+from app.state.results import View
 from app.state.rig import Link, RigChoice
 from app.state.scan import Phase
 from dsl_core.io.session import SessionReader
@@ -198,6 +200,12 @@ def test_every_page_fits_the_smallest_window(bench: Bench, tmp_path: Path) -> No
         room = shown.size()
         least = shown.minimumSizeHint()
         assert least.width() <= room.width(), f"{page.key}: {least} in {room}"
+        if isinstance(shown, ResultsPage):
+            for view in View:
+                shown._state.view.set(view)
+                assert shown.minimumSizeHint().width() <= room.width(), view
+            shown._state.view.set(View.COLOUR)
+            bench.live(0.05)
         for button in _buttons(shown):
             if button.isVisible():
                 words = button.fontMetrics().horizontalAdvance(button.text().replace("&", ""))
