@@ -24,7 +24,7 @@ from dsl_core.planning.trial import run_trial
 from dsl_core.progress import NoProgress, Progress
 
 #: Part of every key: points measured by another method than today's are measured anew.
-METHOD = 4
+METHOD = 5
 PALETTES: dict[str, Callable[[], references.References]] = {
     "chart": references.chart,
     "peaks": references.peaks,
