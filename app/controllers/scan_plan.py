@@ -44,6 +44,8 @@ class ScanPlanController:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
         self._undo, self._library = undo, library
         self._chosen: Rig | None = None
+        #: Counts choices of a calibration: of several that are read at once the last one counts.
+        self._turn = 0
         #: What was chosen while a scan ran, which keeps its own.
         self._next: CalibrationChoice | None = None
         self._stops = [
@@ -204,6 +206,8 @@ class ScanPlanController:
         if self.state.phase.value.is_busy:
             self._choose_later(choice)
             return
+        self._turn += 1
+        turn = self._turn
         if not choice.key:
             self._chosen = None
             self.state.calibration.set(choice)
@@ -211,6 +215,8 @@ class ScanPlanController:
             return
 
         def done(rig: Rig) -> None:
+            if turn != self._turn:
+                return
             if self.state.phase.value.is_busy:
                 self._choose_later(choice)
                 return

@@ -8,7 +8,7 @@ from typing import Any
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from app.jobs.base import Job
+from app.jobs.base import Job, JobState
 from app.jobs.housekeeping import return_memory
 from dsl_core.errors import DeviceError
 
@@ -30,6 +30,7 @@ class QtRunner(QObject):
         super().__init__(parent)
         self._pool = ThreadPoolExecutor(WORKERS, thread_name_prefix="job")
         self._active: list[Job[Any]] = []
+        self._is_over = False
         self._ended.connect(self._finish)
         self._ticker = QTimer(self)
         self._ticker.setInterval(TICK_MS)
@@ -41,7 +42,13 @@ class QtRunner(QObject):
         return tuple(self._active)
 
     def submit(self, job: Job[Any]) -> Job[Any]:
-        """Start a job; raises `DeviceError` when another one uses what it needs alone."""
+        """Start a job; raises `DeviceError` when another one uses what it needs alone.
+
+        After `shut_down` nobody waits for a job any more, and none is begun.
+        """
+        if self._is_over:
+            job.state = JobState.CANCELLED
+            return job
         for other in self._active:
             if job.exclusive and other.exclusive == job.exclusive:
                 raise DeviceError(
@@ -61,6 +68,7 @@ class QtRunner(QObject):
 
     def shut_down(self) -> None:
         """Stop all jobs and wait for their threads; what they had to tell is dropped."""
+        self._is_over = True
         self.cancel_all()
         self._ticker.stop()
         self._pool.shutdown(wait=True, cancel_futures=True)

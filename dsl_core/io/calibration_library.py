@@ -111,10 +111,11 @@ class CalibrationLibrary:
         return entry
 
     def names(self) -> tuple[str, ...]:
-        """All names, sorted."""
+        """All names, sorted; one whose first version is just being written is none yet."""
         if not self.home.is_dir():
             return ()
-        return tuple(sorted(path.parent.name for path in self.home.glob("*/versions") if path.is_dir()))
+        folders = self.home.glob("*/versions")
+        return tuple(sorted(path.parent.name for path in folders if any(path.glob("*.json"))))
 
     def lines(self) -> tuple[LibraryLine, ...]:
         """Every version of every name, newest first within a name; damaged ones with the reason."""

@@ -91,3 +91,20 @@ def test_shutting_down_stops_what_runs(qtbot: QtBot) -> None:
     runner.submit(Job("Endless", work))
     assert started.wait(5)
     runner.shut_down()
+
+
+def test_what_the_end_of_a_job_begins_after_shutting_down_is_left(qtbot: QtBot) -> None:
+    runner, done = QtRunner(), threading.Event()
+    late: list[Job[None]] = []
+    runner.submit(
+        Job("First", lambda progress: done.set(), lambda _: late.append(runner.submit(Job("Late", fail))))
+    )
+    assert done.wait(5)
+    runner.shut_down()
+    qtbot.waitUntil(lambda: bool(late))
+    assert runner.active == ()
+    assert late[0].state is JobState.CANCELLED
+
+
+def fail(progress: Progress) -> None:
+    pytest.fail("a job began after the end")

@@ -331,6 +331,24 @@ def test_a_calibration_that_is_read_when_a_scan_starts_waits_for_its_end(
     assert bench.state.calibration.value.key == "bench"
 
 
+def test_of_two_calibrations_that_are_read_at_once_the_one_chosen_last_counts(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.library.store("slow", bench.calibration)
+    bench.library.store("quick", bench.calibration)
+    find, plans = bench.library.find, bench.scans.plans
+
+    def overtaken(key: str) -> LibraryEntry:
+        if key == "slow":
+            plans.choose_calibration(CalibrationChoice("quick", "quick"))
+        return find(key)
+
+    with monkeypatch.context() as reading:
+        reading.setattr(bench.library, "find", overtaken)
+        plans.choose_calibration(CalibrationChoice("slow", "slow"))
+    assert bench.state.calibration.value.key == "quick"
+
+
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
 def test_the_command_line_makes_the_same_plan(bench: ScanBench, preset: object, tmp_path: Path) -> None:
     bench.scans.plans.choose_preset(preset.key)  # type: ignore[attr-defined]

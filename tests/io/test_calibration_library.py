@@ -37,6 +37,13 @@ def test_versions_stay_and_the_newest_is_current(library: CalibrationLibrary) ->
     assert library.home.parent.name == "home"
 
 
+def test_a_name_whose_first_version_is_being_written_is_none_yet(library: CalibrationLibrary) -> None:
+    library.store("lab 3", brighter(1.0))
+    (library.home / "lab 4" / "versions").mkdir(parents=True)
+    assert library.names() == ("lab 3",)
+    assert [line.name for line in library.lines()] == ["lab 3"]
+
+
 def test_a_damaged_version_is_listed_with_its_reason_and_nothing_changes(
     library: CalibrationLibrary,
 ) -> None:
