@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
 
 from app.main_window import MainWindow
-from app.widgets import file_dialogs
 
 if TYPE_CHECKING:
     from app.controllers.again import AgainController
@@ -48,7 +48,9 @@ class AgainDesk:
 
     def _choose(self) -> Path | None:
         title = "Choose the scan to reconstruct again (NAME.dsl)"
-        name = file_dialogs.choose_folder(self._window, title, self._window.parts.settings.output_folder)
+        name = QFileDialog.getExistingDirectory(
+            self._window, title, self._window.parts.settings.output_folder
+        )
         return Path(name) if name else None
 
     def _ask(self) -> None:

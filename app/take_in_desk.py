@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
 
 from app.main_window import MainWindow
-from app.widgets import file_dialogs
 
 if TYPE_CHECKING:
     from app.controllers.take_in import TakeInController
@@ -39,7 +39,7 @@ class TakeInDesk:
     def begin(self) -> None:
         """Choose a folder and look at it; the dialog follows."""
         title = "Import a folder of images or a calibration"
-        name = file_dialogs.choose_folder(self._window, title, str(self._home))
+        name = QFileDialog.getExistingDirectory(self._window, title, str(self._home))
         if name:
             self.look(Path(name))
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QFileDialog, QWidget
 
 from app.actions import ACTIONS
 from app.paged_window import PagedWindow
 from app.report_bundle import write_report_bundle
-from app.widgets import file_dialogs, text_windows
+from app.widgets import text_windows
 from app.widgets.figure_file import FORMATS, save_figure
 from app.widgets.help_window import help_of, help_window
 from app.widgets.tour import Tour
@@ -58,7 +58,7 @@ class WindowActions:
     # Files -----------------------------------------------------------------------------------------
 
     def _open(self) -> None:
-        name, _ = file_dialogs.open_file(self._window, "Open", self._parts.settings.output_folder)
+        name, _ = QFileDialog.getOpenFileName(self._window, "Open", self._parts.settings.output_folder)
         if name:
             self._window.open_path(Path(name))
 
@@ -81,7 +81,7 @@ class WindowActions:
             )
             return
         draft = str(Path(self._parts.settings.output_folder) / f"{figure.name}.svg")
-        name, _ = file_dialogs.save_file(self._window, "Save the figure", draft, FORMATS)
+        name, _ = QFileDialog.getSaveFileName(self._window, "Save the figure", draft, FORMATS)
         if not name:
             return
         try:
@@ -92,7 +92,7 @@ class WindowActions:
             self._toasts.tell("info", f"Saved as {name}.")
 
     def _save_report_bundle(self) -> None:
-        name, _ = file_dialogs.save_file(
+        name, _ = QFileDialog.getSaveFileName(
             self._window, "Save a report bundle", "dsl-scan-report.zip", "Zip (*.zip)"
         )
         if not name:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QDialogButtonBox,
+    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLabel,
@@ -19,7 +20,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.state.again import OWN, AgainOrder, AgainState
-from app.widgets import file_dialogs
 from app.widgets.forms import ChoiceBox, NumberBox, label, set_role
 from app.widgets.help_window import add_help_key
 from app.widgets.text_windows import command_window
@@ -183,7 +183,7 @@ class AgainDialog(QDialog):
 
     def _choose_file(self) -> None:
         folder = str(self._source.session.parent)
-        name, _ = file_dialogs.open_file(self, "Choose a calibration", folder, "Calibrations (*.json)")
+        name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", folder, "Calibrations (*.json)")
         if not name:
             return
         if self.calibration.findData(name) < 0:

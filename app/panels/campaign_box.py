@@ -9,6 +9,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
+    QFileDialog,
     QFormLayout,
     QFrame,
     QHBoxLayout,
@@ -21,7 +22,6 @@ from PySide6.QtWidgets import (
 from app.panels.calibrate_commands import CalibrateCommands
 from app.state.calibrate import CalibrateState, CampaignFacts
 from app.state.rig import RigState
-from app.widgets import file_dialogs
 from app.widgets.forms import label, set_role
 from dsl_core.devices.base import DeviceRig
 
@@ -76,7 +76,7 @@ class NewCampaignDialog(QDialog):
         return Path(self.folder.text()).expanduser() / self.name.text().strip()
 
     def _browse(self) -> None:
-        name = file_dialogs.choose_folder(self, "Folder of campaigns", self.folder.text())
+        name = QFileDialog.getExistingDirectory(self, "Folder of campaigns", self.folder.text())
         if name:
             self.folder.setText(name)
 
@@ -162,7 +162,7 @@ class CampaignBox(QFrame):
     def _ask_open(self) -> None:
         facts = self._state.campaign.value
         start = self._home if facts is None else facts.path.parent
-        name = file_dialogs.choose_folder(self, "Open a campaign", str(start))
+        name = QFileDialog.getExistingDirectory(self, "Open a campaign", str(start))
         if name:
             self._commands.open_campaign(Path(name))
 

@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QPushButton, QSplitter, QVBoxLayout, QWidget
 
 from app.panels.compare_bar import CompareBar
 from app.panels.compare_commands import CompareCommands
@@ -15,7 +15,6 @@ from app.panels.compare_figures import CompareFigures
 from app.panels.compare_view import CompareView
 from app.state.compare import CompareState, Pair, Side
 from app.theme import Theme
-from app.widgets import file_dialogs
 from app.widgets.forms import label, set_role
 from app.widgets.late import Late
 
@@ -109,7 +108,7 @@ class ComparePair(QWidget):
     # Ask -------------------------------------------------------------------------------------------
 
     def _choose(self, second: bool) -> None:
-        name = file_dialogs.choose_folder(self, f"Open a result as {'B' if second else 'A'}")
+        name = QFileDialog.getExistingDirectory(self, f"Open a result as {'B' if second else 'A'}")
         if name:
             self._commands.open_side(Path(name), second)
 
@@ -118,7 +117,7 @@ class ComparePair(QWidget):
         if pair is None:
             return
         start = pair.first.arrays.path.with_suffix(".html")
-        name, _ = file_dialogs.save_file(self, "Write the report", str(start), "Web page (*.html)")
+        name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
         if name:
             self._commands.write_report(Path(name))
 

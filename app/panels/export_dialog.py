@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QDialog,
     QDialogButtonBox,
+    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLabel,
@@ -19,7 +20,6 @@ from PySide6.QtWidgets import (
 
 from app.panels.results_commands import ResultCommands
 from app.state.results import ResultsState
-from app.widgets import file_dialogs
 from app.widgets.forms import set_role
 from app.widgets.help_window import add_help_key
 
@@ -107,7 +107,7 @@ class ExportDialog(QDialog):
         return {form: folder / f"{name}{suffix}" for form, suffix in ticked}
 
     def _browse(self) -> None:
-        folder = file_dialogs.choose_folder(self, "Export to", self.folder.text())
+        folder = QFileDialog.getExistingDirectory(self, "Export to", self.folder.text())
         if folder:
             self.folder.setText(folder)
 

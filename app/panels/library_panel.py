@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QFileDialog,
     QGroupBox,
     QHBoxLayout,
     QMessageBox,
@@ -22,7 +23,6 @@ from PySide6.QtWidgets import (
 from app.panels.calibrate_commands import LibraryCommands
 from app.panels.library_words import NOTHING, details_of
 from app.state.calibrate import CalibrateState
-from app.widgets import file_dialogs
 from app.widgets.forms import label
 from app.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
@@ -190,7 +190,7 @@ class LibraryPanel(QGroupBox):
         line = self.line
         if line is None:
             return
-        name, chosen = file_dialogs.save_file(
+        name, chosen = QFileDialog.getSaveFileName(
             self, "Export a calibration", f"{line.name}.json", ";;".join(FORMS)
         )
         if name:
@@ -198,7 +198,7 @@ class LibraryPanel(QGroupBox):
             self._commands.export(self.key, Path(name), FORMS.get(chosen, "entry"), overwrite=True)
 
     def _import(self) -> None:
-        name, _ = file_dialogs.open_file(self, "Import a calibration", "", "Calibrations (*.json)")
+        name, _ = QFileDialog.getOpenFileName(self, "Import a calibration", "", "Calibrations (*.json)")
         if name:
             self._commands.take_in(Path(name))
 

@@ -8,6 +8,7 @@ from PySide6.QtCore import QModelIndex, QSize, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QKeySequence, QPixmap, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QFileDialog,
     QFrame,
     QHBoxLayout,
     QHeaderView,
@@ -24,7 +25,6 @@ from app.panels.mark_figures import figures_of
 from app.panels.results_commands import MarkCommands
 from app.state.results import Mark, ResultsState
 from app.theme import DARK, Theme
-from app.widgets import file_dialogs
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
@@ -115,7 +115,7 @@ class MarksPanel(QWidget):
 
     def choose_reference(self) -> None:
         """Choose a file with a spectrum."""
-        name, _ = file_dialogs.open_file(self, "Add a reference spectrum", "", _FORMATS)
+        name, _ = QFileDialog.getOpenFileName(self, "Add a reference spectrum", "", _FORMATS)
         if name:
             self._commands.add_reference(Path(name))
 
@@ -134,7 +134,7 @@ class MarksPanel(QWidget):
         if result is None or not self._commands.has_shown():
             return
         draft = str(result.path.with_name(f"{result.path.stem}_spectra.csv"))
-        name, _ = file_dialogs.save_file(self, "Export spectra", draft, "Spectra (*.csv)")
+        name, _ = QFileDialog.getSaveFileName(self, "Export spectra", draft, "Spectra (*.csv)")
         if name:
             path = Path(name)
             # The dialog asked about the name as it was typed, not about one with an ending added.

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
+    QFileDialog,
     QHBoxLayout,
     QPushButton,
     QSplitter,
@@ -31,7 +32,6 @@ from app.panels.spectrum_panel import SpectrumPanel
 from app.panels.view_bar import ViewBar
 from app.state.results import Library, ResultsState, View
 from app.theme import DARK, Theme
-from app.widgets import file_dialogs
 from app.widgets.figure_file import Figure
 from app.widgets.forms import label
 from app.widgets.help_window import set_help
@@ -267,7 +267,7 @@ class ResultsPage(PageWidget):
 
     def choose(self) -> None:
         """Choose the folder of a result or scan."""
-        name = file_dialogs.choose_folder(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
+        name = QFileDialog.getExistingDirectory(self, "Open a result (NAME.zarr) or a scan (NAME.dsl)")
         if name:
             self.open_chosen.emit(Path(name))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
+    QFileDialog,
     QFrame,
     QHBoxLayout,
     QScrollArea,
@@ -26,7 +27,6 @@ from app.panels.scan_view import ScanView
 from app.state.effects import EffectsState
 from app.state.scan import Phase, Rescue, ScanState
 from app.theme import Theme
-from app.widgets import file_dialogs
 from app.widgets.banner import Banner
 from app.widgets.figure_file import Figure
 from app.widgets.help_window import set_help
@@ -142,13 +142,13 @@ class ScanPage(PageWidget):
 
     def _open_plan(self) -> None:
         folder = str(self._state.target.value.parent)
-        name, _ = file_dialogs.open_file(self, "Open a plan or a pattern set", folder, PLANS)
+        name, _ = QFileDialog.getOpenFileName(self, "Open a plan or a pattern set", folder, PLANS)
         if name:
             self._commands.plans.open_plan(Path(name))
 
     def _save_plan(self) -> None:
         proposed = str(self._state.target.value.parent / "plan.json")
-        name, _ = file_dialogs.save_file(self, "Save the plan", proposed, PLANS)
+        name, _ = QFileDialog.getSaveFileName(self, "Save the plan", proposed, PLANS)
         if name:
             self._commands.plans.save_plan(Path(name))
 

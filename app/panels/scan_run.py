@@ -6,6 +6,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import (
     QCheckBox,
+    QFileDialog,
     QFormLayout,
     QGroupBox,
     QHBoxLayout,
@@ -18,7 +19,6 @@ from PySide6.QtWidgets import (
 from app.panels.forecast_words import minutes, volume
 from app.panels.scan_commands import ScanCommands
 from app.state.scan import CalibrationChoice, Facts, Phase, ScanState
-from app.widgets import file_dialogs
 from app.widgets.forms import ChoiceBox, label, set_role
 from app.widgets.job_strip import describe_seconds
 from dsl_core.capture.status import Status
@@ -105,7 +105,7 @@ class TargetBox(QGroupBox):
 
     def _browse(self) -> None:
         target = self._state.target.value
-        name = file_dialogs.choose_folder(self, "Store scans in", str(target.parent))
+        name = QFileDialog.getExistingDirectory(self, "Store scans in", str(target.parent))
         if name:
             self._commands.plans.set_target(Path(name) / target.name)
 

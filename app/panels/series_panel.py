@@ -9,6 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
+    QFileDialog,
     QHBoxLayout,
     QHeaderView,
     QPushButton,
@@ -23,7 +24,6 @@ from app.panels.series_plot import SeriesPlot
 from app.panels.series_table import SeriesTable
 from app.state.series import Kind, SeriesState
 from app.theme import Theme
-from app.widgets import file_dialogs
 from app.widgets.forms import ChoiceBox, label
 from app.widgets.help_window import set_help
 from app.widgets.late import Late
@@ -134,7 +134,7 @@ class SeriesPanel(QWidget):
 
     def choose(self) -> None:
         """Choose results."""
-        name = file_dialogs.choose_folder(self, "Add a result, or a folder with several")
+        name = QFileDialog.getExistingDirectory(self, "Add a result, or a folder with several")
         if name:
             self._commands.add([Path(name)])
 
@@ -147,7 +147,7 @@ class SeriesPanel(QWidget):
         if not rows:
             return
         start = rows[0].path.parent / "series.html"
-        name, _ = file_dialogs.save_file(self, "Write the report", str(start), "Web page (*.html)")
+        name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
         if name:
             self._commands.write_report(Path(name))
 

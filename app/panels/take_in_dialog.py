@@ -8,6 +8,7 @@ from typing import Any, Protocol
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
+    QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QHeaderView,
@@ -19,7 +20,6 @@ from PySide6.QtWidgets import (
 
 from app.state.take_in import PUBLISHED, FileRow, Found, TakeInOrder, TakeInState
 from app.theme import DARK, Theme
-from app.widgets import file_dialogs
 from app.widgets.forms import ChoiceBox, WholeBox, label, set_role
 from app.widgets.help_window import add_help_key
 from app.widgets.read_table import ReadTable, cell
@@ -220,17 +220,17 @@ class TakeInDialog(QDialog):
     def _choose_folder(self) -> None:
         found = self._state.found.value
         start = "" if found is None else str(found.folder.parent)
-        name = file_dialogs.choose_folder(self, "Import a folder", start)
+        name = QFileDialog.getExistingDirectory(self, "Import a folder", start)
         if name:
             self._commands.look(Path(name), Path(self.home.text()))
 
     def _choose_file(self) -> None:
-        name, _ = file_dialogs.open_file(self, "Choose a calibration", "", "Calibrations (*.json)")
+        name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", "Calibrations (*.json)")
         if name:
             self._commands.change(base=name)
 
     def _choose_home(self) -> None:
-        name = file_dialogs.choose_folder(self, "Store it in", self.home.text())
+        name = QFileDialog.getExistingDirectory(self, "Store it in", self.home.text())
         if name:
             self.home.setText(name)
             self._rename()

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QMessageBox, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.application import make_window
@@ -18,7 +18,6 @@ from app.main_window import MainWindow
 from app.panels.again_dialog import AgainDialog
 from app.panels.compare_page import ComparePage
 from app.panels.results_page import ResultsPage
-from app.widgets import file_dialogs
 from tests.app.compare_bench import make_result
 from tests.app.test_names import complaints
 
@@ -112,7 +111,7 @@ def test_the_dialog_shows_what_it_asks_for(
     assert not dialog.solver.isEnabled()
     assert not dialog.override.isEnabled()
     file = str(tmp_path / "other.json")
-    monkeypatch.setattr(file_dialogs, "open_file", lambda *_: (file, ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (file, ""))
     dialog.file.click()
     assert dialog.calibration.currentText() == "other.json"
     assert dialog.override.isEnabled()
@@ -142,7 +141,7 @@ def test_elsewhere_it_asks_for_the_scan(
     qtbot: QtBot, window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.open_page("rig")
-    monkeypatch.setattr(file_dialogs, "choose_folder", lambda *_: str(tmp_path))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
     window.do("reconstruct_again")
     qtbot.waitUntil(lambda: bool(window.toasts.shown), timeout=PATIENCE_MS)
     assert "is no scan" in window.toasts.shown[-1].text

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QApplication,
     QComboBox,
+    QFileDialog,
     QLabel,
     QLineEdit,
     QMessageBox,
@@ -29,7 +30,6 @@ from app.panels.drift_window import DriftWindow
 from app.state.calibrate import ABOUT, DriftVerdict, RowState
 from app.state.wizard import Doing
 from app.theme import DARK, LIGHT
-from app.widgets import file_dialogs
 from app.wizards.board_edit import BoardEdit
 from app.wizards.evidence import PlainEvidence
 from app.wizards.settings_page import SettingsPage
@@ -328,7 +328,7 @@ def test_a_campaign_is_begun_and_opened_from_the_page(
     stage.windows[-1].reject()
     assert (tmp_path / "first" / "campaign.json").is_file()
     stage.idle()
-    monkeypatch.setattr(file_dialogs, "choose_folder", lambda *_: str(tmp_path / "taken"))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "taken"))
     click(stage.page.head.open)
     assert "is no campaign" in stage.bench.told
     assert stage.bench.state.campaign.value is not None

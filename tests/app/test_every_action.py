@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication, QDialog, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.actions import ACTIONS, Action
@@ -16,7 +16,6 @@ from app.application import make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
 from app.state.rig import Link, RigChoice
-from app.widgets import file_dialogs
 from app.widgets.tour import Tour
 from tests.app.small_result import write_small_result
 
@@ -74,9 +73,9 @@ def chosen(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         asked.append(title)
         return ""
 
-    for name in ("open_file", "save_file"):
-        monkeypatch.setattr(file_dialogs, name, refuse_file)
-    monkeypatch.setattr(file_dialogs, "choose_folder", refuse_folder)
+    for name in ("getOpenFileName", "getSaveFileName"):
+        monkeypatch.setattr(QFileDialog, name, refuse_file)
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", refuse_folder)
     return asked
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pyqtgraph as pg
 import pytest
 from PIL import Image
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.panels.spectrum_panel import SpectrumPanel
 from app.state.results import Mark, ResultsState, Spectrum
 from app.theme import DARK, LIGHT
-from app.widgets import file_dialogs
 from app.widgets.figure_file import PNG_SCALE, Figure, save_figure
 from dsl_core.errors import StoreError
 from tests.app.test_results_page import Bench
@@ -81,7 +81,7 @@ def test_the_window_saves_the_figure_of_the_page(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "mine.svg"
-    monkeypatch.setattr(file_dialogs, "save_file", lambda *_: (str(target), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(target), ""))
     bench.window.do("save_figure")
     assert f"Saved as {target}" in bench.window.toasts.shown[-1].text
     assert target.stat().st_size > 1000

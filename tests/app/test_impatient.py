@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QMessageBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QFileDialog, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
@@ -27,7 +27,6 @@ from app.panels.scan_page import ScanPage
 from app.state.results import View
 from app.state.rig import Link, RigChoice
 from app.state.scan import Phase
-from app.widgets import file_dialogs
 from dsl_core.io.session import SessionReader
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.faults import FaultPlan, with_faults
@@ -113,9 +112,9 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
 def test_clicking_everything_while_a_scan_runs_loses_nothing(
     bench: Bench, gate: threading.Event, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(file_dialogs, "open_file", lambda *_: ("", ""))
-    monkeypatch.setattr(file_dialogs, "save_file", lambda *_: ("", ""))
-    monkeypatch.setattr(file_dialogs, "choose_folder", lambda *_: "")
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: ("", ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: ("", ""))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: "")
     caught: list[str] = []
     bench.hook.caught.connect(caught.append)
     bench.window.open_path(write_small_result(tmp_path))

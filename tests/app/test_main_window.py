@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QLabel, QMessageBox, QVBoxLayout
+from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
 
 from app.actions import ACTIONS, PAGES
@@ -16,7 +16,6 @@ from app.jobs.base import Job
 from app.main_window import MainWindow
 from app.state.undo import Change
 from app.views import RecordingNotifier
-from app.widgets import file_dialogs
 from app.widgets.page import PageWidget
 
 
@@ -103,7 +102,7 @@ def test_a_report_bundle_replaces_a_file_after_the_dialog_has_asked(
 ) -> None:
     path = tmp_path / "report.zip"
     path.write_text("old")
-    monkeypatch.setattr(file_dialogs, "save_file", lambda *_: (str(path), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path), ""))
     window.actions_by_key["report_bundle"].trigger()
     assert window.toasts.shown[-1].text == f"Saved as {path}."
     assert set(zipfile.ZipFile(path).namelist()) == {"log.txt", "settings.json", "versions.json"}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QImage, QMouseEvent, QWheelEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.application import make_window
@@ -37,7 +37,6 @@ from app.panels.still_scene import still_picture
 from app.state.results import Mark, Pixel, Quality, ResultsState, Seek, Spectrum, Tool, View
 from app.theme import DARK as DARK_THEME
 from app.theme import LIGHT
-from app.widgets import file_dialogs
 from app.widgets.late import Late
 from app.widgets.page import PageWidget
 from app.widgets.spectrum_curve import split_by_share
@@ -355,7 +354,7 @@ def test_spectra_go_to_the_clipboard_and_to_a_file(
     QTest.keyClick(bench.page.marks.tree, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
     assert QApplication.clipboard().text().startswith("wavelength_nm\tpin 1: reflectance (1)\t")
     names = iter([str(tmp_path / "a"), "", str(tmp_path / "a.csv")])
-    monkeypatch.setattr(file_dialogs, "save_file", lambda *_: (next(names), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (next(names), ""))
     for _ in range(3):
         bench.window.do("export_spectra")
     assert "Wrote 1 spectrum" in bench.window.toasts.shown[-1].text

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from app.controllers import rescue
@@ -22,7 +23,6 @@ from app.state.forecast import ForecastState
 from app.state.rig import Link
 from app.state.scan import LivePicture, Phase
 from app.theme import DARK, LIGHT
-from app.widgets import file_dialogs
 from app.widgets.figure_file import save_figure
 from dsl_core.errors import DeviceError
 from dsl_core.io.session import SessionReader
@@ -350,8 +350,8 @@ def test_a_plan_is_saved_and_opened_by_the_buttons(
 ) -> None:
     page, bench, _ = ready
     path = str(tmp_path / "mine.json")
-    monkeypatch.setattr(file_dialogs, "save_file", lambda *_: (path, ""))
-    monkeypatch.setattr(file_dialogs, "open_file", lambda *_: (path, ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (path, ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (path, ""))
     click(page.plan.save)
     qtbot.waitUntil((tmp_path / "mine.json").is_file)
     bench.scans.plans.choose_preset("quick")

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from app.controllers.compare import CompareController
@@ -24,7 +24,6 @@ from app.state.series import Kind, SeriesState
 from app.state.undo import UndoStack
 from app.theme import DARK, LIGHT
 from app.views import RecordingNotifier
-from app.widgets import file_dialogs
 from tests.cases.stage_series import write_stage, write_sweep
 
 POSITIONS = (700.0, 725.0, 750.0, 775.0)
@@ -175,7 +174,7 @@ def test_accuracy_over_time_and_its_report(
     paths = write_sweep(tmp_path)
     panel.kind.setCurrentIndex(1)
     panel.kind.activated.emit(1)
-    monkeypatch.setattr(file_dialogs, "choose_folder", lambda *_: str(tmp_path))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
     QTest.mouseClick(panel.add, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: not bench.state.busy.value and bool(bench.state.rows.value), timeout=30_000)
     at = panel.against.findText("reference")
@@ -195,7 +194,7 @@ def test_accuracy_over_time_and_its_report(
     panel.figure.setCurrentIndex(1)
     panel.figure.activated.emit(1)
     assert "Reflectance" in panel.plot.plot.getPlotItem().getAxis("left").labelText
-    monkeypatch.setattr(file_dialogs, "save_file", lambda *_: (str(tmp_path / "s.html"), ""))
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "s.html"), ""))
     QTest.mouseClick(panel.report, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: (tmp_path / "s.html").exists(), timeout=30_000)
 
@@ -207,7 +206,7 @@ def test_the_action_leads_to_the_series(bench: Bench, monkeypatch: pytest.Monkey
         asked.append(title)
         return ""
 
-    monkeypatch.setattr(file_dialogs, "choose_folder", refuse)
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", refuse)
     bench.page.page_actions()["series_add"]()
     assert bench.page.tabs.currentIndex() == 1
     assert asked == ["Add a result, or a folder with several"]

@@ -8,14 +8,13 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QMessageBox, QPlainTextEdit
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit
 from pytestqt.qtbot import QtBot
 
 from app.application import make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
 from app.panels.take_in_dialog import TakeInDialog
-from app.widgets import file_dialogs
 from dsl_core.io.calibration_library import CalibrationLibrary
 from tests.app.published_folders import Folders, make_folders
 from tests.app.test_drops import drop
@@ -74,7 +73,7 @@ def test_a_dropped_scan_is_taken_in_and_offered(
     assert "missing" in texts(dialog, 2)
     assert not dialog._size.isVisible()
     assert not dialog.go.isEnabled()
-    monkeypatch.setattr(file_dialogs, "open_file", lambda *_: (str(made.own), ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(made.own), ""))
     dialog.file.click()
     qtbot.waitUntil(lambda: dialog.go.isEnabled(), timeout=PATIENCE_MS)
     dialog.name.selectAll()
@@ -90,7 +89,7 @@ def test_a_dropped_scan_is_taken_in_and_offered(
 def test_a_calibration_ends_in_the_library(
     qtbot: QtBot, window: MainWindow, made: Folders, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(file_dialogs, "choose_folder", lambda *_: str(made.rig))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(made.rig))
     window.do("import")
     dialog = opened(qtbot, window)
     assert dialog._size.isVisible()
@@ -109,7 +108,7 @@ def test_another_folder_is_shown_in_the_same_dialog(
     window.open_path(made.rig)
     dialog = opened(qtbot, window)
     (tmp_path / "empty").mkdir()
-    monkeypatch.setattr(file_dialogs, "choose_folder", lambda *_: str(tmp_path / "empty"))
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "empty"))
     dialog.other.click()
     qtbot.waitUntil(lambda: "is not a published dataset" in dialog.text.text(), timeout=PATIENCE_MS)
     assert "ldr_exposure1/" in texts(dialog, 0)
