@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 from app.panels.calibrate_commands import CalibrateCommands
 from app.state.calibrate import CalibrateState, CampaignFacts
 from app.state.rig import RigState
-from app.widgets.forms import label, set_role
+from app.widgets.forms import label, push_button, set_role
 from dsl_core.devices.base import DeviceRig
 
 NOTHING = (
@@ -104,15 +104,15 @@ class CampaignBox(QFrame):
         self._name, self._where = label("", "title"), label("", "muted")
         self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._where.setWordWrap(True)
-        self.new = _button("&New campaign…", "Begin a campaign of the rig at hand in a folder of its own")
-        self.open = _button("&Open campaign…", "Go on with a campaign that was begun before")
-        self.everything = _button(
+        self.new = push_button("&New campaign…", "Begin a campaign of the rig at hand in a folder of its own")
+        self.open = push_button("&Open campaign…", "Go on with a campaign that was begun before")
+        self.everything = push_button(
             "Calibrate &everything",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
         )
         self.everything.setProperty("role", "primary")
-        self.cancel = _button("&Stop", "End at the next safe point; everything captured is kept")
-        self.keep = _button(
+        self.cancel = push_button("&Stop", "End at the next safe point; everything captured is kept")
+        self.keep = push_button(
             "&Keep in library", "Assemble the rig as far as it is calibrated and keep it in the library"
         )
         self._progress = label("", "muted")
@@ -195,12 +195,6 @@ class CampaignBox(QFrame):
 
 def _places_itself(devices: DeviceRig | None) -> bool:
     return devices is not None and devices.place is not None
-
-
-def _button(text: str, tip: str) -> QPushButton:
-    made = QPushButton(text)
-    made.setToolTip(tip)
-    return made
 
 
 def _free_name(home: Path) -> str:

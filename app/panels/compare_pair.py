@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QPushButton, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
 from app.panels.compare_bar import CompareBar
 from app.panels.compare_commands import CompareCommands
@@ -15,7 +15,7 @@ from app.panels.compare_figures import CompareFigures
 from app.panels.compare_view import CompareView
 from app.state.compare import CompareState, Pair, Side
 from app.theme import Theme
-from app.widgets.forms import label, set_role
+from app.widgets.forms import label, push_button, set_role
 from app.widgets.late import Late
 
 NOTHING = (
@@ -31,13 +31,15 @@ class ComparePair(QWidget):
         super().__init__()
         self._state, self._commands = state, commands
         self.names = [label("A: –", "heading"), label("B: –", "heading")]
-        self.open_first = _button("Open &A…", "Choose the result to look at")
-        self.open_second = _button("Open &B…", "Choose the result to compare it with")
-        self.truth = _button(
+        self.open_first = push_button("Open &A…", "Choose the result to look at")
+        self.open_second = push_button("Open &B…", "Choose the result to compare it with")
+        self.truth = push_button(
             "&Truth as B", "Take what the twin knows of the scene of A, where a twin took it"
         )
-        self.swap = _button("&Swap", "Let A and B change places")
-        self.report = _button("Write &report…", "Figures and pictures of A against the truth as an HTML page")
+        self.swap = push_button("&Swap", "Let A and B change places")
+        self.report = push_button(
+            "Write &report…", "Figures and pictures of A against the truth as an HTML page"
+        )
         self.hint = label(NOTHING, "muted")
         self.hint.setWordWrap(True)
         self._view = Late(self._make_view)
@@ -158,9 +160,3 @@ class ComparePair(QWidget):
         late = [part.stops for part in (self._view.made, self._figures.made) if part is not None]
         for stop in (*self._stops, *chain.from_iterable(late)):
             stop()
-
-
-def _button(text: str, tip: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
-    return button

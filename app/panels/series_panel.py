@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QHeaderView,
-    QPushButton,
     QSplitter,
     QVBoxLayout,
     QWidget,
@@ -24,7 +23,7 @@ from app.panels.series_plot import SeriesPlot
 from app.panels.series_table import SeriesTable
 from app.state.series import Kind, SeriesState
 from app.theme import Theme
-from app.widgets.forms import ChoiceBox, label
+from app.widgets.forms import ChoiceBox, label, push_button
 from app.widgets.help_window import set_help
 from app.widgets.late import Late
 from app.widgets.read_table import RIGHT, ReadTable, cell
@@ -55,15 +54,15 @@ class SeriesPanel(QWidget):
         self.kind = ChoiceBox("Question", "What the results are asked together")
         for kind in Kind:
             self.kind.addItem(kind.value, kind)
-        self.add = _button("&Add results…", "Choose a result, or a folder that holds several")
-        self.remove = _button(
+        self.add = push_button("&Add results…", "Choose a result, or a folder that holds several")
+        self.remove = push_button(
             "Re&move", "Take the selected result out of the series (Delete); undo brings it back"
         )
         self.against = ChoiceBox("Compare with", "What the scans are compared with")
         self.figure = ChoiceBox("Error", "The error that the plot shows")
         for figure in FIGURES:
             self.figure.addItem(figure.words, figure)
-        self.report = _button("Write &report…", "Table, figures, plot and pictures as an HTML page")
+        self.report = push_button("Write &report…", "Table, figures, plot and pictures as an HTML page")
         self.hint = label("", "muted")
         self.hint.setWordWrap(True)
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
@@ -216,9 +215,3 @@ def _splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int]) -> QSplitt
         made.addWidget(widget)
         made.setStretchFactor(i, stretch)
     return made
-
-
-def _button(text: str, tip: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
-    return button

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QSpinBox, QStyle, QWidget
+from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QPushButton, QSpinBox, QStyle, QWidget
 
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
@@ -94,6 +94,13 @@ def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
     made = QLabel(text, parent)
     if role:
         made.setProperty("role", role)
+    return made
+
+
+def push_button(text: str, tip: str) -> QPushButton:
+    """A button with its tooltip."""
+    made = QPushButton(text)
+    made.setToolTip(tip)
     return made
 
 
