@@ -1,9 +1,13 @@
 """Settings of every test run: no window, no screen, one thread for small arrays."""
 
 import os
+import signal
 
 os.environ.setdefault("QT_API", "pyside6")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
 # Threads that wait for each other on a busy machine make the twin's small images seven times slower.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+# A run in the background of a script ignores Ctrl-C, and so would every program that the tests interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
