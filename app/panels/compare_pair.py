@@ -15,7 +15,7 @@ from app.panels.compare_figures import CompareFigures
 from app.panels.compare_view import CompareView
 from app.state.compare import CompareState, Pair, Side
 from app.theme import Theme
-from app.widgets.forms import label, push_button, set_role
+from app.widgets.forms import label, push_button, remark_line, set_role, show_remark
 from app.widgets.late import Late
 
 NOTHING = (
@@ -40,8 +40,7 @@ class ComparePair(QWidget):
         self.report = push_button(
             "Write &report…", "Figures and pictures of A against the truth as an HTML page"
         )
-        self.hint = label(NOTHING, "muted")
-        self.hint.setWordWrap(True)
+        self.hint = remark_line()
         self._view = Late(self._make_view)
         self.bar = CompareBar(state, commands)
         self._figures = Late(lambda: CompareFigures(state))
@@ -135,8 +134,7 @@ class ComparePair(QWidget):
         text = state.trouble.value or (f"{state.busy.value}…" if state.busy.value else "")
         if not text and pair is None:
             text = NOTHING
-        self.hint.setText(text)
-        self.hint.setVisible(bool(text))
+        show_remark(self.hint, text)
         set_role(self.hint, "bad" if state.trouble.value else "muted")
         idle = not state.busy.value
         truth = state.second.value is not None and state.second.value.truth is not None

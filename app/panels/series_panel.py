@@ -23,7 +23,7 @@ from app.panels.series_plot import SeriesPlot
 from app.panels.series_table import SeriesTable
 from app.state.series import Kind, SeriesState
 from app.theme import Theme
-from app.widgets.forms import ChoiceBox, label, push_button
+from app.widgets.forms import ChoiceBox, push_button, remark_line, show_remark
 from app.widgets.help_window import set_help
 from app.widgets.late import Late
 from app.widgets.read_table import RIGHT, ReadTable, cell
@@ -63,8 +63,7 @@ class SeriesPanel(QWidget):
         for figure in FIGURES:
             self.figure.addItem(figure.words, figure)
         self.report = push_button("Write &report…", "Table, figures, plot and pictures as an HTML page")
-        self.hint = label("", "muted")
-        self.hint.setWordWrap(True)
+        self.hint = remark_line()
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.table = SeriesTable(state, commands)
         self.figures = ReadTable(
@@ -157,8 +156,7 @@ class SeriesPanel(QWidget):
         kind, rows = state.kind.value, state.rows.value
         is_stage, is_answered = kind is Kind.STAGE, bool(rows) and not state.advice.value
         text = f"{state.busy.value}…" if state.busy.value else state.advice.value
-        self.hint.setText(text if rows else NOTHING[kind])
-        self.hint.setVisible(bool(self.hint.text()))
+        show_remark(self.hint, text if rows else NOTHING[kind])
         self.kind.setCurrentIndex(self.kind.findData(kind))
         self.parts.setVisible(bool(rows))
         self.remove.setEnabled(state.selected_row is not None)

@@ -97,6 +97,23 @@ def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
     return made
 
 
+def remark_line() -> QLabel:
+    """A label for what is going on, which keeps its room while it is hidden: nothing below it moves."""
+    made = label("", "muted")
+    made.setWordWrap(True)
+    policy = made.sizePolicy()
+    policy.setRetainSizeWhenHidden(True)
+    made.setSizePolicy(policy)
+    return made
+
+
+def show_remark(line: QLabel, text: str) -> None:
+    """Say something, or hide the line; the words stay in it, as they are its room."""
+    if text:
+        line.setText(text)
+    line.setVisible(bool(text))
+
+
 def push_button(text: str, tip: str) -> QPushButton:
     """A button with its tooltip."""
     made = QPushButton(text)
