@@ -7,46 +7,37 @@ from typing import Any, Protocol
 
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QLabel,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.state.again import OWN, AgainOrder, AgainState
-from app.widgets.forms import ChoiceBox, NumberBox, label, set_role
+from app.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from app.widgets.help_window import add_help_key
-from app.widgets.text_windows import command_window
+from app.widgets.order_dialog import OrderCommands, OrderDialog
 from dsl_core.model.spectral_choices import MODELS, SOLVERS, SpectralChoice
 
 LOW_NM, HIGH_NM = 380.0, 780.0
 DEVICES = (("cpu", "Processor (CPU)"), ("cuda", "Graphics card (CUDA)"))
 
 
-class AgainCommands(Protocol):
+class AgainCommands(OrderCommands, Protocol):
     """What the dialog asks of its controller."""
 
     def change(self, **what: Any) -> None:
         """Change fields of the order."""
 
-    def start(self) -> bool:
-        """Carry the order out."""
 
-    def command_line(self) -> str:
-        """The command that does the same."""
-
-
-class AgainDialog(QDialog):
+class AgainDialog(OrderDialog):
     """Follows an `AgainState` whose scan was looked at; the controller reconstructs."""
 
     def __init__(self, state: AgainState, commands: AgainCommands, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(commands, parent)
         source = state.source.value
         assert source is not None
         self._state, self._commands, self._source = state, commands, source
@@ -57,8 +48,11 @@ class AgainDialog(QDialog):
         self._make_target(state.order.value)
         self._lay_out()
         self._connect()
-        self._stops = [state.order.follow(self._show_order), state.trouble.follow(lambda _: self._judge())]
-        self._stops.append(state.cost.changed.connect(lambda _: self._judge()))
+        self.stops = [
+            state.order.follow(self._show_order),
+            state.trouble.follow(lambda _: self._judge()),
+            state.cost.changed.connect(lambda _: self._judge()),
+        ]
         self.name.setFocus()
         self.name.selectAll()
 
@@ -86,8 +80,7 @@ class AgainDialog(QDialog):
         self.calibration.addItem(f"The scan's own: {own}" if own else "The scan holds none", OWN)
         for name in self._source.library:
             self.calibration.addItem(name, name)
-        self.file = QPushButton("&File…")
-        self.file.setToolTip("Choose the file of a calibration (.json)")
+        self.file = push_button("&File…", "Choose the file of a calibration (.json)")
         self.override = QCheckBox("Use it although settings differ")
         self.override.setToolTip(
             "Without this, a calibration is refused whose camera or projector was set otherwise"
@@ -104,14 +97,11 @@ class AgainDialog(QDialog):
         self.name.setToolTip("The result is kept as NAME.zarr beside the scan, whose frames it needs")
         self.replace = QCheckBox("Replace the one of this name")
         self.replace.setToolTip("Without this, nothing that exists is touched")
-        self.text = label("", "muted")
-        self.text.setWordWrap(True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
-        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Do nothing (Escape)")
-        self.go = self.buttons.addButton("Reconstruct", QDialogButtonBox.ButtonRole.AcceptRole)
-        self.go.setToolTip("Turn the frames into a new result; the scan and other results stay as they are")
-        self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
-        self.command.setToolTip("The command that does the same in a terminal")
+        self.name_buttons(
+            "Reconstruct",
+            "Turn the frames into a new result; the scan and other results stay as they are",
+            "Do nothing (Escape)",
+        )
 
     def _lay_out(self) -> None:
         form = QFormLayout()
@@ -127,11 +117,9 @@ class AgainDialog(QDialog):
         form.addRow("Computed on", self.device)
         form.addRow("Name", self.name)
         form.addRow("", self.replace)
-        column = QVBoxLayout(self)
-        column.addLayout(form)
-        column.addWidget(self.text)
-        column.addStretch(1)
-        column.addWidget(self.buttons)
+        self.column.addLayout(form)
+        self.column.addStretch(1)
+        self.close_column()
 
     def _connect(self) -> None:
         change = self._commands.change
@@ -155,9 +143,6 @@ class AgainDialog(QDialog):
             )
         self.name.textChanged.connect(lambda text: change(name=text.strip()))
         self.file.clicked.connect(self._choose_file)
-        self.command.clicked.connect(lambda: command_window(self._commands.command_line(), self).open())
-        self.buttons.accepted.connect(self._start)
-        self.buttons.rejected.connect(self.reject)
 
     # Show ------------------------------------------------------------------------------------------
 
@@ -174,10 +159,7 @@ class AgainDialog(QDialog):
         self.override.setEnabled(order.calibration != OWN)
 
     def _judge(self) -> None:
-        trouble = self._state.trouble.value
-        self.text.setText(trouble or self._state.cost.value)
-        set_role(self.text, "warn" if trouble else "muted")
-        self.go.setEnabled(not trouble)
+        self.judge(self._state.trouble.value, self._state.cost.value)
 
     # Do --------------------------------------------------------------------------------------------
 
@@ -189,16 +171,6 @@ class AgainDialog(QDialog):
         if self.calibration.findData(name) < 0:
             self.calibration.addItem(Path(name).name, name)
         self.calibration.setCurrentIndex(self.calibration.findData(name))
-
-    def _start(self) -> None:
-        if self._commands.start():
-            self.accept()
-
-    def done(self, result: int) -> None:
-        """Follow nothing more."""
-        for stop in self._stops:
-            stop()
-        super().done(result)
 
 
 def _nanometres(name: str, value: float, tip: str) -> NumberBox:

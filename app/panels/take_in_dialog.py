@@ -6,30 +6,27 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from PySide6.QtWidgets import (
-    QDialog,
-    QDialogButtonBox,
     QFileDialog,
     QFormLayout,
     QHBoxLayout,
     QHeaderView,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from app.state.take_in import PUBLISHED, FileRow, Found, TakeInOrder, TakeInState
 from app.theme import DARK, Theme
-from app.widgets.forms import ChoiceBox, WholeBox, label, set_role
+from app.widgets.forms import ChoiceBox, WholeBox, label, push_button
 from app.widgets.help_window import add_help_key
+from app.widgets.order_dialog import OrderCommands, OrderDialog
 from app.widgets.read_table import ReadTable, cell
-from app.widgets.text_windows import command_window
 
 _COLUMNS = ("Wanted", "Found", "Status", "What to do")
 _LARGEST_PX = 20000
 
 
-class TakeInCommands(Protocol):
+class TakeInCommands(OrderCommands, Protocol):
     """What the dialog asks of its controller."""
 
     def look(self, folder: Path, home: Path) -> None:
@@ -41,18 +38,12 @@ class TakeInCommands(Protocol):
     def rename(self, name: str, home: Path) -> None:
         """Store what is imported by a name in a folder."""
 
-    def start(self) -> bool:
-        """Import."""
 
-    def command_line(self) -> str:
-        """The command that does the same."""
-
-
-class TakeInDialog(QDialog):
+class TakeInDialog(OrderDialog):
     """Follows a `TakeInState` whose folder was looked at; the controller imports."""
 
     def __init__(self, state: TakeInState, commands: TakeInCommands, parent: QWidget) -> None:
-        super().__init__(parent)
+        super().__init__(commands, parent)
         order = state.order.value
         assert order is not None
         self._state, self._commands, self._theme = state, commands, DARK
@@ -65,7 +56,7 @@ class TakeInDialog(QDialog):
         self._make_target(order)
         self._lay_out()
         self._connect()
-        self._stops = [
+        self.stops = [
             state.found.follow(self._show_found),
             state.order.follow(self._show_order),
             state.busy.follow(lambda _: self._judge()),
@@ -77,8 +68,7 @@ class TakeInDialog(QDialog):
 
     def _make_folder(self) -> None:
         self._folder = label("", "muted")
-        self.other = QPushButton("&Another folder…")
-        self.other.setToolTip("Choose another folder to import")
+        self.other = push_button("&Another folder…", "Choose another folder to import")
         self._summary = label("")
         self.table = ReadTable(
             "Files of the folder", "What the published layout wants, what is there, and what to do", _COLUMNS
@@ -94,8 +84,7 @@ class TakeInDialog(QDialog):
         self.base.addItem("The published rig", PUBLISHED)
         for name in self._state.library.value:
             self.base.addItem(name, name)
-        self.file = QPushButton("&File…")
-        self.file.setToolTip("Choose the file of a calibration (.json)")
+        self.file = push_button("&File…", "Choose the file of a calibration (.json)")
         self._size = QWidget()
         self.width_px, self.height_px = (
             WholeBox(f"{what} of the camera's images", 0, _LARGEST_PX, 0, "px",
@@ -112,16 +101,8 @@ class TakeInDialog(QDialog):
         self.home = QLineEdit(str(order.target.parent))
         self.home.setAccessibleName("Folder to store it in")
         self.home.setToolTip("What is imported is stored here; the folder it comes from stays as it is")
-        self.browse = QPushButton("&Choose…")
-        self.browse.setToolTip("Choose the folder to store it in")
-        self.text = label("", "muted")
-        self.text.setWordWrap(True)
-        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
-        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Import nothing (Escape)")
-        self.go = self.buttons.addButton("Import", QDialogButtonBox.ButtonRole.AcceptRole)
-        self.go.setToolTip("Take it in; whole or not at all")
-        self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
-        self.command.setToolTip("The command that does the same in a terminal")
+        self.browse = push_button("&Choose…", "Choose the folder to store it in")
+        self.name_buttons("Import", "Take it in; whole or not at all", "Import nothing (Escape)")
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -138,13 +119,11 @@ class TakeInDialog(QDialog):
         self._form.addRow("Camera's images", self._size)
         self._form.addRow("Name", self.name)
         self._form.addRow("In folder", _row(self.home, self.browse))
-        column = QVBoxLayout(self)
-        column.addLayout(head)
-        column.addWidget(self._summary)
-        column.addWidget(self.table, 1)
-        column.addLayout(self._form)
-        column.addWidget(self.text)
-        column.addWidget(self.buttons)
+        self.column.addLayout(head)
+        self.column.addWidget(self._summary)
+        self.column.addWidget(self.table, 1)
+        self.column.addLayout(self._form)
+        self.close_column()
 
     def _connect(self) -> None:
         commands = self._commands
@@ -159,9 +138,6 @@ class TakeInDialog(QDialog):
             box.valueChanged.connect(
                 lambda _: commands.change(camera_px=(self.width_px.value(), self.height_px.value()))
             )
-        self.command.clicked.connect(lambda: command_window(commands.command_line(), self).open())
-        self.buttons.accepted.connect(self._start)
-        self.buttons.rejected.connect(self.reject)
 
     # Show ------------------------------------------------------------------------------------------
 
@@ -203,9 +179,7 @@ class TakeInDialog(QDialog):
         target = "" if order is None else f"Makes {order.target.name}."
         if found is not None and found.kind == "calibration":
             target += " It is taken into the library of calibrations."
-        self.text.setText(f"{busy}…" if busy else trouble or target)
-        set_role(self.text, "warn" if trouble and not busy else "muted")
-        self.go.setEnabled(not busy and not trouble)
+        self.judge("" if busy else trouble, f"{busy}…" if busy else target, bool(busy))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
@@ -234,16 +208,6 @@ class TakeInDialog(QDialog):
         if name:
             self.home.setText(name)
             self._rename()
-
-    def _start(self) -> None:
-        if self._commands.start():
-            self.accept()
-
-    def done(self, result: int) -> None:
-        """Follow nothing more."""
-        for stop in self._stops:
-            stop()
-        super().done(result)
 
 
 def _breakable(path: str) -> str:
