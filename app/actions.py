@@ -80,6 +80,17 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "show_log", "Show lo&g", "View", "Ctrl+L", "Messages of the program, with a filter", separator=True
     ),
+    Action(
+        "rig_connect",
+        "&Connect or disconnect",
+        "Rig",
+        "Ctrl+K",
+        "Open the devices that the Rig page names, or let them go",
+    ),
+    Action(
+        "rig_live", "&Live view on or off", "Rig", "Ctrl+Shift+V", "Show the camera's frames as they come"
+    ),
+    Action("rig_expose", "&Auto exposure", "Rig", "", "Find the exposure that suits what the camera sees"),
     Action("calibrate_new", "&New campaign…", "Calibrate", "", "Begin a campaign of the rig at hand"),
     Action("calibrate_open", "&Open campaign…", "Calibrate", "", "Go on with a campaign that was begun"),
     *(
@@ -105,11 +116,23 @@ ACTIONS: tuple[Action, ...] = (
         separator=True,
     ),
     Action(
+        "scan_start",
+        "&Start or resume the scan",
+        "Scan",
+        "Ctrl+Return",
+        "Take every frame of the plan, or those that an interrupted scan still lacks",
+    ),
+    Action(
+        "scan_pause", "&Pause or go on", "Scan", "Ctrl+Shift+P", "Wait before the next frame; nothing is lost"
+    ),
+    Action("scan_stop", "S&top the scan", "Scan", "", "What is stored stays stored, and can be resumed"),
+    Action(
         "cancel_jobs",
         "&Cancel all work",
         "Scan",
         "Ctrl+.",
         "Stop everything that runs, at the next safe point",
+        separator=True,
     ),
     *(
         Action(f"view_{key}", text, "Results", str(i), tip, page="results")

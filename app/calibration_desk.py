@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.main_window import MainWindow
-from app.state.calibrate import ABOUT, CampaignFacts
+from app.state.calibrate import CampaignFacts
 from app.widgets.page import PageWidget
 
 if TYPE_CHECKING:
@@ -19,17 +18,6 @@ if TYPE_CHECKING:
     from app.state.wizard import WizardState
 
 _log = logging.getLogger(__name__)
-_OTHERS = ("new", "open", "everything")
-
-
-def calibration_commands() -> dict[str, Callable[[MainWindow], object]]:
-    """Actions of the Calibrate menu by key: each opens the page, which does it."""
-
-    def command(key: str) -> Callable[[MainWindow], object]:
-        return lambda window: window.open_page("calibrate").page_actions()[key]()
-
-    keys = [f"calibrate_{name}" for name in (*ABOUT, *_OTHERS)]
-    return {key: command(key) for key in keys}
 
 
 class CalibrationDesk:

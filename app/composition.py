@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QObject, QTimer
 
 from app.again_desk import AgainDesk
-from app.calibration_desk import CalibrationDesk, calibration_commands
+from app.calibration_desk import CalibrationDesk
 from app.controllers.known_files import Kind
-from app.main_window import Command, MainWindow, PageMaker, Taker
+from app.main_window import Command, MainWindow, PageMaker, Taker, page_commands
 from app.settings import data_folder
 from app.state.rig import Link, RigChoice, RigState
 from app.take_in_desk import TakeInDesk
@@ -104,7 +104,7 @@ class Composition(QObject):
             "live_demo": lambda window: self.demo(window).scan_live(),
             "import": lambda window: self.importer(window).begin(),
             "reconstruct_again": lambda window: self.again(window).begin(),
-            **calibration_commands(),
+            **page_commands(),
         }
 
     def start(self, window: MainWindow) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDockWidget
 
-from app.actions import ACTIONS, Action
+from app.actions import ACTIONS, PAGES, Action
 from app.controllers.known_files import Kind
 from app.paged_window import PagedWindow, Parts
 from app.panels.log import LogPanel
@@ -22,6 +22,17 @@ from app.window_actions import THEMES, WindowActions
 PageMaker = Callable[["MainWindow"], PageWidget]
 Command = Callable[["MainWindow"], object]
 Taker = Callable[["MainWindow", Path], object]
+
+
+def page_commands() -> dict[str, Command]:
+    """Actions whose key begins with the name of a page: each opens that page, which does it."""
+
+    def command(page: str, key: str) -> Command:
+        return lambda window: window.open_page(page).page_actions()[key]()
+
+    keys = {page.key for page in PAGES}
+    first = {action.key: action.key.partition("_")[0] for action in ACTIONS}
+    return {key: command(page, key) for key, page in first.items() if page in keys}
 
 
 class MainWindow(PagedWindow):

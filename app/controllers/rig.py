@@ -23,6 +23,7 @@ _log = logging.getLogger(__name__)
 #: What only one job may use at a time.
 RIG = "the rig"
 DISCONNECT = "Disconnect"
+NO_CAMERA = "No camera is connected. Connect a rig first."
 #: Lost frames in a row after which a camera counts as lost.
 LOST_AFTER = 3
 #: Shortest time between two live frames, s: a twin would else keep a core busy for nobody.
@@ -162,7 +163,10 @@ class RigController:
     def start_live(self) -> None:
         """Show frames as they come until `stop_live`."""
         devices = self.state.devices.value
-        if devices is None or self._live_job is not None:
+        if devices is None:
+            self._notifier.tell("info", NO_CAMERA)
+            return
+        if self._live_job is not None:
             return
         job = Job(
             "Live view",
@@ -289,7 +293,7 @@ class RigController:
     def expose_automatically(self, region_px: Region | None) -> None:
         """Find the exposure that suits a region of the picture, starting the live view where it is off."""
         if self.state.devices.value is None:
-            self._notifier.tell("info", "No camera is connected. Connect a rig first.")
+            self._notifier.tell("info", NO_CAMERA)
             return
         self.start_live()
         if self._live_job is not None:

@@ -116,19 +116,26 @@ class ScanController:
 
     def pause(self) -> None:
         """Wait before the next frame."""
-        if self._scan is not None:
+        if self._is_under_way() and self._scan is not None:
             self._scan.pause()
 
     def go_on(self) -> None:
         """Go on after `pause`."""
-        if self._scan is not None:
+        if self._is_under_way() and self._scan is not None:
             self._scan.go_on()
 
     def cancel(self) -> None:
         """End before the next frame; what is stored stays stored."""
-        if self._job is not None and self.state.phase.value.is_busy:
+        if self._is_under_way() and self._job is not None:
             self.state.phase.set(Phase.STOPPING)
             self._job.cancel()
+
+    def _is_under_way(self) -> bool:
+        """Whether a scan can be paused or stopped; says so where there is none."""
+        is_busy = self.state.phase.value.is_busy
+        if not is_busy:
+            self._notifier.tell("info", "No scan is under way.")
+        return is_busy
 
     def take_news(self) -> None:
         """Hand what the job told since last time to who follows; called by the window's clock."""

@@ -130,7 +130,7 @@ class RigPage(PageWidget):
         self._connect_button.clicked.connect(self._toggle_link)
         self._live_button.clicked.connect(self._toggle_live)
         self._exposure.valueChanged.connect(commands.set_exposure)
-        self.auto.clicked.connect(lambda: commands.expose_automatically(self.live.region))
+        self.auto.clicked.connect(self._expose)
         self.projector.wanted.connect(commands.show)
         self._stops += [
             state.choice.follow(self._show_choice),
@@ -154,6 +154,9 @@ class RigPage(PageWidget):
             self._commands.stop_live()
         else:
             self._commands.start_live()
+
+    def _expose(self) -> None:
+        self._commands.expose_automatically(self.live.region)
 
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whoever asked for it."""
@@ -204,6 +207,14 @@ class RigPage(PageWidget):
             self._timer.start()
         else:
             self._timer.stop()
+
+    def page_actions(self) -> dict[str, Callable[[], object]]:
+        """What the buttons do, for menus and keys."""
+        return {
+            "rig_connect": self._toggle_link,
+            "rig_live": self._toggle_live,
+            "rig_expose": self._expose,
+        }
 
     def command_line(self) -> str:
         """How the command line tests this rig."""

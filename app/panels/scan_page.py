@@ -204,6 +204,14 @@ class ScanPage(PageWidget):
         """Take an interrupted scan, a plan or a pattern set."""
         return self._commands.open(path)
 
+    def page_actions(self) -> dict[str, Callable[[], object]]:
+        """What the buttons do, for menus and keys."""
+        return {
+            "scan_start": self._commands.resume,
+            "scan_pause": self.run.toggle_pause,
+            "scan_stop": self._commands.cancel,
+        }
+
     def command_line(self) -> str:
         """The command that takes this scan."""
         return self._commands.command_line()

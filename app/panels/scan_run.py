@@ -157,7 +157,7 @@ class RunBox(QGroupBox):
         self._text.setWordWrap(True)
         self._lay_out()
         self.start.clicked.connect(commands.start)
-        self.pause.clicked.connect(self._toggle_pause)
+        self.pause.clicked.connect(self.toggle_pause)
         self.cancel.clicked.connect(commands.cancel)
         self.renew.clicked.connect(commands.leave_session)
         self.then.toggled.connect(state.then_reconstruct.set)
@@ -187,7 +187,8 @@ class RunBox(QGroupBox):
         for widget in (self._phase, self._bar, self._what, self._time, self._text):
             column.addWidget(widget)
 
-    def _toggle_pause(self) -> None:
+    def toggle_pause(self) -> None:
+        """Pause, or go on."""
         if self._state.phase.value is Phase.PAUSED:
             self._commands.go_on()
         else:
