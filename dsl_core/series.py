@@ -136,11 +136,7 @@ class TruthReference:
         result = load_result(path)
         progress.report("compare with the truth", 0, 1)
         truth = self._truth(path, result)
-        error = None
-        if truth.depth_mm is not None:
-            error = result["depth_mm"].values - truth.depth_mm
-            error = error if truth.lit is None else np.where(truth.lit, error, np.nan)
-        return point_against_truth(path.stem, _seconds(path, result.attrs), evaluate(result, truth), error)
+        return point_against_truth(path.stem, _seconds(path, result.attrs), evaluate(result, truth))
 
     def _truth(self, path: Path, result: Any) -> Truth:
         from dsl_core.io.origin import rig_of_notes
@@ -178,8 +174,7 @@ class ResultReference:
         bands = shared_bands(mine.wavelengths_nm, other.wavelengths_nm) if both else []
         cubes = [side["reflectance"] if both else None for side in (mine, other)]
         found = compare_results(mine["depth_mm"], other["depth_mm"], cubes[0], cubes[1], bands, progress)
-        error = other["depth_mm"] - mine["depth_mm"]
-        return point_against_result(path.stem, _seconds(path, other.attributes), found, error)
+        return point_against_result(path.stem, _seconds(path, other.attributes), found)
 
 
 def read_sweep(

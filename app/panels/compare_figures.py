@@ -52,7 +52,7 @@ class CompareFigures(QSplitter):
         rows = () if pair is None else pair.rows
         self.table.show_rows(
             [
-                (cell(row.figure), cell(row.value.replace("-", "−"), side=RIGHT), cell(row.unit))
+                (cell(row.figure), cell(row.words.replace("-", "−"), side=RIGHT), cell(row.unit))
                 for row in rows
             ]
         )

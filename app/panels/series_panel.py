@@ -188,7 +188,7 @@ class SeriesPanel(QWidget):
         rows = () if test is None else stage_table(test)
         self.figures.show_rows(
             [
-                (cell(row.figure), cell(row.value.replace("-", "−"), side=RIGHT), cell(row.unit))
+                (cell(row.figure), cell(row.words.replace("-", "−"), side=RIGHT), cell(row.unit))
                 for row in rows
             ]
         )

@@ -116,8 +116,10 @@ class SeriesPlot(QWidget):
         """Draw a point with its name and bar; returns the ends of the bar."""
         theme, (x, y) = self._theme, at
         low = high = y
-        if self._state.figure.value.field == "depth_mm" and point.depth_mm and point.depth_std_mm:
-            share = BAND_95 * point.depth_std_mm / point.depth_mm
+        figure = self._state.figure.value
+        error, std = point.error(figure), point.std(figure)
+        if error and std:
+            share = BAND_95 * std / error
             low, high = y + math.log10(max(1 - share, 0.1)), y + math.log10(1 + share)
             bar: dict[str, Any] = {"x": np.array([x]), "y": np.array([y]), "pen": theme.muted}
             self.plot.addItem(

@@ -29,10 +29,10 @@ def compare(
         # The second is what the first is measured against.
         found = compare_results(b["depth_mm"], a["depth_mm"], cubes[0], cubes[1], bands, progress)
     rows = difference_table(found)
-    output.table(("figure", "value", "unit"), [(row.figure, row.value, row.unit) for row in rows])
+    output.table(("figure", "value", "unit"), [(row.figure, row.words, row.unit) for row in rows])
     output.put(
         first=first,
         second=second,
-        figures={row.figure: {"value": row.value, "unit": row.unit} for row in rows},
+        figures={row.figure: {"value": row.value, "std": row.std or None, "unit": row.unit} for row in rows},
     )
     output.finish()

@@ -164,7 +164,7 @@ def print_figures(output: Output, evaluation: Evaluation) -> None:
     """Every figure of an evaluation, one a line."""
     from dsl_core.evaluation.verdict import verdicts
 
-    output.table(("figure", "value", "unit"), [(v.figure, v.value, v.unit) for v in verdicts(evaluation)])
+    output.table(("figure", "value", "unit"), [(v.figure, v.words, v.unit) for v in verdicts(evaluation)])
 
 
 def _require_one_of(option: str, given: str, wanted: tuple[str, ...]) -> None:

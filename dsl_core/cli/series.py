@@ -51,7 +51,7 @@ def depth_test(
     _tell(output, stage_rows(names, targets, found))
     output.say("")
     rows = stage_table(found)
-    output.table(("figure", "value", "unit"), [(row.figure, row.value, row.unit) for row in rows])
+    output.table(("figure", "value", "unit"), [(row.figure, row.words, row.unit) for row in rows])
     output.put(
         results=[str(path) for path in results],
         pixels=[target.plane.pixels for target in targets],

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
+from dsl_core.evaluation.scatter import mean_std, rms_std
 
 Floats = NDArray[np.float64] | NDArray[np.float32]
 Mask = NDArray[np.bool_]
@@ -20,7 +21,7 @@ class DepthScore:
 
     ``coverage`` is the share of lit pixels that have a depth, ``within_1_mm`` the share of lit pixels
     whose depth is right to a millimetre (a pixel without depth is wrong); ``bias_mm`` is the mean of
-    measured minus true.
+    measured minus true. The deviations of RMSE and bias follow from their scatter over the picture.
     """
 
     pixels: int
@@ -30,6 +31,8 @@ class DepthScore:
     bias_mm: float
     median_abs_mm: float
     within_1_mm: float
+    rmse_std_mm: float | None = None
+    bias_std_mm: float | None = None
 
 
 def depth_score(depth_mm: Floats, truth_mm: Floats, lit: Mask | None = None) -> DepthScore:
@@ -49,7 +52,8 @@ def depth_score(depth_mm: Floats, truth_mm: Floats, lit: Mask | None = None) -> 
             f"None of the {int(wanted.sum())} lit pixels with known depth was measured, so that no error"
             " can be given; look at the flags of the result for the reason."
         )
-    error = depth_mm[measured].astype(np.float64) - truth_mm[measured]
+    errors = np.where(measured, depth_mm.astype(np.float64) - truth_mm, np.nan)
+    error = errors[measured]
     return DepthScore(
         pixels=error.size,
         coverage=error.size / int(wanted.sum()),
@@ -58,6 +62,8 @@ def depth_score(depth_mm: Floats, truth_mm: Floats, lit: Mask | None = None) -> 
         bias_mm=float(np.mean(error)),
         median_abs_mm=float(np.median(np.abs(error))),
         within_1_mm=int((np.abs(error) <= 1.0).sum()) / int(wanted.sum()),
+        rmse_std_mm=rms_std(errors),
+        bias_std_mm=mean_std(errors),
     )
 
 

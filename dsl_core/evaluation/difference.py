@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.verdict import Verdict
+from dsl_core.evaluation.scatter import mean_std, median_std, rms_std
+from dsl_core.evaluation.verdict import Verdict, estimate_row
 from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.floating[Any]]
 #: Bands of two results this close are the same, nm.
 SAME_BAND_NM = 0.01
+#: Field, that of its deviation, words, unit and format of every row, in the order of the table.
+_FIGURES = (
+    ("depth_rms_mm", "depth_rms_std_mm", "Depth, RMS difference", "mm", ".3f"),
+    ("depth_bias_mm", "depth_bias_std_mm", "Depth, mean difference", "mm", "+.3f"),
+    ("depth_median_abs_mm", "depth_median_abs_std_mm", "Depth, median of absolute difference", "mm", ".3f"),
+    ("reflectance_rms", "reflectance_rms_std", "Reflectance, RMS difference", "", ".4f"),
+    ("reflectance_bias", "reflectance_bias_std", "Reflectance, mean difference", "", "+.4f"),
+    ("mean_angle_rad", "mean_angle_std_rad", "Mean spectral angle", "rad", ".4f"),
+)
 
 
 @dataclass(frozen=True)
@@ -22,6 +32,7 @@ class ResultDifference:
     """Second minus first over pixels that both have.
 
     ``share`` is that part of the pixels that either has. Reflectance figures are None without common bands.
+    Deviations follow from how a figure scatters over the picture, None where too little of it is known.
     """
 
     pixels: int
@@ -33,6 +44,12 @@ class ResultDifference:
     reflectance_rms: float | None = None
     reflectance_bias: float | None = None
     mean_angle_rad: float | None = None
+    depth_rms_std_mm: float | None = None
+    depth_bias_std_mm: float | None = None
+    depth_median_abs_std_mm: float | None = None
+    reflectance_rms_std: float | None = None
+    reflectance_bias_std: float | None = None
+    mean_angle_std_rad: float | None = None
 
 
 def shared_bands(first_nm: Floats, second_nm: Floats) -> list[tuple[int, int]]:
@@ -60,13 +77,17 @@ def compare_results(
     either = int((np.isfinite(first_mm) | np.isfinite(second_mm)).sum())
     if not both.any():
         raise DecodeError("No pixel has a depth in both results, so that they cannot be compared.")
-    error = second_mm[both].astype(np.float64) - first_mm[both]
+    errors = second_mm.astype(np.float64) - first_mm
+    error = errors[both]
     depth = ResultDifference(
         pixels=error.size,
         share=error.size / either,
         depth_rms_mm=float(np.sqrt(np.mean(error**2))),
         depth_bias_mm=float(error.mean()),
         depth_median_abs_mm=float(np.median(np.abs(error))),
+        depth_rms_std_mm=rms_std(errors),
+        depth_bias_std_mm=mean_std(errors),
+        depth_median_abs_std_mm=median_std(np.abs(errors)),
     )
     if first is None or second is None or not bands:
         return depth
@@ -98,34 +119,29 @@ def _with_spectra(
     known = np.isfinite(square)
     if not known.any():
         return depth
-    norm = np.sqrt(powers[0, known] * powers[1, known])
-    cosine = np.divide(product[known], norm, out=np.zeros_like(norm), where=norm > 0)
-    return ResultDifference(
-        depth.pixels,
-        depth.share,
-        depth.depth_rms_mm,
-        depth.depth_bias_mm,
-        depth.depth_median_abs_mm,
-        len(bands),
-        float(np.sqrt(square[known].mean() / len(bands))),
-        float(total[known].mean() / len(bands)),
-        float(np.arccos(cosine.clip(-1, 1)).mean()),
+    norm = np.sqrt(powers[0] * powers[1])
+    cosine = np.divide(product, norm, out=np.zeros_like(norm), where=norm > 0)
+    angle = np.where(known, np.arccos(cosine.clip(-1, 1)), np.nan)
+    square, total = square / len(bands), total / len(bands)
+    return replace(
+        depth,
+        bands=len(bands),
+        reflectance_rms=float(np.sqrt(square[known].mean())),
+        reflectance_bias=float(total[known].mean()),
+        mean_angle_rad=float(angle[known].mean()),
+        reflectance_rms_std=rms_std(np.sqrt(square)),
+        reflectance_bias_std=mean_std(total),
+        mean_angle_std_rad=mean_std(angle),
     )
 
 
 def difference_table(found: ResultDifference) -> tuple[Verdict, ...]:
     """The figures as rows of a table."""
-    rows = [
-        Verdict("Pixels that both have", f"{100 * found.share:.2f}", "%"),
-        Verdict("Depth, RMS difference", f"{found.depth_rms_mm:.3f}", "mm"),
-        Verdict("Depth, mean difference", f"{found.depth_bias_mm:+.3f}", "mm"),
-        Verdict("Depth, median of absolute difference", f"{found.depth_median_abs_mm:.3f}", "mm"),
-    ]
-    if found.reflectance_rms is not None:
-        rows += [
-            Verdict("Reflectance, RMS difference", f"{found.reflectance_rms:.4f}"),
-            Verdict("Reflectance, mean difference", f"{found.reflectance_bias:+.4f}"),
-            Verdict("Mean spectral angle", f"{found.mean_angle_rad:.4f}", "rad"),
-            Verdict("Common bands", str(found.bands)),
-        ]
+    rows = [Verdict("Pixels that both have", f"{100 * found.share:.2f}", "%")]
+    for field, std_field, words, unit, form in _FIGURES:
+        value = getattr(found, field)
+        if value is not None:
+            rows.append(estimate_row(words, value, getattr(found, std_field), unit, form))
+    if found.bands:
+        rows.append(Verdict("Common bands", str(found.bands)))
     return tuple(rows)

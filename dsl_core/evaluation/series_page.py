@@ -154,7 +154,7 @@ def _sweep_plot(points: Sequence[SweepPoint], i: int) -> str:
         error = point.error(shown)
         if error is None:
             continue
-        half = BAND_95 * (point.depth_std_mm or 0.0) if shown.field == "depth_mm" else 0.0
+        half = BAND_95 * (point.std(shown) or 0.0)
         # A bar down to nothing has no end on an axis that counts decades.
         lower = min(half, 0.9 * error)
         axes.errorbar(point.seconds, error, [[lower], [half]], fmt="o", ms=5, color=_COLOURS["free"])

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import straightness_mm
 from dsl_core.evaluation.flat_target import FlatTarget
-from dsl_core.evaluation.verdict import Verdict
+from dsl_core.evaluation.verdict import Verdict, estimate_row
 
 Floats = NDArray[np.floating[Any]]
 MIN_POSITIONS = 3
@@ -147,10 +147,10 @@ def stage_table(found: StageTest) -> tuple[Verdict, ...]:
     rows = [
         Verdict("Straightness, slope free (RMS)", f"{free.rms_mm:.4f}", "mm"),
         Verdict("Worst deviation, slope free", f"{free.worst_mm:.4f}", "mm"),
-        Verdict("Slope of distance over position", f"{free.scale:.5f} ± {free.scale_std:.5f}"),
+        estimate_row("Slope of distance over position", free.scale, free.scale_std, "", ".5f"),
         Verdict("Straightness, slope fixed to 1 (RMS)", f"{fixed.rms_mm:.4f}", "mm"),
         Verdict("Worst deviation, slope fixed to 1", f"{fixed.worst_mm:.4f}", "mm"),
-        Verdict("Distance minus position", f"{fixed.offset_mm:+.4f} ± {fixed.offset_std_mm:.4f}", "mm"),
+        estimate_row("Distance minus position", fixed.offset_mm, fixed.offset_std_mm, "mm", "+.4f"),
         Verdict("Single pixels about their plane (RMS)", f"{found.pixel_rms_mm:.3f}", "mm"),
     ]
     if found.patch_rms_mm is not None:

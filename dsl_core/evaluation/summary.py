@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import DepthScore, depth_score
+from dsl_core.evaluation.scatter import std_of_mean
 from dsl_core.evaluation.spectral import Peak, peak_width, spectral_errors
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, Calibration, calibration
 
@@ -89,11 +90,23 @@ class Evaluation:
             raise DecodeError("There is no patch with a known spectrum to average over.")
         return float(np.mean([getattr(patch, figure) for patch in self.patches]))
 
+    def mean_std(self, figure: str) -> float | None:
+        """Standard deviation of such a mean, by its scatter over the patches; None for fewer than two."""
+        return std_of_mean([getattr(patch, figure) for patch in self.patches])
+
     @property
     def mean_fwhm_nm(self) -> float | None:
         """Mean measured width over the patches whose truth is a narrow peak."""
-        widths = [patch.peak.fwhm_nm for patch in self.patches if patch.peak]
-        return float(np.mean(widths)) if widths else None
+        return float(np.mean(self._widths_nm)) if self._widths_nm else None
+
+    @property
+    def fwhm_std_nm(self) -> float | None:
+        """Standard deviation of `mean_fwhm_nm`, by its scatter over patches; None for fewer than two."""
+        return std_of_mean(self._widths_nm)
+
+    @property
+    def _widths_nm(self) -> list[float]:
+        return [patch.peak.fwhm_nm for patch in self.patches if patch.peak]
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and lists, ready for JSON."""

@@ -10,13 +10,36 @@ from dsl_core.evaluation.summary import Evaluation
 
 @dataclass(frozen=True)
 class Verdict:
-    """A figure with its unit, what was wanted of it, and whether it got there (None: nothing was wanted)."""
+    """A figure with its unit, what was wanted of it, and whether it got there (None: nothing was wanted).
+
+    ``std`` is the standard deviation of a figure that is estimated, in its unit; empty for others.
+    """
 
     figure: str
     value: str
     unit: str = ""
     wanted: str = ""
     passed: bool | None = None
+    std: str = ""
+
+    @property
+    def words(self) -> str:
+        """The value, with its deviation where it has one."""
+        return f"{self.value} ± {self.std}" if self.std else self.value
+
+
+def estimate_row(
+    figure: str,
+    value: float,
+    std: float | None,
+    unit: str,
+    form: str,
+    wanted: str = "",
+    passed: bool | None = None,
+) -> Verdict:
+    """A row for a figure and its standard deviation, both to as many places as ``form`` says."""
+    plain = "" if std is None else format(std, form.removeprefix("+"))
+    return Verdict(figure, format(value, form).rstrip("%"), unit, wanted, passed, plain)
 
 
 @dataclass(frozen=True)
@@ -77,6 +100,21 @@ def figures(evaluation: Evaluation) -> dict[str, float]:
     return found
 
 
+def deviations(evaluation: Evaluation) -> dict[str, float | None]:
+    """Standard deviations of figures, by the same names; those that count what is there have none."""
+    found: dict[str, float | None] = {
+        "spectral_rmse": evaluation.mean_std("rmse"),
+        "spectral_pixel_rmse": evaluation.mean_std("pixel_rmse"),
+        "spectral_rmse_scaled": evaluation.mean_std("rmse_scaled"),
+        "spectral_angle_rad": evaluation.mean_std("angle_rad"),
+        "delta_e": evaluation.mean_std("delta_e"),
+        "fwhm_nm": evaluation.fwhm_std_nm,
+    }
+    if (depth := evaluation.depth) is not None:
+        found |= {"depth_rmse_mm": depth.rmse_std_mm, "depth_bias_mm": depth.bias_std_mm}
+    return found
+
+
 def verdicts(evaluation: Evaluation, goals: Mapping[str, Goal] | None = None) -> tuple[Verdict, ...]:
     """The figures of an evaluation as rows of a table, judged where there is a goal.
 
@@ -85,13 +123,13 @@ def verdicts(evaluation: Evaluation, goals: Mapping[str, Goal] | None = None) ->
     goals = goals or {}
     for name in goals:
         _FIGURES[name]
-    rows = []
+    rows, stds = [], deviations(evaluation)
     for name, value in figures(evaluation).items():
         words, unit, form = _FIGURES[name]
         goal = goals.get(name)
         wanted = "" if goal is None else f"{'≥' if goal.at_least else '≤'} {goal.limit * _factor(form):.4g}"
         passed = None if goal is None else goal.met(value)
-        rows.append(Verdict(words, format(value, form).rstrip("%"), unit, wanted, passed))
+        rows.append(estimate_row(words, value, stds.get(name), unit, form, wanted, passed))
     return tuple(rows)
 
 

@@ -28,6 +28,7 @@ def test_spectra_are_compared_over_common_bands() -> None:
     assert found.reflectance_rms == pytest.approx(0.1)
     assert found.reflectance_bias == pytest.approx(0.1)
     assert found.mean_angle_rad == pytest.approx(0, abs=1e-6)
+    assert found.reflectance_rms_std == pytest.approx(0, abs=1e-12)
     assert ("Common bands", "2") in [(row.figure, row.value) for row in difference_table(found)]
 
 
@@ -37,3 +38,16 @@ def test_results_that_do_not_fit_say_why() -> None:
     with pytest.raises(DecodeError, match="No pixel"):
         compare_results(np.full((4, 5), np.nan), np.zeros((4, 5)))
     assert shared_bands(NM, np.empty(0)) == []
+
+
+def test_figures_say_how_sure_they_are() -> None:
+    rng = np.random.default_rng(4)
+    first = np.full((60, 80), 700.0)
+    rows = {
+        row.figure: row
+        for row in difference_table(compare_results(first, first + rng.normal(0, 0.5, first.shape)))
+    }
+    rms = rows["Depth, RMS difference"]
+    assert rms.words == f"{rms.value} ± {rms.std}"
+    assert float(rms.std) == pytest.approx(0.5 / np.sqrt(2 * first.size), rel=0.4)
+    assert rows["Pixels that both have"].std == ""

@@ -69,7 +69,7 @@ def test_one_position_off_the_line_is_the_worst() -> None:
     assert found.free.worst_mm == pytest.approx(0.5, rel=0.25)
     rows = {row.figure: row for row in stage_table(found)}
     assert rows["Worst deviation, slope free"].value == f"{found.free.worst_mm:.4f}"
-    assert "±" in rows["Slope of distance over position"].value
+    assert "±" in rows["Slope of distance over position"].words
     assert rows["Positions"].value == "8"
 
 

@@ -118,6 +118,17 @@ def test_verdicts_follow_their_goals(known: Any) -> None:
     assert len(rows) == len(figures(evaluation)) == 13
 
 
+def test_estimates_have_a_deviation_and_counts_have_none(known: Any) -> None:
+    evaluation = evaluate(known.result, known.truth)
+    rows = {row.figure: row for row in verdicts(evaluation)}
+    angles = [patch.angle_rad for patch in evaluation.patches]
+    expected = np.std(angles, ddof=1) / np.sqrt(len(angles))
+    assert float(rows["Mean spectral angle"].std) == pytest.approx(expected, abs=1e-4)
+    assert {figure for figure, row in rows.items() if row.std} >= {"Depth, RMSE per pixel", "Depth, bias"}
+    for figure in ("Lit pixels with a depth", "Reflectance, worst patch"):
+        assert rows[figure].words == rows[figure].value
+
+
 def test_a_goal_for_an_unknown_figure_is_refused(known: Any) -> None:
     with pytest.raises(KeyError):
         verdicts(evaluate(known.result, known.truth), {"beauty": Goal(1.0)})

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.time_sweep import FIGURES, SweepPoint, best_points, require_sweep, rms_std
+from dsl_core.evaluation.time_sweep import FIGURES, SweepPoint, best_points, require_sweep
 
 DEPTH, REFLECTANCE, _ = FIGURES
 
@@ -23,13 +22,7 @@ def test_best_is_what_no_quicker_scan_beats() -> None:
         require_sweep(points[:1])
 
 
-def test_the_deviation_of_an_rms_is_that_of_many_repeats() -> None:
-    maps = [np.random.default_rng(seed).normal(0, 0.4, (60, 80)) for seed in range(60)]
-    spread = np.std([np.sqrt(np.mean(each**2)) for each in maps], ddof=1)
-    found = [rms_std(each) for each in maps]
-    assert np.mean([each for each in found if each is not None]) == pytest.approx(spread, rel=0.3)
-
-
-def test_without_an_error_nothing_is_said_of_its_deviation() -> None:
-    assert rms_std(np.zeros((12, 16))) is None
-    assert rms_std(np.full((12, 16), np.nan)) is None
+def test_every_error_says_how_sure_it_is() -> None:
+    point = SweepPoint("good", 30.0, 0.3, 0.01, 0.02, 0.001)
+    assert [point.words(figure) for figure in FIGURES] == ["0.300 ± 0.010", "0.0200 ± 0.0010", "–"]
+    assert [point.std(figure) for figure in FIGURES] == [0.01, 0.001, None]
