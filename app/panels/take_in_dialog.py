@@ -151,7 +151,7 @@ class TakeInDialog(OrderDialog):
 
     def _items(self, row: FileRow) -> tuple[Any, ...]:
         theme = self._theme
-        harmless = row.status in ("misnamed", "extra")
+        harmless = row.status in ("misnamed", "extra", "optional")
         colour = theme.good if not row.is_odd else theme.warn if harmless else theme.bad
         return (
             cell(_breakable(row.expected or "–")),

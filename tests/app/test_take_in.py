@@ -155,7 +155,7 @@ def test_a_folder_of_other_images_says_what_is_wanted(bench: Bench, tmp_path: Pa
     (tmp_path / "holiday" / "cat.jpeg").write_bytes(b"\xff\xd8")
     bench.look(tmp_path / "holiday")
     assert "is not a published dataset" in bench.trouble
-    assert {row.status for row in bench.found.rows} == {"missing"}
+    assert {row.status for row in bench.found.rows} == {"missing", "optional"}
     assert {"intensity1/", "black_exposure1/", "ldr_exposure1/"} <= {r.expected for r in bench.found.rows}
     bench.look(tmp_path / "gone")
     assert "is not a folder" in bench.notifier.told[-1][1]

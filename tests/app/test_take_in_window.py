@@ -70,7 +70,7 @@ def test_a_dropped_scan_is_taken_in_and_offered(
     dialog = opened(qtbot, window)
     assert complaints(dialog) == []
     assert "entries are as published" in dialog._summary.text()
-    assert "missing" in texts(dialog, 2)
+    assert "optional" in texts(dialog, 2)
     assert not dialog._size.isVisible()
     assert not dialog.go.isEnabled()
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(made.own), ""))

@@ -100,11 +100,10 @@ def check_calibration(root: Path) -> list[FileRecord]:
         found = find_table(root / TABLE_FOLDER, name)
         records.append(_record(root, TABLE_FOLDER / expected, found, f"the {name} cannot be imported"))
     lines = root / TABLE_FOLDER / FIRST_ORDER_NAME
-    advice = "optional: the first-order lines of the analytic model are used instead"
-    return [
-        *records,
-        _record(root, TABLE_FOLDER / FIRST_ORDER_NAME, lines if lines.is_file() else None, advice),
-    ]
+    if lines.is_file():
+        return [*records, _record(root, TABLE_FOLDER / FIRST_ORDER_NAME, lines, "")]
+    name, advice = (TABLE_FOLDER / FIRST_ORDER_NAME).as_posix(), "the analytic model's lines are used instead"
+    return [*records, FileRecord(name, None, "optional", advice)]
 
 
 def _stereo_record(root: Path) -> FileRecord:

@@ -27,7 +27,8 @@ from typing import Literal
 from dsl_core.io.published.png_probe import PngInfo, probe_png
 from dsl_core.model.plan import CapturePlan, Role, Setting
 
-Status = Literal["ok", "missing", "misnamed", "wrong size", "wrong type", "unreadable", "extra"]
+#: ``optional`` is what is not there and need not be.
+Status = Literal["ok", "missing", "optional", "misnamed", "wrong size", "wrong type", "unreadable", "extra"]
 #: Role, setting and pattern of a shot: what a file has to know of it.
 Place = tuple[Role, int, int]
 
@@ -97,7 +98,7 @@ def survey(root: Path, plan: CapturePlan) -> Survey:
     if points.is_file():
         result.add(FileRecord(DEPTH_NAME, DEPTH_NAME, "ok", ""))
     else:
-        result.add(FileRecord(DEPTH_NAME, None, "missing", "depth must come from code frames"))
+        result.add(FileRecord(DEPTH_NAME, None, "optional", "depth is computed from the code frames"))
     return result
 
 
