@@ -215,12 +215,7 @@ class ScreenProjector(Projector):
 
     def show(self, image: NDArray[np.uint8]) -> None:
         """Show drive levels; returns when they are painted and the latency has passed."""
-        info = self.info
-        if image.dtype != np.uint8 or image.shape[:2] != (info.height_px, info.width_px):
-            raise DeviceError(
-                f"The projector was given an image of shape {image.shape} and type {image.dtype}; it shows"
-                f" {info.height_px} x {info.width_px} pixels of uint8, grey or RGB."
-            )
+        self.info.require_image(image)
         if self._window.lost_screen:
             raise DeviceError(
                 f"The projector's screen {self._window.lost_screen} is gone. Connect it again and choose it"

@@ -16,6 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import BayerPattern, Rig
@@ -102,6 +103,15 @@ class ProjectorInfo:
     latency_ms: float
     frame_period_ms: float
     mode: str = ""
+
+    def require_image(self, image: NDArray[np.uint8]) -> None:
+        """Raise `DeviceError` unless these are drive levels that this projector can show."""
+        size = (self.height_px, self.width_px)
+        if image.dtype != np.uint8 or image.shape not in (size, (*size, 3)):
+            raise DeviceError(
+                f"The projector was given an image of shape {image.shape} and type {image.dtype}; it shows"
+                f" {size[0]} x {size[1]} pixels of uint8, grey or RGB. Make the pattern for its size."
+            )
 
 
 class Projector(Device):

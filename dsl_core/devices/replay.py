@@ -77,12 +77,7 @@ class ReplayProjector(Projector):
 
     def show(self, image: NDArray[np.uint8]) -> None:
         """Accept an image; raises `DeviceError` for another size or type."""
-        wanted = (self._info.height_px, self._info.width_px)
-        if image.dtype != np.uint8 or image.shape not in (wanted, (*wanted, 3)):
-            raise DeviceError(
-                f"The projector was given {image.dtype} of shape {image.shape} instead of uint8"
-                f" of shape {wanted} or {(*wanted, 3)}. Make the pattern with the projector's size."
-            )
+        self._info.require_image(image)
 
 
 def replay_rig(source: FrameSource, calibration: Rig | None = None) -> DeviceRig:

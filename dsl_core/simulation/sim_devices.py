@@ -102,12 +102,7 @@ class SimProjector(Projector):
 
     def show(self, image: NDArray[np.uint8]) -> None:
         """Show drive levels; raises `DeviceError` for another size or type."""
-        wanted = (self._info.height_px, self._info.width_px)
-        if image.dtype != np.uint8 or image.shape not in (wanted, (*wanted, 3)):
-            raise DeviceError(
-                f"The projector was given an image of shape {image.shape} and type {image.dtype}; it shows"
-                f" {wanted[0]} x {wanted[1]} pixels of uint8, grey or RGB."
-            )
+        self._info.require_image(image)
         self.world.show(image)
         self.world.clock.wait(LATENCY_MS / 1000)
 

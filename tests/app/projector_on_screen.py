@@ -89,6 +89,8 @@ def main() -> None:
     worker.start()
     wait(lambda: not worker.is_alive())
     assert not errors, errors
+    show(np.zeros((*image.shape[:2], 4), np.uint8))
+    assert isinstance(errors.pop(), DeviceError)
     seen = pixels(beam)
     assert seen.shape == image.shape, (seen.shape, image.shape)
     print("differing pixels at 1:1:", int((seen != image).any(2).sum()))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pickle
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from tests.cases.tiny_campaign import Ending, contents, give, kill_at
 
@@ -23,9 +26,25 @@ class Calibrated:
 
 
 @pytest.fixture(scope="session")
-def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Calibrated:
+def calibrated(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Calibrated:
+    """The campaign; of processes that share the tests the first makes it, the others take it."""
+    if worker_id == "master":
+        return _make(tmp_path_factory.mktemp("calibrated"))
+    shared = tmp_path_factory.getbasetemp().parent / "calibrated"
+    made = shared / "made.pickle"
+    with FileLock(f"{shared}.lock"):
+        if not made.exists():
+            shutil.rmtree(shared, ignore_errors=True)  # half of one that failed
+            shared.mkdir()
+            made.write_bytes(pickle.dumps(_make(shared)))
+    found = pickle.loads(made.read_bytes())
+    assert isinstance(found, Calibrated)
+    return found
+
+
+def _make(home: Path) -> Calibrated:
     """``calibrate all``, killed while the filters' first scan runs, and the same command without options."""
-    folder = tmp_path_factory.mktemp("calibrated") / "campaign"
+    folder = home / "campaign"
     kill_at(folder, BEGUN)
     killed = contents(folder)
     return Calibrated(
