@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHeaderView, QSplitter
+from PySide6.QtWidgets import QSplitter
 
 from app.state.compare import CompareState, Pair
 from app.state.results import spectrum_of_pixel
@@ -15,7 +15,7 @@ from app.widgets.plots import calm_plot, theme_plots
 from app.widgets.read_table import RIGHT, ReadTable, cell
 from app.widgets.spectrum_curve import SpectrumCurve
 
-#: Room for the longest figure's name.
+#: Room for most names of figures; longer ones break.
 TABLE_PX = 400
 
 
@@ -36,8 +36,7 @@ class CompareFigures(QSplitter):
             "Figures of the comparison", "Differences are A minus B", ("Figure", "Value", "Unit")
         )
         self.table.setMinimumWidth(TABLE_PX)
-        self.table.verticalHeader().setDefaultSectionSize(24)
-        self.table.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        self.table.wrap(0)
         set_help(self.table, "comparing#figures")
         self.setChildrenCollapsible(False)
         self.addWidget(self.plot)
