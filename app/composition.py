@@ -287,8 +287,8 @@ class Composition(QObject):
 
         parts, state, several = window.parts, CompareState(), SeriesState()
         controller = CompareController(state, parts.runner, window.toasts)
-        self.session(window).serve_comparison(controller)
         series = SeriesController(several, parts.runner, window.toasts, parts.undo)
+        self.session(window).serve_comparison(controller, series)
         page = ComparePage(state, controller, several, series)
         page.apply_theme(window.theme)
         return page

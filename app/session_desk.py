@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from app.controllers.compare import CompareController
     from app.controllers.results import ResultsController
     from app.controllers.scan import ScanController
+    from app.controllers.series import SeriesController
 
 #: How long changes are gathered before they are written, ms.
 SAVE_MS = 1000
@@ -28,6 +29,7 @@ class SessionDesk(QObject):
         self._results: ResultsController | None = None
         self._scans: ScanController | None = None
         self._compare: CompareController | None = None
+        self._series: SeriesController | None = None
         self.keeper = SessionKeeper(window.parts.settings_path.parent / "sessions", self.collect)
         self._timer = QTimer(self)
         self._timer.setInterval(SAVE_MS)
@@ -62,22 +64,25 @@ class SessionDesk(QObject):
             state.calibration,
         )
 
-    def serve_comparison(self, control: CompareController) -> None:
-        """Keep what the Compare page compares."""
-        self._compare = control
+    def serve_comparison(self, control: CompareController, series: SeriesController) -> None:
+        """Keep what the Compare page compares, two results and several."""
+        self._compare, self._series = control, series
+        several = series.state
         self.keeper.watch(control.state.first, control.state.second)
+        self.keeper.watch(several.rows, several.kind, several.figure, several.against, several.region)
 
     # Keep ------------------------------------------------------------------------------------------
 
     def collect(self) -> Session:
         """What is open now."""
-        from app.controllers.session_parts import compare_part, results_part, scan_part
+        from app.controllers.session_parts import compare_part, results_part, scan_part, series_part
 
         return Session(
             page=self._window.page,
             results=None if self._results is None else results_part(self._results.state),
             scan=None if self._scans is None else scan_part(self._scans.state),
             compare=None if self._compare is None else compare_part(self._compare.state),
+            series=None if self._series is None else series_part(self._series.state),
         )
 
     def save(self) -> None:
@@ -111,6 +116,7 @@ class SessionDesk(QObject):
             come_back_to_comparison,
             come_back_to_result,
             come_back_to_scan,
+            come_back_to_series,
         )
 
         window = self._window
@@ -129,4 +135,8 @@ class SessionDesk(QObject):
             window.page_of("compare")
             assert self._compare is not None
             come_back_to_comparison(session.compare, self._compare)
+        if session.series is not None:
+            window.page_of("compare")
+            assert self._series is not None
+            come_back_to_series(session.series, self._series)
         window.open_page(session.page)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,6 +49,19 @@ class SeriesController:
             self._notifier.tell("info", "All of these results are in the series already.")
         else:
             self._set_rows((*self.state.rows.value, *new))
+
+    def come_back(
+        self, rows: Sequence[tuple[Path, float | None]], against: Path | None, region: Region | None
+    ) -> None:
+        """Take results with their positions, and ask the same of them again; what is gone is told."""
+        here = tuple(Row(path, position_mm) for path, position_mm in rows if results_in(path))
+        gone = [path.name for path, _ in rows if not results_in(path)]
+        if gone:
+            self._notifier.tell("warning", f"The series has lost {', '.join(gone)}: no result is there now.")
+        self._reference = None
+        self.state.against.set(against if against is not None and results_in(against) else None)
+        self.state.region.set(region)
+        self._set_rows(here)
 
     def remove(self, path: Path) -> None:
         """Take a result out of the series."""

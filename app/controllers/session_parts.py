@@ -11,11 +11,14 @@ from app.controllers.compare import CompareController
 from app.controllers.result_files import is_complete
 from app.controllers.results import ResultsController
 from app.controllers.scan import ScanController
+from app.controllers.series import SeriesController
 from app.state.compare import CompareState, Side
 from app.state.evented import Event, Value
 from app.state.results import Quality, ResultsState, View
 from app.state.scan import CalibrationChoice, ScanState, preset_of
-from app.state.session import ComparePart, ResultsPart, ScanPart
+from app.state.series import Kind, SeriesState
+from app.state.session import ComparePart, ResultsPart, ScanPart, SeriesPart
+from dsl_core.evaluation.time_sweep import FIGURES
 from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.result_arrays import ResultArrays
 from dsl_core.model.presets import on_cycles
@@ -120,6 +123,30 @@ def come_back_to_comparison(part: ComparePart, control: CompareController) -> No
         return
     _once(control.state.first.changed, then, lambda side: _path(side) == part.first)
     control.open_side(part.first, second=False)
+
+
+def series_part(state: SeriesState) -> SeriesPart | None:
+    """The results with their positions, and what is asked of them."""
+    rows = state.rows.value
+    if not rows:
+        return None
+    return SeriesPart(
+        rows=tuple((row.path, row.position_mm) for row in rows),
+        kind=state.kind.value.value,
+        figure=state.figure.value.field,
+        against=state.against.value,
+        region=state.region.value,
+    )
+
+
+def come_back_to_series(part: SeriesPart, control: SeriesController) -> None:
+    """Ask the same of the same results."""
+    state = control.state
+    _set_named(state.kind, Kind, part.kind)
+    for figure in FIGURES:
+        if figure.field == part.figure:
+            state.figure.set(figure)
+    control.come_back(part.rows, part.against, part.region)
 
 
 def _path(side: Side | None) -> Path | None:

@@ -45,6 +45,16 @@ class ComparePart(_Part):
     with_truth: bool = False
 
 
+class SeriesPart(_Part):
+    """The results of a series, where the stage stood for each, and what they were asked."""
+
+    rows: tuple[tuple[Path, float | None], ...]
+    kind: str = ""
+    figure: str = ""
+    against: Path | None = None
+    region: tuple[int, int, int, int] | None = None
+
+
 class Session(_Part):
     """All of it; parts are missing where a page held nothing."""
 
@@ -53,6 +63,7 @@ class Session(_Part):
     results: ResultsPart | None = None
     scan: ScanPart | None = None
     compare: ComparePart | None = None
+    series: SeriesPart | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,4 +77,6 @@ class Session(_Part):
             sides = [side.name for side in (self.compare.first, self.compare.second) if side is not None]
             if sides:
                 found.append(f"the comparison of {' and '.join(sides)}")
+        if self.series is not None:
+            found.append(f"a series of {len(self.series.rows)} results")
         return tuple(found)

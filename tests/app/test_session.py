@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -15,27 +16,33 @@ from app.application import make_window
 from app.composition import Composition, Wish
 from app.controllers.compare import CompareController
 from app.controllers.results import ResultsController
+from app.controllers.series import SeriesController
 from app.controllers.session_keeper import SessionKeeper, is_running
 from app.controllers.session_parts import (
     come_back_to_comparison,
     come_back_to_result,
     come_back_to_scan,
+    come_back_to_series,
     compare_part,
     results_part,
     scan_part,
+    series_part,
 )
 from app.jobs.base import InlineRunner
 from app.state.compare import CompareState
 from app.state.evented import Value
 from app.state.results import Quality, ResultsState, View
-from app.state.session import ResultsPart, ScanPart, Session
+from app.state.series import Kind, SeriesState
+from app.state.session import ResultsPart, ScanPart, SeriesPart, Session
 from app.state.undo import UndoStack
 from app.views import RecordingNotifier
 from dsl_core.errors import DeviceError
+from dsl_core.evaluation.time_sweep import FIGURES
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.scan_bench import make_bench
 from tests.app.small_result import write_small_result
+from tests.cases.stage_series import write_stage, write_sweep
 
 #: A number that no process has.
 NOBODY = 2**30
@@ -180,6 +187,43 @@ def test_a_comparison_comes_back(tmp_path: Path) -> None:
     come_back_to_comparison(part, again)
     assert again.state.pair.value is not None
     assert compare_part(again.state) == part
+
+
+def several() -> SeriesController:
+    return SeriesController(SeriesState(), InlineRunner(), RecordingNotifier(), UndoStack())
+
+
+def test_a_depth_test_comes_back_with_its_positions_and_region(tmp_path: Path) -> None:
+    stage = [write_stage(tmp_path, position) for position in (700.0, 725.0, 750.0)]
+    first = several()
+    assert series_part(first.state) is None
+    first.add(stage)
+    first.set_position(stage[1], 726.0)
+    first.set_region((10, 6, 24, 20))
+    part = series_part(first.state)
+    assert part is not None
+    assert Session(series=part).names == ("a series of 3 results",)
+    again = several()
+    come_back_to_series(SeriesPart.model_validate_json(part.model_dump_json()), again)
+    assert series_part(again.state) == part
+    assert again.state.test.value == first.state.test.value is not None
+
+
+def test_a_sweep_comes_back_without_what_is_gone(tmp_path: Path) -> None:
+    reference, *scans = write_sweep(tmp_path)
+    first = several()
+    first.ask(Kind.SWEEP)
+    first.add([reference, *scans])
+    first.compare_with(reference)
+    first.show_figure(FIGURES[1])
+    part = series_part(first.state)
+    assert part is not None
+    shutil.rmtree(scans[0])
+    again = several()
+    come_back_to_series(part, again)
+    assert [row.path for row in again.state.rows.value] == [reference, *scans[1:]]
+    assert (again.state.against.value, again.state.figure.value) == (reference, FIGURES[1])
+    assert scans[0].name in again._notifier.told[-1][1]  # type: ignore[attr-defined]
 
 
 class Bench:
