@@ -33,6 +33,13 @@ def compare(
     output.put(
         first=first,
         second=second,
-        figures={row.figure: {"value": row.value, "std": row.std or None, "unit": row.unit} for row in rows},
+        figures={
+            row.figure: {
+                "value": float(row.value),
+                "std": float(row.std) if row.std else None,
+                "unit": row.unit,
+            }
+            for row in rows
+        },
     )
     output.finish()

@@ -88,7 +88,7 @@ def evaluate(
     """Compare a result with known truth, in figures and one self-contained HTML page."""
     from dsl_core import pipeline, sessions
     from dsl_core.evaluation.report_content import report_content
-    from dsl_core.evaluation.verdict import figures
+    from dsl_core.evaluation.verdict import deviations, figures
     from dsl_core.io.result_file import load_result
     from dsl_core.io.staging import check_targets
 
@@ -100,7 +100,7 @@ def evaluate(
     pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
     print_figures(output, evaluation)
     output.say(f"The report lies in {report}")
-    output.put(report=report, figures=figures(evaluation))
+    output.put(report=report, figures=figures(evaluation), deviations=deviations(evaluation))
     output.finish()
 
 

@@ -100,9 +100,9 @@ def figures(evaluation: Evaluation) -> dict[str, float]:
     return found
 
 
-def deviations(evaluation: Evaluation) -> dict[str, float | None]:
+def deviations(evaluation: Evaluation) -> dict[str, float]:
     """Standard deviations of figures, by the same names; those that count what is there have none."""
-    found: dict[str, float | None] = {
+    stds: dict[str, float | None] = {
         "spectral_rmse": evaluation.mean_std("rmse"),
         "spectral_pixel_rmse": evaluation.mean_std("pixel_rmse"),
         "spectral_rmse_scaled": evaluation.mean_std("rmse_scaled"),
@@ -111,8 +111,8 @@ def deviations(evaluation: Evaluation) -> dict[str, float | None]:
         "fwhm_nm": evaluation.fwhm_std_nm,
     }
     if (depth := evaluation.depth) is not None:
-        found |= {"depth_rmse_mm": depth.rmse_std_mm, "depth_bias_mm": depth.bias_std_mm}
-    return found
+        stds |= {"depth_rmse_mm": depth.rmse_std_mm, "depth_bias_mm": depth.bias_std_mm}
+    return {name: std for name, std in stds.items() if std is not None}
 
 
 def verdicts(evaluation: Evaluation, goals: Mapping[str, Goal] | None = None) -> tuple[Verdict, ...]:

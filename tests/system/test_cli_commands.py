@@ -136,6 +136,8 @@ def test_evaluate_finds_the_truth_by_itself(give: Give, finished: Path, tmp_path
     said = give("evaluate", finished / "scan.zarr", "--report", report, "--json").json
     assert said["figures"]["depth_rmse_mm"] < 2
     assert said["figures"]["spectral_rmse"] < 0.05
+    assert 0 < said["deviations"]["depth_rmse_mm"] < said["figures"]["depth_rmse_mm"]
+    assert set(said["deviations"]) < set(said["figures"])
     page = report.read_text()
     assert "Dark Skin" in page or "dark skin" in page.lower()
     assert "columns, depth, normals" in page
