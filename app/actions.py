@@ -84,7 +84,7 @@ ACTIONS: tuple[Action, ...] = (
         "rig_connect",
         "&Connect or disconnect",
         "Rig",
-        "Ctrl+K",
+        "Ctrl+Shift+K",
         "Open the devices that the Rig page names, or let them go",
     ),
     Action(

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDockWidget
+from PySide6.QtWidgets import QAbstractSpinBox, QDockWidget, QLineEdit
 
 from app.actions import ACTIONS, PAGES, Action
 from app.controllers.known_files import Kind
@@ -88,6 +88,11 @@ class MainWindow(PagedWindow):
 
     def do(self, key: str) -> None:
         """Do the action of a key: of the open page where it offers it, else of the window."""
+        typed = self.focusWidget()
+        if isinstance(typed, QLineEdit | QAbstractSpinBox):
+            # What is being typed counts, as it would after a click on a button.
+            typed.clearFocus()
+            typed.setFocus()
         if not key.startswith(("page_", "theme_")):
             method = self.page_of(self.page).page_actions().get(key)
             if method is not None:

@@ -118,6 +118,7 @@ class SessionDesk(QObject):
             come_back_to_scan,
             come_back_to_series,
         )
+        from app.panels.compare_page import ComparePage
 
         window = self._window
         if session.results is not None:
@@ -136,7 +137,10 @@ class SessionDesk(QObject):
             assert self._compare is not None
             come_back_to_comparison(session.compare, self._compare)
         if session.series is not None:
-            window.page_of("compare")
+            page = window.page_of("compare")
             assert self._series is not None
             come_back_to_series(session.series, self._series)
+            if session.compare is None:
+                assert isinstance(page, ComparePage)
+                page.show_series()
         window.open_page(session.page)

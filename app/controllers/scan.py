@@ -125,8 +125,10 @@ class ScanController:
             self._scan.go_on()
 
     def cancel(self) -> None:
-        """End before the next frame; what is stored stays stored."""
-        if self._is_under_way() and self._job is not None:
+        """End before the next frame, or no longer wait for a lost rig; what is stored stays stored."""
+        if self.state.rescue.value.is_trying:
+            self._rescuer.stop()
+        elif self._is_under_way() and self._job is not None:
             self.state.phase.set(Phase.STOPPING)
             self._job.cancel()
 

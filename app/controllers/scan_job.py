@@ -43,6 +43,9 @@ class ScanJob:
         self.token = CancelToken()
         self._lock = threading.Lock()
         self._runner: Runner | None = None
+        #: Of its own, as the runner tells news, for which the other is taken, under a lock too.
+        self._pausing = threading.Lock()
+        self._is_paused = False
         self._graphs: IntensityGraphs | None = None
         self._status: Status | None = None
         self._picture: LivePicture | None = None
@@ -71,7 +74,10 @@ class ScanJob:
             lambda shot, frame: self._watch(shot, frame, info),
         ) as runner:  # fmt: skip
             runner.listen(self._listen)
-            self._runner = runner
+            with self._pausing:
+                self._runner = runner
+                if self._is_paused:
+                    runner.pause()
             return runner.run()
 
     def _calibrate(self, devices: DeviceRig) -> dict[str, str]:
@@ -122,11 +128,15 @@ class ScanJob:
         return None if self._graphs is None else self._graphs.graph(pixel)
 
     def pause(self) -> None:
-        """Wait before the next frame."""
-        if self._runner is not None:
-            self._runner.pause()
+        """Wait before the next frame; one that is still being prepared waits before its first."""
+        self._pause(True)
 
     def go_on(self) -> None:
         """Go on after `pause`."""
-        if self._runner is not None:
-            self._runner.resume()
+        self._pause(False)
+
+    def _pause(self, on: bool) -> None:
+        with self._pausing:
+            self._is_paused = on
+            if self._runner is not None:
+                (self._runner.pause if on else self._runner.resume)()

@@ -56,8 +56,10 @@ def _span(names: Sequence[str]) -> str:
 
 def summary_of(kind: str, records: Sequence[FileRecord]) -> str:
     """How much of a folder is as published."""
-    good = sum(record.status == "ok" for record in records)
-    return f"A published {KINDS[kind]}: {good} of {len(records)} entries are as published."
+    from dsl_core.io.published.layout import as_published
+
+    good, wanted = as_published(records)
+    return f"A published {KINDS[kind]}: {good} of {wanted} entries are as published."
 
 
 def target_for(folder: Path, kind: str, home: Path) -> Path:

@@ -51,6 +51,10 @@ class ComparePage(PageWidget):
         """The series, made when somebody looks."""
         return self._series.part
 
+    def show_series(self) -> None:
+        """Show the tab of several results."""
+        self.tabs.setCurrentWidget(self._series)
+
     @property
     def _shows_series(self) -> bool:
         return self.tabs.currentWidget() is self._series
@@ -60,7 +64,7 @@ class ComparePage(PageWidget):
         return {"series_add": self._add_to_series}
 
     def _add_to_series(self) -> None:
-        self.tabs.setCurrentWidget(self._series)
+        self.show_series()
         self.series.choose()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:

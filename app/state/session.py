@@ -78,5 +78,6 @@ class Session(_Part):
             if sides:
                 found.append(f"the comparison of {' and '.join(sides)}")
         if self.series is not None:
-            found.append(f"a series of {len(self.series.rows)} results")
+            count = len(self.series.rows)
+            found.append(f"a series of {count} result{'' if count == 1 else 's'}")
         return tuple(found)

@@ -98,8 +98,8 @@ def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
 
 
 def remark_line() -> QLabel:
-    """A label for what is going on, which keeps its room while it is hidden: nothing below it moves."""
-    made = label("", "muted")
+    """A label for what is going on, which keeps a line's room while it is hidden: nothing below it moves."""
+    made = label(" ", "muted")
     made.setWordWrap(True)
     policy = made.sizePolicy()
     policy.setRetainSizeWhenHidden(True)
@@ -108,9 +108,8 @@ def remark_line() -> QLabel:
 
 
 def show_remark(line: QLabel, text: str) -> None:
-    """Say something, or hide the line; the words stay in it, as they are its room."""
-    if text:
-        line.setText(text)
+    """Say something, or hide the line; the room of one line stays."""
+    line.setText(text or " ")
     line.setVisible(bool(text))
 
 

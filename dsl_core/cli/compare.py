@@ -17,7 +17,7 @@ def compare(
     json: Json = False,
 ) -> None:
     """Compare two results: FIRST minus SECOND over the pixels and bands that both have."""
-    from dsl_core.evaluation.difference import compare_results, difference_table, shared_bands
+    from dsl_core.evaluation.difference import compare_results, difference_table, figures, shared_bands
     from dsl_core.io.result_arrays import load_arrays
 
     output = Output(json)
@@ -34,12 +34,7 @@ def compare(
         first=first,
         second=second,
         figures={
-            row.figure: {
-                "value": float(row.value),
-                "std": float(row.std) if row.std else None,
-                "unit": row.unit,
-            }
-            for row in rows
+            each.words: {"value": each.value, "std": each.std, "unit": each.unit} for each in figures(found)
         },
     )
     output.finish()

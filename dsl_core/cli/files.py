@@ -73,14 +73,17 @@ def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig)
 
 def _print_files(output: Output, kind: str, records: Sequence[FileRecord]) -> None:
     """Everything that is not as it should be, and how much is."""
-    odd = [record for record in records if record.status != "ok"]
-    output.say(f"A published {kind}: {len(records) - len(odd)} of {len(records)} entries are as published.")
-    if odd:
+    from dsl_core.io.published.layout import as_published
+
+    told = [record for record in records if record.status != "ok"]
+    good, wanted = as_published(records)
+    output.say(f"A published {kind}: {good} of {wanted} entries are as published.")
+    if told:
         output.table(
             ("expected", "found", "status", "what to do"),
-            [(r.expected or "-", r.found or "-", r.status, r.advice) for r in odd],
+            [(r.expected or "-", r.found or "-", r.status, r.advice) for r in told],
         )
-    output.put(kind=kind, as_published=not odd, files=[vars(record) for record in records])
+    output.put(kind=kind, as_published=good == wanted, files=[vars(record) for record in records])
 
 
 def info(

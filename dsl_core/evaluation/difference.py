@@ -135,13 +135,31 @@ def _with_spectra(
     )
 
 
-def difference_table(found: ResultDifference) -> tuple[Verdict, ...]:
-    """The figures as rows of a table."""
-    rows = [Verdict("Pixels that both have", f"{100 * found.share:.2f}", "%")]
+@dataclass(frozen=True)
+class DifferenceFigure:
+    """A figure of a difference in words, with its standard deviation (None: counted, not estimated)."""
+
+    words: str
+    value: float
+    std: float | None
+    unit: str
+    form: str
+
+
+def figures(found: ResultDifference) -> tuple[DifferenceFigure, ...]:
+    """All figures that there are, in the order of the table."""
+    rows = [DifferenceFigure("Pixels that both have", 100 * found.share, None, "%", ".2f")]
     for field, std_field, words, unit, form in _FIGURES:
         value = getattr(found, field)
         if value is not None:
-            rows.append(estimate_row(words, value, getattr(found, std_field), unit, form))
+            rows.append(DifferenceFigure(words, value, getattr(found, std_field), unit, form))
     if found.bands:
-        rows.append(Verdict("Common bands", str(found.bands)))
+        rows.append(DifferenceFigure("Common bands", found.bands, None, "", ".0f"))
     return tuple(rows)
+
+
+def difference_table(found: ResultDifference) -> tuple[Verdict, ...]:
+    """The figures as rows of a table."""
+    return tuple(
+        estimate_row(each.words, each.value, each.std, each.unit, each.form) for each in figures(found)
+    )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.difference import ResultDifference
-from dsl_core.evaluation.scatter import std_of_rms
+from dsl_core.evaluation.scatter import std_of_rms, with_std
 from dsl_core.evaluation.summary import Evaluation
 from dsl_core.solve.front import front
 
@@ -59,7 +59,7 @@ class SweepPoint:
         error, std = self.error(figure), self.std(figure)
         if error is None:
             return "–"
-        return f"{error:{figure.form}}" + ("" if std is None else f" ± {std:{figure.form}}")
+        return with_std(error, std, figure.form)
 
 
 def point_against_truth(name: str, seconds: float, found: Evaluation) -> SweepPoint:

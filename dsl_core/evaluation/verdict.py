@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from dsl_core.evaluation.scatter import with_std
 from dsl_core.evaluation.summary import Evaluation
 
 
@@ -37,9 +38,11 @@ def estimate_row(
     wanted: str = "",
     passed: bool | None = None,
 ) -> Verdict:
-    """A row for a figure and its standard deviation, both to as many places as ``form`` says."""
-    plain = "" if std is None else format(std, form.removeprefix("+"))
-    return Verdict(figure, format(value, form).rstrip("%"), unit, wanted, passed, plain)
+    """A row for a figure and its standard deviation, to as many places as ``form`` says or more."""
+    if std is None:
+        return Verdict(figure, format(value, form).rstrip("%"), unit, wanted, passed)
+    shown, _, spread = with_std(value, std, form).partition(" ± ")
+    return Verdict(figure, shown, unit, wanted, passed, spread)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.controllers.compare import CompareController
@@ -64,6 +65,7 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     first = page.figures.table.item(0, 0)
     assert first is not None
     assert first.text() == "Depth, RMSE per pixel"
+    assert " ± " in page.figures.table.item(0, 1).text()  # type: ignore[union-attr]
     shapes = [item.image.shape for item in page.view.images]
     assert shapes == [(48, 64)] * 3
     assert tuple(page.view.images[0].levels) == tuple(page.view.images[1].levels)
@@ -89,3 +91,18 @@ def test_the_slider_steps_through_common_bands(qtbot: QtBot, bench: Bench, chart
     QTest.keyClick(page.bar.band, Qt.Key.Key_Right)
     assert page.bar.nm.text() == "550 nm"
     assert page.view.images[0].levels[0] == 0.0
+
+
+def test_pictures_stay_where_they_are_while_work_is_told(qtbot: QtBot, bench: Bench, chart: Path) -> None:
+    page, state, _ = bench
+    with_truth(qtbot, bench, chart)
+    QApplication.processEvents()
+    before = page.parts.geometry()
+    state.busy.set("Compare chart")
+    QApplication.processEvents()
+    assert page.hint.isVisible()
+    assert page.parts.geometry() == before
+    state.busy.set("")
+    QApplication.processEvents()
+    assert not page.hint.isVisible()
+    assert page.parts.geometry() == before

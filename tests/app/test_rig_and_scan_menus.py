@@ -6,11 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
 from app.application import make_window
 from app.composition import Composition, Wish
 from app.main_window import MainWindow
+from app.panels.scan_page import ScanPage
 from app.state.rig import Link, RigChoice
 from app.state.scan import Phase
 
@@ -51,6 +53,10 @@ def test_a_rig_is_watched_and_scans_from_the_results_page(
     qtbot.waitUntil(lambda: state.live.value, timeout=5000)
     do_from_results("rig_live")
     qtbot.waitUntil(lambda: not state.live.value, timeout=5000)
+    do_from_results("rig_expose")
+    qtbot.waitUntil(lambda: state.live.value, timeout=5000)
+    do_from_results("rig_live")
+    qtbot.waitUntil(lambda: not state.live.value, timeout=5000)
 
     do_from_results("scan_start")
     assert window.page == "scan"
@@ -81,3 +87,19 @@ def test_a_rig_is_watched_and_scans_from_the_results_page(
 def test_without_a_rig_it_says_why_nothing_happens(window: MainWindow, key: str, said: str) -> None:
     window.do(key)
     assert [toast.text for toast in window.toasts.shown if toast.text.startswith(said)]
+
+
+def test_a_name_that_is_being_typed_counts(
+    qtbot: QtBot, window: MainWindow, composition: Composition
+) -> None:
+    page = window.open_page("scan")
+    assert isinstance(page, ScanPage)
+    window.activateWindow()
+    page.target.name.setFocus()
+    qtbot.waitUntil(page.target.name.hasFocus)
+    page.target.name.selectAll()
+    QTest.keyClicks(page.target.name, "leaf")
+    window.do("scan_start")
+    assert composition._scans is not None
+    assert composition._scans.state.target.value.stem == "leaf"
+    assert page.target.name.hasFocus()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from collections import namedtuple
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,11 +9,14 @@ from pathlib import Path
 import pytest
 
 from app.controllers.rescue import ATTEMPTS, RETRY_S
+from app.controllers.scan_job import ScanJob
 from app.controllers.scan_plan import connect_first
 from app.state.rig import Link
 from app.state.scan import CalibrationChoice, Phase, Rescue
 from dsl_core import sessions
+from dsl_core.capture.status import State, Status
 from dsl_core.cli.options import PlanChoice
+from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DecodeError, DeviceError, DslError, StoreError
 from dsl_core.io.calibration_library import LibraryEntry
 from dsl_core.io.session import SessionReader, SessionWriter
@@ -499,6 +503,39 @@ def test_a_rig_is_not_connected_again_for_a_scan_that_was_left(outage: Outage) -
     outage.is_gone = False
     outage.wait(RETRY_S)
     assert (outage.rescue, outage.link, outage.told) == (Rescue.NONE, Link.LOST, "")
+
+
+def test_who_stops_a_lost_scan_does_not_find_it_gone_on(outage: Outage) -> None:
+    bench = outage.bench
+    bench.scans.resume()
+    assert outage.rescue is Rescue.RESUMING
+    bench.scans.cancel()
+    outage.is_gone = False
+    outage.wait(10 * RETRY_S)
+    assert (phase(bench), outage.link) == (Phase.LOST, Link.LOST)
+    assert "No scan is under way." not in [text for _, text in bench.notifier.told]
+
+
+def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states: list[State] = []
+    calibrate, listen = ScanJob._calibrate, ScanJob._listen
+
+    def prepare(job: ScanJob, devices: DeviceRig) -> dict[str, str]:
+        job.pause()
+        threading.Timer(0.3, job.go_on).start()
+        return calibrate(job, devices)
+
+    def hear(job: ScanJob, status: Status) -> None:
+        states.append(status.state)
+        listen(job, status)
+
+    monkeypatch.setattr(ScanJob, "_calibrate", prepare)
+    monkeypatch.setattr(ScanJob, "_listen", hear)
+    bench.scans.start()
+    assert states.index(State.PAUSED) < states.index(State.RUNNING)
+    assert phase(bench) is Phase.DONE
 
 
 def test_another_scan_that_is_opened_does_not_go_on_by_itself(outage: Outage, tmp_path: Path) -> None:

@@ -113,6 +113,7 @@ def test_results_dropped_together_become_a_depth_test(qtbot: QtBot, bench: Bench
     assert not panel.hint.isVisible()
     assert [panel.table.item(i, 1).text() for i in range(4)] == ["700", "725", "750", "775"]  # type: ignore[union-attr]
     assert panel.figures.item(0, 0).text() == "Straightness, slope free (RMS)"  # type: ignore[union-attr]
+    assert " ± " in panel.figures.item(2, 1).text()  # type: ignore[union-attr]
     assert "worst" in panel.plot.legend.text()
     (low, high), _ = panel.plot.plot.getViewBox().viewRange()
     assert low < POSITIONS[0] < POSITIONS[-1] < high

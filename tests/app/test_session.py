@@ -29,6 +29,7 @@ from app.controllers.session_parts import (
     series_part,
 )
 from app.jobs.base import InlineRunner
+from app.panels.compare_page import ComparePage
 from app.state.compare import CompareState
 from app.state.evented import Value
 from app.state.results import Quality, ResultsState, View
@@ -203,6 +204,7 @@ def test_a_depth_test_comes_back_with_its_positions_and_region(tmp_path: Path) -
     part = series_part(first.state)
     assert part is not None
     assert Session(series=part).names == ("a series of 3 results",)
+    assert Session(series=SeriesPart(rows=part.rows[:1])).names == ("a series of 1 result",)
     again = several()
     come_back_to_series(SeriesPart.model_validate_json(part.model_dump_json()), again)
     assert series_part(again.state) == part
@@ -280,6 +282,21 @@ def test_after_a_crash_the_window_offers_once_what_was_open(
     assert later.window.toasts.shown == ()
     later.window.close()
     crashed.window.close()
+
+
+def test_a_series_comes_back_where_it_is_seen(qtbot: QtBot, tmp_path: Path) -> None:
+    stage = [write_stage(tmp_path, position) for position in (700.0, 725.0, 750.0)]
+    part = SeriesPart(rows=tuple((path, None) for path in stage))
+    bench = Bench(qtbot, tmp_path)
+    bench.desk.come_back(Session(page="compare", series=part))
+    wait_until(lambda: not bench.window.parts.runner.active)
+    page = bench.window.page_of("compare")
+    assert isinstance(page, ComparePage)
+    assert page._shows_series
+    found = bench.desk.collect().series
+    assert found is not None
+    assert [path for path, _ in found.rows] == stage
+    bench.window.close()
 
 
 def test_a_result_that_is_gone_is_told(qtbot: QtBot, tmp_path: Path) -> None:

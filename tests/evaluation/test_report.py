@@ -73,6 +73,8 @@ def full(known: Any) -> ReportContent:
 def test_full_report_is_one_well_formed_page(full: ReportContent) -> None:
     html = render_report(full)
     page = Page(html)
+    assert full.verdicts[0].std
+    assert full.verdicts[0].words in page.text
     assert page.open == []
     assert page.references
     assert all(reference.startswith("data:image/png;base64,") for reference in page.references)

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -61,6 +62,12 @@ class FileRecord:
     found: str | None
     status: Status
     advice: str
+
+
+def as_published(records: Sequence[FileRecord]) -> tuple[int, int]:
+    """How many entries are as published, and how many should be: what is optional may be absent."""
+    wanted = [record for record in records if record.status != "optional"]
+    return sum(record.status == "ok" for record in wanted), len(wanted)
 
 
 @dataclass
