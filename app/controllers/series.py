@@ -57,7 +57,9 @@ class SeriesController:
         here = tuple(Row(path, position_mm) for path, position_mm in rows if results_in(path))
         gone = [path.name for path, _ in rows if not results_in(path)]
         if gone:
-            self._notifier.tell("warning", f"The series has lost {', '.join(gone)}: no result is there now.")
+            self._notifier.tell(
+                "warning", f"The series has lost {', '.join(gone)}. Add the results from where they are now."
+            )
         self._reference = None
         self.state.against.set(against if against is not None and results_in(against) else None)
         self.state.region.set(region)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from dsl_core.evaluation.scatter import with_std
+from dsl_core.evaluation.scatter import in_places
 from dsl_core.evaluation.summary import Evaluation
 
 
@@ -39,10 +39,8 @@ def estimate_row(
     passed: bool | None = None,
 ) -> Verdict:
     """A row for a figure and its standard deviation, to as many places as ``form`` says or more."""
-    if std is None:
-        return Verdict(figure, format(value, form).rstrip("%"), unit, wanted, passed)
-    shown, _, spread = with_std(value, std, form).partition(" ± ")
-    return Verdict(figure, shown, unit, wanted, passed, spread)
+    shown, spread = in_places(value, std, form)
+    return Verdict(figure, shown.rstrip("%"), unit, wanted, passed, spread)
 
 
 @dataclass(frozen=True)
