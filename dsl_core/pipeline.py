@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from dsl_core.capture.status import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.evaluation.report import ReportContent
+    from dsl_core.evaluation.report.scan_report import ReportContent
     from dsl_core.evaluation.summary import Evaluation, Truth
     from dsl_core.model.board import Board
-    from dsl_core.model.geometry_calibration import GeometryCalibration
-    from dsl_core.model.pose_frames import PoseFrames
+    from dsl_core.model.calibration.geometry import GeometryCalibration
+    from dsl_core.model.calibration.pose_frames import PoseFrames
     from dsl_core.model.rig import BayerPattern
 
 
@@ -90,7 +90,7 @@ def open_scan(
     from dsl_core.capture.preflight import require_possible
     from dsl_core.capture.runner import Runner
     from dsl_core.capture.sink import WatchedSink
-    from dsl_core.io.session import SessionWriter
+    from dsl_core.io.scan.session import SessionWriter
     from dsl_core.patterns.images import pattern_image
 
     require_possible(rig, plan)
@@ -124,7 +124,7 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> Ca
     The session's own calibration counts, whatever the rig says of itself now.
     """
     from dsl_core.capture import drift
-    from dsl_core.io.session import SessionReader
+    from dsl_core.io.scan.session import SessionReader
     from dsl_core.patterns.images import pattern_image
 
     reader = SessionReader(folder)
@@ -151,7 +151,7 @@ def reconstruct(
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
     from dsl_core.reconstruction.sanity import require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
-    from dsl_core.reconstruction.solvers import check_solver, solve_spectra
+    from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
     plan = check_source(source, rig)
@@ -213,7 +213,7 @@ def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
 
 def write_report(content: ReportContent, path: Path, overwrite: bool = False) -> Path:
     """Write the report as one HTML page; raises `StoreError`."""
-    from dsl_core.evaluation.report import render_report
+    from dsl_core.evaluation.report.scan_report import render_report
     from dsl_core.io.staging import staged
 
     page = render_report(content)
@@ -236,8 +236,8 @@ def calibrate_geometry(
     Goes on without poses whose board or code cannot be read, and says so. Raises `CalibrationError` that
     names the picture that is missing, or the poses that are wrong when too few are left.
     """
-    from dsl_core.calibration.geometric import calibrate_geometry as calibrate
-    from dsl_core.calibration.pose_series import observe_series
+    from dsl_core.calibration.geometry.pose_series import observe_series
+    from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
     from dsl_core.io.pose_pictures import pose_folders, read_pose, require_one_size
     from dsl_core.patterns.gray_code import bit_counts
 

@@ -1,0 +1,1 @@
+"""From captures of targets to the parameters of a rig."""

@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 
 from pydantic import ValidationError
 
-from dsl_core.campaign.recipe import Recipe
+from dsl_core.campaign.common.recipe import Recipe
 from dsl_core.campaign.recipes import load_recipe, recipe_names
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.conditions import differences
 from dsl_core.model.rig import Provenance, Rig
 

@@ -19,8 +19,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
-    from dsl_core.calibration.light_drift import PlaneSignals
-    from dsl_core.calibration.plane import PlaneFit
+    from dsl_core.calibration.common.plane import PlaneFit
+    from dsl_core.calibration.drift.light import PlaneSignals
     from dsl_core.patterns.gray_code import DecodedCode
     from dsl_core.reconstruction.hdr import MergedFrame
 
@@ -63,7 +63,7 @@ def measure_drift(
     The light is judged only when the target is the Spectralon. Raises `CalibrationError` when the target does
     not fill the picture, and what a scan raises.
     """
-    from dsl_core.io.session import SessionReader
+    from dsl_core.io.scan.session import SessionReader
 
     plan = pipeline.fit_plan(quick_plan(rig.frame_period_ms), devices)
     pipeline.scan(devices, plan, folder, progress)
@@ -78,9 +78,9 @@ def drift_figures(
     pixels: int = PIXELS,
 ) -> tuple[Figure, ...]:
     """The figures of a quick shot, the light compared at that many pixels; see `measure_drift`."""
-    from dsl_core.calibration.drift import geometry_drift
-    from dsl_core.calibration.light_drift import film_drift, light_drift
-    from dsl_core.calibration.plane import fit_plane
+    from dsl_core.calibration.common.plane import fit_plane
+    from dsl_core.calibration.drift.geometry import geometry_drift
+    from dsl_core.calibration.drift.light import film_drift, light_drift
     from dsl_core.patterns.images import spectral_profiles
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
     from dsl_core.reconstruction.sanity import require_light
@@ -129,7 +129,7 @@ def _signals(
     std: NDArray[np.floating],
 ) -> PlaneSignals:
     """Frames (frames, rows, columns) at the chosen pixels of the plane."""
-    from dsl_core.calibration.light_drift import PlaneSignals
+    from dsl_core.calibration.drift.light import PlaneSignals
     from dsl_core.optics.flat_field import relative_gain
     from dsl_core.optics.sensor import bayer_channels
     from dsl_core.optics.shading import plane_shading

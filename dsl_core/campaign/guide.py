@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from dsl_core.campaign.assembly import accepted_calibrations, assemble, campaign_recipes, nominal_rig
-from dsl_core.campaign.recipe import Recipe, Step
+from dsl_core.campaign.common.recipe import Recipe, Step
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure, failures
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress

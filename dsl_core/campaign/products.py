@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.campaign.assembly import accepted_calibrations, campaign_recipes
-from dsl_core.campaign.recipe import Recipe
+from dsl_core.campaign.common.recipe import Recipe
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import save_rig
 from dsl_core.io.staging import staged
-from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.rig import Rig
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def write_calibration_report(
     costs: Sequence[StageCost] = (),
 ) -> Path:
     """Write the page, over what is there, whole or not at all; raises `StoreError`."""
-    from dsl_core.evaluation.calibration_report import CalibrationContent, render_calibration_report
+    from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
 
     page = render_calibration_report(CalibrationContent(rig, accepted, history, costs))
     with staged([path], overwrite=True) as (draft,):

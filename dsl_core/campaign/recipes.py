@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, get_origin, get_type_hints
 
-from dsl_core.campaign.recipe import Recipe
+from dsl_core.campaign.common.recipe import Recipe
 from dsl_core.errors import CalibrationError
 
 #: Film off first, so that the film is mounted once.
@@ -38,7 +38,7 @@ def load_recipe(name: str, settings: Mapping[str, str] | None = None) -> Recipe:
 
 
 def _module(name: str) -> str:
-    return f"dsl_core.campaign.{name.replace('-', '_')}"
+    return f"dsl_core.campaign.{name.replace('-', '_')}.recipe"
 
 
 def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:

@@ -22,7 +22,7 @@ from dsl_core.campaign.assembly import (
     require_needs,
     require_same_devices,
 )
-from dsl_core.campaign.captures import (
+from dsl_core.campaign.common.captures import (
     CaptureNote,
     other_conditions,
     read_note,
@@ -31,13 +31,13 @@ from dsl_core.campaign.captures import (
     scan_settings,
     write_note,
 )
-from dsl_core.campaign.recipe import Bench, Recipe, Step
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.campaign_folder import CampaignFolder, now
-from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.progress import NoProgress, Progress
 

@@ -18,7 +18,7 @@ def compare(
 ) -> None:
     """Compare two results: FIRST minus SECOND over the pixels and bands that both have."""
     from dsl_core.evaluation.difference import compare_results, difference_table, figures, shared_bands
-    from dsl_core.io.result_arrays import load_arrays
+    from dsl_core.io.result.result_arrays import load_arrays
 
     output = Output(json)
     with output.progress() as progress:

@@ -61,8 +61,8 @@ def demo(
 def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
     """The first of the name and its numbered neighbours that is free, or holds this demo unfinished."""
     from dsl_core.io.file_names import MANIFEST_NAME
-    from dsl_core.io.origin import rig_notes
-    from dsl_core.io.session_manifest import read_manifest
+    from dsl_core.io.scan.manifest import read_manifest
+    from dsl_core.io.scan.origin import rig_notes
 
     for number in itertools.count(1):
         folder = wanted if number == 1 else wanted.with_name(f"{wanted.name}-{number}")
@@ -85,7 +85,7 @@ def _plan() -> CapturePlan:
 def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str, str]) -> None:
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io.origin import rig_notes
+    from dsl_core.io.scan.origin import rig_notes
 
     with output.progress() as progress, timer.stage("scan on the twin"), open_rig("twin", options) as rig:
         plan = pipeline.fit_plan(_plan(), rig)
@@ -96,8 +96,8 @@ def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str,
 
 
 def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
-    from dsl_core.io.result_file import save_result
-    from dsl_core.sessions import reconstruct_session
+    from dsl_core.io.result.result_file import save_result
+    from dsl_core.workflows.sessions import reconstruct_session
 
     with output.progress() as progress:
         result = reconstruct_session(folder / SCAN, progress=progress, timer=timer)
@@ -108,11 +108,12 @@ def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
 
 def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Dataset) -> dict[str, float]:
     """Figures, exports and the report."""
-    from dsl_core import pipeline, sessions
+    from dsl_core import pipeline
     from dsl_core.cli.results import print_figures
-    from dsl_core.evaluation.report_content import report_content
+    from dsl_core.evaluation.report.content import report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export
+    from dsl_core.workflows import sessions
 
     with timer.stage("evaluate"):
         truth = sessions.truth_of(result)

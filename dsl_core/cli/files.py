@@ -40,10 +40,10 @@ def import_(
     json: Json = False,
 ) -> None:
     """Read the published dataset or calibration layout; say what is missing or misnamed."""
-    from dsl_core import exchange
     from dsl_core.io.published import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
+    from dsl_core.workflows import exchange
 
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
@@ -63,7 +63,7 @@ def import_(
 
 def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig) -> None:
     """The table comes first, so that it is there when the import is refused."""
-    from dsl_core import exchange
+    from dsl_core.workflows import exchange
 
     _print_files(output, "dataset", exchange.import_scan(source, None, rig))
     if target is not None:

@@ -13,7 +13,7 @@ from dsl_core.cli.options import RigOptions
 from dsl_core.errors import DslError
 
 #: The window of this package, so that it opens in a source tree without metadata too.
-WINDOW = EntryPoint("dsl-scan-gui", "app.__main__:main", "gui_scripts")
+WINDOW = EntryPoint("dsl-scan-gui", "dsl_app.__main__:main", "gui_scripts")
 
 
 class Theme(StrEnum):

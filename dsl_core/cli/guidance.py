@@ -12,11 +12,11 @@ from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, Cancelled
 
 if TYPE_CHECKING:
-    from dsl_core.campaign.recipe import Step
+    from dsl_core.campaign.common.recipe import Step
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.devices.base import DeviceRig
     from dsl_core.io.campaign_folder import CampaignFolder
-    from dsl_core.model.accepted import AcceptedCalibration
+    from dsl_core.model.calibration.accepted import AcceptedCalibration
     from dsl_core.model.figure import Figure
 
 
@@ -95,7 +95,7 @@ def opened_campaign(
     """A campaign that no other process writes, and the open devices of its rig."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.campaign_folder import CampaignFolder
-    from dsl_core.io.session_lock import SessionLock
+    from dsl_core.io.scan.lock import SessionLock
 
     campaign = CampaignFolder.prepare(folder, rig, options, settings)
     # Devices that do not open must not leave a campaign of theirs behind.

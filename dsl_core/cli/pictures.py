@@ -12,7 +12,7 @@ from dsl_core.errors import CalibrationError
 
 if TYPE_CHECKING:
     from dsl_core.model.board import Charuco, Checkerboard
-    from dsl_core.model.geometry_calibration import GeometryCalibration, PoseQuality
+    from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
     from dsl_core.model.rig import BayerPattern
 
 

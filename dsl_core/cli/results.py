@@ -47,12 +47,12 @@ def reconstruct(
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.calibration_library import load_calibration
-    from dsl_core.io.result_file import RESULT_FOLDER, save_result
+    from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
     from dsl_core.io.staging import check_targets
     from dsl_core.model.spectral_choices import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
     from dsl_core.reconstruction.torch_device import DEVICES, torch_device
-    from dsl_core.sessions import reconstruct_session
+    from dsl_core.workflows.sessions import reconstruct_session
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
     _require_one_of("--model", model, names(MODELS))
@@ -86,11 +86,12 @@ def evaluate(
     json: Json = False,
 ) -> None:
     """Compare a result with known truth, in figures and one self-contained HTML page."""
-    from dsl_core import pipeline, sessions
-    from dsl_core.evaluation.report_content import report_content
+    from dsl_core import pipeline
+    from dsl_core.evaluation.report.content import report_content
     from dsl_core.evaluation.verdict import deviations, figures
-    from dsl_core.io.result_file import load_result
+    from dsl_core.io.result.result_file import load_result
     from dsl_core.io.staging import check_targets
+    from dsl_core.workflows import sessions
 
     output, report = Output(json), report or path.with_suffix(".html")
     check_targets([report], overwrite=force)
@@ -133,13 +134,14 @@ def export(
 def _export(
     output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
 ) -> list[Path]:
-    from dsl_core import exchange, pipeline
+    from dsl_core import pipeline
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.export import export as export_result
     from dsl_core.io.export import export_csv
     from dsl_core.io.published import export_calibration
-    from dsl_core.io.result_file import load_result
-    from dsl_core.io.session import SessionReader
+    from dsl_core.io.result.result_file import load_result
+    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.workflows import exchange
 
     if pixels and form != "csv":
         raise PlanError(f"--pixel is for csv; {form} holds all pixels. Leave it out.")

@@ -51,7 +51,7 @@ def rigs(json: Json = False) -> None:
 
 def scenes(json: Json = False) -> None:
     """List the scenes of the twin and their options."""
-    from dsl_core.simulation.scenes import scene_catalogue
+    from dsl_core.simulation.scenes.catalogue import scene_catalogue
 
     output, entries = Output(json), scene_catalogue()
     output.table(
@@ -110,7 +110,7 @@ def scan(
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.file_names import MANIFEST_NAME
-    from dsl_core.io.origin import rig_notes
+    from dsl_core.io.scan.origin import rig_notes
 
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)
     choice = PlanChoice(plan, code, lines, comb, setting).build()
@@ -139,8 +139,9 @@ def resume(
     json: Json = False,
 ) -> None:
     """Go on with a scan that was stopped, or killed, at its next missing frame."""
-    from dsl_core import pipeline, sessions
+    from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
+    from dsl_core.workflows import sessions
 
     output = Output(json)
     _say_gaps(output, target)
@@ -152,7 +153,7 @@ def resume(
 
 def _say_gaps(output: Output, target: Path) -> None:
     """Say how many frames a scan lacks, and how many of those it has cannot be used."""
-    from dsl_core.io.session import SessionReader
+    from dsl_core.io.scan.session import SessionReader
 
     reader = SessionReader(target)
     missing = len(reader.missing())
@@ -185,7 +186,7 @@ def _require_patterns(plan: CapturePlan) -> None:
 
 def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) -> None:
     """Say what a plan will take."""
-    from dsl_core.io.estimate import estimate
+    from dsl_core.io.scan.estimate import estimate
 
     needs = estimate(plan, folder, devices.projector.info.latency_ms)
     output.say(f"{devices.name}: {needs}.")

@@ -12,7 +12,7 @@ from dsl_core.cli.options import Force, Json, parse_numbers, parse_region
 from dsl_core.cli.output import Output
 
 if TYPE_CHECKING:
-    from dsl_core.evaluation.series_page import Table
+    from dsl_core.evaluation.report.series_page import Table
 
 Results = Annotated[list[Path], typer.Argument(metavar="RESULT.zarr...", help="Results of 'reconstruct'.")]
 Report = Annotated[Path | None, typer.Option("--report", help="Write all of it as an HTML page.")]
@@ -36,10 +36,10 @@ def depth_test(
     json: Json = False,
 ) -> None:
     """Test depth with a flat target at positions of a stage: planes, and how straight they follow it."""
-    from dsl_core.evaluation.series_page import stage_page, stage_rows
+    from dsl_core.evaluation.report.series_page import stage_page, stage_rows
     from dsl_core.evaluation.stage_test import stage_table, stage_test
     from dsl_core.io.staging import check_targets
-    from dsl_core.series import read_targets, write_page
+    from dsl_core.workflows.series import read_targets, write_page
 
     output = Output(json)
     given = None if positions is None else parse_numbers("--positions", positions)
@@ -79,10 +79,10 @@ def sweep(
     json: Json = False,
 ) -> None:
     """Compare scans of one scene: error against the seconds of the capture, and which are worth them."""
-    from dsl_core.evaluation.series_page import sweep_page, sweep_rows
+    from dsl_core.evaluation.report.series_page import sweep_page, sweep_rows
     from dsl_core.evaluation.time_sweep import FIGURES, best_points
     from dsl_core.io.staging import check_targets
-    from dsl_core.series import read_sweep, write_page
+    from dsl_core.workflows.series import read_sweep, write_page
 
     output = Output(json)
     check_targets([] if report is None else [report], overwrite=force)

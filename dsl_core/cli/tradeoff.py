@@ -151,7 +151,7 @@ def _calibration(devices: DeviceRig, name: str | None) -> Rig:
 def _view(rig: Rig, look: Path | None) -> View | None:
     if look is None:
         return None
-    from dsl_core.io.result_file import load_result
+    from dsl_core.io.result.result_file import load_result
     from dsl_core.planning.views import scene_view
 
     return scene_view(rig, load_result(look))

@@ -1,0 +1,1 @@
+"""Scans, results, rigs and spectra on disk."""

@@ -19,8 +19,8 @@ from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import store_error, write_atomic
 from dsl_core.io.campaign_folder import now, read_record
 from dsl_core.io.rig_file import load_rig
-from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.rig import Rig
 
 #: Names the folder of everything this program keeps for a user, instead of the system's usual place.

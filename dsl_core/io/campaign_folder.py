@@ -24,8 +24,8 @@ from pydantic import Field, ValidationError
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import write_atomic
 from dsl_core.io.file_names import CAMPAIGN_NAME
-from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 R = TypeVar("R", bound=Record)
 

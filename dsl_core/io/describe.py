@@ -10,10 +10,10 @@ from dsl_core.errors import StoreError
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.plan_file import load_plan
-from dsl_core.io.result_file import load_result
+from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.session import SessionReader
-from dsl_core.io.session_check import find_problems
+from dsl_core.io.scan.check import find_problems
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import CapturePlan
 
 Facts = dict[str, Any]

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.stereo import Stereo
 from dsl_core.io.staging import staged
-from dsl_core.model.geometry_calibration import GeometryCalibration
+from dsl_core.model.calibration.geometry import GeometryCalibration
 
 
 def save_geometry(found: GeometryCalibration, path: Path, *, overwrite: bool = False) -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
-from dsl_core.model.pose_frames import PoseFrames
+from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.rig import BayerPattern
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 
 
 def open_replay(options: dict[str, str]) -> DeviceRig:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from dsl_core.model.accepted import CalibrationNote
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions

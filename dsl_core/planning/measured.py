@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.errors import StoreError
-from dsl_core.evaluation.pages import render_page
+from dsl_core.evaluation.report.pages import render_page
 from dsl_core.io.staging import staged
 from dsl_core.planning.sweep import Case, Point
 from dsl_core.solve.front import front

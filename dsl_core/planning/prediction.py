@@ -26,7 +26,7 @@ from dsl_core.planning.references import References
 from dsl_core.planning.views import View, plane_view
 from dsl_core.planning.virtual import Outcome, VirtualPixels
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
-from dsl_core.reconstruction.spectral_system import Bands
+from dsl_core.reconstruction.spectral.system import Bands
 from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]

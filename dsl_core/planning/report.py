@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.evaluation.pages import render_page
-from dsl_core.evaluation.pictures import figure_uri
+from dsl_core.evaluation.report.pages import render_page
+from dsl_core.evaluation.report.pictures import figure_uri
 from dsl_core.io.staging import staged
 from dsl_core.planning.choice import Weighed, pareto
 from dsl_core.solve.front import front

@@ -24,12 +24,12 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.references import FINE_NM, References
 from dsl_core.planning.views import View, pixels_view
 from dsl_core.reconstruction.surface import default_window_px
-from dsl_core.simulation import materials
-from dsl_core.simulation.options import ENDLESS
-from dsl_core.simulation.scene_flat import patch_grid
+from dsl_core.simulation.scenes import materials
+from dsl_core.simulation.scenes.flat import patch_grid
+from dsl_core.simulation.scenes.options import ENDLESS
+from dsl_core.simulation.scenes.surfaces import tilted
+from dsl_core.simulation.scenes.truth import Materials, Scene
 from dsl_core.simulation.sim_devices import assemble
-from dsl_core.simulation.surfaces import tilted
-from dsl_core.simulation.truth import Materials, Scene
 from dsl_core.simulation.world import World
 
 #: Pixels of a patch across and down, patches of a piece, and its grey rim, where demosaicing lacks pixels.

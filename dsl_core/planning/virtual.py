@@ -24,20 +24,26 @@ from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, Ord
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel, sideways_shares
 from dsl_core.planning.views import View
-from dsl_core.reconstruction.column import Column, refine
-from dsl_core.reconstruction.dense_solver import solve_dense
-from dsl_core.reconstruction.depth import triangulate
-from dsl_core.reconstruction.first_orders import first_order_share
-from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import (
+from dsl_core.reconstruction.columns.column import Column, refine
+from dsl_core.reconstruction.columns.first_orders import first_order_share
+from dsl_core.reconstruction.columns.pattern_column import (
     one_if_grey,
     radiance_profiles,
     refine_by_profiles,
     rounding_error,
 )
-from dsl_core.reconstruction.spectra import COLOUR_ERROR, DEMOSAIC_SPREAD, DIRECT_ERROR, EDGE_PX, MODEL_ERROR
-from dsl_core.reconstruction.spectral_solver import Prior, Spectra
-from dsl_core.reconstruction.spectral_system import (
+from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.spectra import (
+    COLOUR_ERROR,
+    DEMOSAIC_SPREAD,
+    DIRECT_ERROR,
+    EDGE_PX,
+    MODEL_ERROR,
+)
+from dsl_core.reconstruction.spectral.system import (
     ORDERS,
     Bands,
     band_halfwidth_px,

@@ -1,0 +1,1 @@
+"""From frames to depth, surface and spectra."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from dsl_core.errors import DeviceError, PlanError
 from dsl_core.model.placement import Placement
 from dsl_core.simulation.bandpass_filters import true_transmission
-from dsl_core.simulation.scenes import make_scene
-from dsl_core.simulation.truth import Scene
+from dsl_core.simulation.scenes.catalogue import make_scene
+from dsl_core.simulation.scenes.truth import Scene
 from dsl_core.simulation.world import World
 
 #: Where a stage stands when nothing is asked.

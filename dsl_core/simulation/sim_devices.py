@@ -27,7 +27,7 @@ from dsl_core.simulation.effects.tolerance import Tolerance
 from dsl_core.simulation.placing import Mishaps, TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.spot import spot_light
 from dsl_core.simulation.world import AMBIENT_DN_PER_MS, Clock, World
 

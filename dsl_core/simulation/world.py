@@ -18,7 +18,7 @@ from dsl_core.simulation.effects.path import LightPath, View
 from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.effects.view import make_view
-from dsl_core.simulation.truth import Scene, SceneTruth
+from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread
 
 #: Largest delay between asking the camera for an exposure and its start, ms, where it matters.

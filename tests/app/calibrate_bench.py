@@ -8,16 +8,17 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from app.controllers.calibrate import CalibrateController
-from app.controllers.campaign import Kinds
-from app.controllers.rig import RigController
-from app.controllers.wizard import WizardController
-from app.jobs.base import InlineRunner, JobRunner
-from app.state.calibrate import CalibrateState, Row
-from app.state.rig import RigChoice, RigState
-from app.state.wizard import WizardState
-from app.views import RecordingNotifier
-from dsl_core.campaign.recipe import Recipe
+from dsl_app.calibrate.campaign import Kinds
+from dsl_app.calibrate.controller import CalibrateController
+from dsl_app.calibrate.state import CalibrateState, Row
+from dsl_app.calibrate.wizard.controller import WizardController
+from dsl_app.calibrate.wizard.state import WizardState
+from dsl_app.connection.controller import RigController
+from dsl_app.connection.state import RigChoice, RigState
+from dsl_app.shared.jobs.base import InlineRunner, JobRunner
+from dsl_app.shared.notify import RecordingNotifier
+
+from dsl_core.campaign.common.recipe import Recipe
 from dsl_core.campaign.recipes import _build
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
-from dsl_core.io.origin import rig_notes
-from dsl_core.io.result_file import save_result
+from dsl_core.io.result.result_file import save_result
+from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.presets import PRESETS
+from dsl_core.workflows import sessions
 
 QUICK = next(preset.plan for preset in PRESETS if preset.key == "quick")
 

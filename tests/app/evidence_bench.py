@@ -7,14 +7,14 @@ from typing import Any, cast
 
 import numpy as np
 import pyqtgraph as pg
+from dsl_app.calibrate.evidence.base import Evidence, make_evidence
+from dsl_app.calibrate.evidence.parts import ChartBox
+from dsl_app.shared.theme import DARK, LIGHT, Theme
 from pytestqt.qtbot import QtBot
 
-from app.theme import DARK, LIGHT, Theme
-from app.wizards.evidence import Evidence, make_evidence
-from app.wizards.evidence_parts import ChartBox
 from dsl_core.campaign.session import CalibrationSession
-from dsl_core.model.accepted import AcceptedCalibration
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.spectral import SpectralCurve
 
 THEMES = (LIGHT, DARK)

@@ -12,26 +12,26 @@ import time
 import traceback
 from pathlib import Path
 
+from dsl_app.calibrate.campaign_box import NewCampaignDialog
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.calibrate.state import RowState
+from dsl_app.calibrate.wizard.board_edit import BoardEdit
+from dsl_app.calibrate.wizard.state import Doing
+from dsl_app.calibrate.wizard.window import CalibrationWizard
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.connection.state import Link
+from dsl_app.results.export_dialog import ExportDialog
+from dsl_app.results.page import ResultsPage
+from dsl_app.results.state import ResultsState, View
+from dsl_app.rig.page import RigPage
+from dsl_app.scan.page import ScanPage
+from dsl_app.scan.state import Phase
+from dsl_app.shell.application import ExceptionHook, make_application, make_window
+from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QPoint, QPointF, Qt, QtMsgType, qInstallMessageHandler
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QLineEdit, QWidget
 
-from app.application import ExceptionHook, make_application, make_window
-from app.composition import Composition, Wish
-from app.main_window import MainWindow
-from app.panels.calibrate_page import CalibratePage
-from app.panels.campaign_box import NewCampaignDialog
-from app.panels.export_dialog import ExportDialog
-from app.panels.results_page import ResultsPage
-from app.panels.rig_page import RigPage
-from app.panels.scan_page import ScanPage
-from app.state.calibrate import RowState
-from app.state.results import ResultsState, View
-from app.state.rig import Link
-from app.state.scan import Phase
-from app.state.wizard import Doing
-from app.wizards.board_edit import BoardEdit
-from app.wizards.wizard import CalibrationWizard
 from tests.app.beam_reader import BeamReader, screen_of
 from tests.app.person import (
     choose,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.jobs.base import Job
+from dsl_app.shared.jobs.base import Job
 
 
 class Later:

@@ -6,12 +6,12 @@ import sys
 import threading
 
 import numpy as np
+from dsl_app.connection.projector_window import ProjectorWindow, ScreenProjector, mirrors, pixel_size
 from numpy.typing import NDArray
 from PySide6.QtCore import QCoreApplication, QTimer
 from PySide6.QtGui import QGuiApplication, QImage, QScreen
 from PySide6.QtWidgets import QApplication
 
-from app.projector_window import ProjectorWindow, ScreenProjector, mirrors, pixel_size
 from dsl_core.devices.base import Projector, ProjectorInfo
 from dsl_core.errors import DeviceError
 from tests.app.two_screens import PROJECTOR, plug, set_monitor, unplug

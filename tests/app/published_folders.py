@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from dsl_core import exchange, pipeline
+from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.published import export_calibration
 from dsl_core.io.rig_file import save_rig
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.presets import PRESETS
+from dsl_core.workflows import exchange
 
 QUICK = next(preset.plan for preset in PRESETS if preset.key == "quick")
 

@@ -7,15 +7,16 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.controllers.forecast import ForecastController
-from app.controllers.rig import RigController
-from app.controllers.scan import ScanController
-from app.jobs.base import InlineRunner, JobRunner
-from app.state.forecast import ForecastState
-from app.state.rig import RigChoice, RigState
-from app.state.scan import ScanState
-from app.state.undo import UndoStack
-from app.views import RecordingNotifier
+from dsl_app.connection.controller import RigController
+from dsl_app.connection.state import RigChoice, RigState
+from dsl_app.scan.controller import ScanController
+from dsl_app.scan.forecast.controller import ForecastController
+from dsl_app.scan.forecast.state import ForecastState
+from dsl_app.scan.state import ScanState
+from dsl_app.shared.jobs.base import InlineRunner, JobRunner
+from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.undo import UndoStack
+
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.model.plan import CapturePlan, LineComb
 from dsl_core.model.presets import PRESETS

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.io.result_file import save_result
+from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import Flag, build_result
 from dsl_core.optics.colour import reflectance_to_srgb
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from app.jobs.base import InlineRunner, Job
+from dsl_app.shared.jobs.base import InlineRunner, Job
 
 
 class WaitingRunner(InlineRunner):

@@ -41,7 +41,7 @@ def imported() -> Iterator[str]:
             elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
                 names = [node.module]
             for name in (name.partition(".")[0] for name in names):
-                if name not in sys.stdlib_module_names and name not in ("dsl_core", "app"):
+                if name not in sys.stdlib_module_names and name not in ("dsl_core", "dsl_app"):
                     yield canonicalize_name(DISTRIBUTIONS.get(name, name))
 
 

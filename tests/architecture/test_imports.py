@@ -40,7 +40,7 @@ def test_import_contracts_hold() -> None:
 
 
 def test_no_module_imports_itself_in_a_circle() -> None:
-    graph = grimp.build_graph("dsl_core", "app", cache_dir=None)
+    graph = grimp.build_graph("dsl_core", "dsl_app", cache_dir=None)
     imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     try:
         graphlib.TopologicalSorter(imports).prepare()

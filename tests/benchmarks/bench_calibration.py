@@ -22,13 +22,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.evaluation.summary import Evaluation
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.spectra import chain_response
+from dsl_core.workflows import sessions
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.twin_scan import twin_scan
 

@@ -25,8 +25,8 @@ from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
 from dsl_core.simulation.effects.catalogue import USUAL, Choice
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 from tests.benchmarks.common import NoisyScan, options, print_table, write_json
 

@@ -12,8 +12,8 @@ from itertools import product
 import numpy as np
 import torch
 
-from dsl_core.calibration.correspondence import PUBLISHED_NM, fit_grid, sample_grating
-from dsl_core.calibration.residual import MAX_DEGREE, WAVELENGTH_RANGE_NM
+from dsl_core.calibration.film.correspondence import PUBLISHED_NM, fit_grid, sample_grating
+from dsl_core.calibration.film.residual import MAX_DEGREE, WAVELENGTH_RANGE_NM
 from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import Correspondence, GratingModel, GridModel, HybridModel

@@ -21,8 +21,9 @@ def main() -> None:
     wanted = options(__doc__).parse_args()
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     os.environ.setdefault("QT_API", "pyside6")
-    from app.application import make_application, set_theme
-    from app.panels.live_view import LiveView
+    from dsl_app.rig.live_view import LiveView
+    from dsl_app.shell.application import make_application, set_theme
+
     from dsl_core.devices.base import CameraInfo
     from dsl_core.model.frames import Frame
 

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.capture.runner import Runner
 from dsl_core.capture.sink import MemorySink
 from dsl_core.evaluation.summary import Evaluation
@@ -19,6 +19,7 @@ from dsl_core.model.presets import PRESETS
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import LATENCY_MS, open_twin
+from dsl_core.workflows import sessions
 from tests.benchmarks.common import options, print_table, write_json
 
 SIZE = "445x290"

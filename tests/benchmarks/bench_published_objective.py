@@ -16,13 +16,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.model.result import build_result
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction.published_objective import AdamOptions, PublishedReconstruction
-from dsl_core.reconstruction.spectra import Pixels, SpectralReconstruction
+from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
+from dsl_core.reconstruction.spectral.spectra import Pixels, SpectralReconstruction
+from dsl_core.workflows import sessions
 from tests.cases.twin_scan import solver_input, twin_scan
 
 SIZE = "445x290"

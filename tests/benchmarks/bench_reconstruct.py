@@ -23,10 +23,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
+from dsl_core.workflows import sessions
 from tests.benchmarks.common import options, print_table, write_json
 
 ROOT = Path(__file__).parents[2]
@@ -66,7 +67,7 @@ def job(kind: str, folder: Path, step_nm: float) -> dict[str, Any]:
 
 def read_all(folder: Path, step_nm: float) -> dict[str, Any]:
     """Read and check every frame, and nothing else."""
-    from dsl_core.io.session import SessionReader
+    from dsl_core.io.scan.session import SessionReader
 
     reader = SessionReader(folder)
     return {"frames": sum(1 for _ in reader.read_many(reader.plan.shots()))}
@@ -75,7 +76,7 @@ def read_all(folder: Path, step_nm: float) -> dict[str, Any]:
 def save_all(folder: Path, step_nm: float) -> dict[str, Any]:
     """From session to saved result, stage by stage."""
     from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.io.result_file import save_result
+    from dsl_core.io.result.result_file import save_result
 
     timer = StageTimer()
     result = sessions.reconstruct_session(folder, timer=timer)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dsl_core.io.export import export_csv, formats
-from dsl_core.io.result_file import load_result, save_result
+from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.result import Reach, build_result
 
 if TYPE_CHECKING:

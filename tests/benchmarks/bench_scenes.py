@@ -8,7 +8,7 @@ import numpy as np
 
 from dsl_core.optics.colour import reflectance_to_srgb
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scenes import make_scene, scene_catalogue
+from dsl_core.simulation.scenes.catalogue import make_scene, scene_catalogue
 
 CAMERA = published_rig().camera
 CENTRE_MM = published_rig().pose.projector_centre_mm

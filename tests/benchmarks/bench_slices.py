@@ -18,9 +18,9 @@ from dsl_core.model.plan import GrayCode, XorCode
 from dsl_core.patterns.gray_code import code_image
 from dsl_core.patterns.xor_code import xor_image
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.scenes import make_scene
-from dsl_core.simulation.spectral_tables import BROAD, Slicing
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.rendering.spectral_tables import BROAD, Slicing
+from dsl_core.simulation.scenes.catalogue import make_scene
 from tests.benchmarks.common import options, print_table, write_json
 
 SIZE_PX, PROJECTOR_PX, LEVEL, EXPOSURE_MS = (222, 145), (640, 360), np.uint8(204), 1000 / 3
@@ -53,14 +53,14 @@ def renderer(slicing: Slicing) -> Renderer:
     rig = published_rig()
     rig = rig.model_copy(update={"camera": rig.camera.resized(*SIZE_PX)})
     truth = make_scene("color-checker").render(rig.camera, rig.pose.projector_centre_mm)
-    with patch("dsl_core.simulation.renderer.BROAD", slicing):
+    with patch("dsl_core.simulation.rendering.renderer.BROAD", slicing):
         return Renderer(rig, truth)
 
 
 def seconds(view: Renderer, slicing: Slicing, image: Image) -> tuple[NDArray[np.float32], float]:
     """A frame, and CPU seconds that it takes."""
     runs = []
-    with patch("dsl_core.simulation.renderer.BROAD", slicing):
+    with patch("dsl_core.simulation.rendering.renderer.BROAD", slicing):
         for _ in range(3):
             started = time.process_time()
             frame = view.expected(image)

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.devices.base import DeviceRig
 from dsl_core.evaluation.summary import Evaluation, Truth, interior
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, Calibration, calibration
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.result import DEPTH_INVALID, Reach
 from dsl_core.model.rig import Rig
@@ -30,9 +30,10 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
 from dsl_core.reconstruction.scan_result import assemble, known_pixels
-from dsl_core.reconstruction.spectra import SpectralReconstruction
-from dsl_core.reconstruction.spectral_solver import Prior
+from dsl_core.reconstruction.spectral.solver import Prior
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.simulation.sim_devices import open_twin
+from dsl_core.workflows import sessions
 from tests.benchmarks.common import options, print_table, write_json
 
 if TYPE_CHECKING:

@@ -15,12 +15,12 @@ from itertools import product
 import numpy as np
 import torch
 
-from dsl_core.calibration.depth_stage import StageData, StageFilter, fit_first_orders
-from dsl_core.calibration.film import OrderSamples
-from dsl_core.calibration.line_samples import LineFrames
-from dsl_core.calibration.residual import choose_residual
-from dsl_core.calibration.stage_grid import fit_stage_grid
-from dsl_core.campaign.stage_scans import lines_on_plane
+from dsl_core.calibration.film.depth_stage import StageData, StageFilter, fit_first_orders
+from dsl_core.calibration.film.film import OrderSamples
+from dsl_core.calibration.film.line_samples import LineFrames
+from dsl_core.calibration.film.residual import choose_residual
+from dsl_core.calibration.film.stage_grid import fit_stage_grid
+from dsl_core.campaign.depth_stage.stage_scans import lines_on_plane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import CapturePlan, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Film, Rig
@@ -30,7 +30,7 @@ from dsl_core.progress import NoProgress
 from dsl_core.simulation.bandpass_filters import measured_transmissions, true_transmission
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 from tests.benchmarks.common import NoisyScan, options, print_table, render_plan, write_json
 

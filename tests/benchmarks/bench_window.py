@@ -42,7 +42,8 @@ def main() -> None:
 
 
 def _measure(material: Path, only: list[str], trace: Path | None, quick: bool) -> dict[str, Any]:
-    from app.application import make_application
+    from dsl_app.shell.application import make_application
+
     from tests.benchmarks.window_figures import memory_of, result_figures, start_figures, turn_cloud
     from tests.benchmarks.window_jobs import WindowJobs
     from tests.screens.look import Look
@@ -82,7 +83,7 @@ _SLOW = ("geometry", "depth-stage", "bandpass")
 
 def _full_result(folder: Path) -> Path:
     """A result of the published size."""
-    from dsl_core.io.result_file import save_result
+    from dsl_core.io.result.result_file import save_result
     from tests.benchmarks.bench_result_io import synthetic_result
 
     path = folder / "full.zarr"

@@ -9,21 +9,21 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from dsl_app.compare.page import ComparePage
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.results.page import ResultsPage
+from dsl_app.scan.page import ScanPage
+from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.jobs.qt_runner import WORKERS
+from dsl_app.shared.widgets.late import Late
+from dsl_app.shell.application import ExceptionHook, make_window
+from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QDrag
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDialog, QWidget
 
-from app.application import ExceptionHook, make_window
-from app.composition import Composition, Wish
-from app.jobs.base import Job
-from app.jobs.qt_runner import WORKERS
-from app.main_window import MainWindow
-from app.panels.compare_page import ComparePage
-from app.panels.results_page import ResultsPage
-from app.panels.scan_page import ScanPage
-from app.state.rig import Link, RigChoice
-from app.widgets.late import Late
 from dsl_core.progress import Progress
 
 RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "112x72")))

@@ -56,7 +56,8 @@ def main() -> None:
 
 
 def _soak(minutes: float, seed: int, theme: str) -> int:
-    from app.application import keep_house, make_application
+    from dsl_app.shell.application import keep_house, make_application
+
     from tests.benchmarks.random_person import RandomPerson
 
     application = make_application([])

@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+from dsl_app.results.cloud.scene import TurnedScene
+from dsl_app.results.page import ResultsPage
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from app.panels.results_page import ResultsPage
-from app.panels.scene import TurnedScene
 from tests.screens.stage import Stage
 
 #: Between two moves of a mouse, s.
@@ -30,9 +30,9 @@ MOUSE_S = 0.008
 #: Runs in a process of its own, up to the first picture on the screen, and to that of the first page.
 TO_THE_SCREEN = """
 import os, time
-import app.__main__
-from app.application import ExceptionHook, make_application, make_window
-from app.composition import IMPORTS, Composition, Wish
+import dsl_app.__main__
+from dsl_app.shell.application import ExceptionHook, make_application, make_window
+from dsl_app.composition.window import IMPORTS, Composition, Wish
 application = make_application([])
 composition = Composition(Wish())
 window = make_window(composition.pages, commands=composition.commands, imports=IMPORTS)

@@ -8,18 +8,19 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from app.application import keep_house
-from app.controllers.scan import ScanController
-from app.jobs.warm_up import WarmUp
-from app.panels.compare_page import ComparePage
-from app.panels.results_page import ResultsPage
-from app.panels.rig_page import RigPage
-from app.panels.scan_page import ScanPage
-from app.state.calibrate import ABOUT
-from app.state.rig import Link, RigChoice
-from app.state.scan import Phase
-from app.state.wizard import Doing
-from app.wizards.wizard import CalibrationWizard
+from dsl_app.calibrate.state import ABOUT
+from dsl_app.calibrate.wizard.state import Doing
+from dsl_app.calibrate.wizard.window import CalibrationWizard
+from dsl_app.compare.page import ComparePage
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.results.page import ResultsPage
+from dsl_app.rig.page import RigPage
+from dsl_app.scan.controller import ScanController
+from dsl_app.scan.page import ScanPage
+from dsl_app.scan.state import Phase
+from dsl_app.shell.application import keep_house
+from dsl_app.shell.warm_up import WarmUp
+
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.plan import LineComb
 from tests.benchmarks.stall_watch import Stalls, StallWatch

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.campaign.bandpass import BandpassRecipe
-from dsl_core.campaign.recipe import Bench
-from dsl_core.campaign.step_scan import scan_of
+from dsl_core.campaign.bandpass.recipe import BandpassRecipe
+from dsl_core.campaign.common.recipe import Bench
+from dsl_core.campaign.common.step_scan import scan_of
 from dsl_core.errors import CalibrationError
-from dsl_core.model.bandpass import BandpassCalibration
+from dsl_core.model.calibration.bandpass import BandpassCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
 from dsl_core.progress import NoProgress

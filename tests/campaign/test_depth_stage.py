@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.campaign.depth_stage import NOTE_NAME, DepthStageRecipe
-from dsl_core.campaign.recipe import Bench
-from dsl_core.campaign.step_scan import scan_of
+from dsl_core.campaign.common.recipe import Bench
+from dsl_core.campaign.common.step_scan import scan_of
+from dsl_core.campaign.depth_stage.recipe import NOTE_NAME, DepthStageRecipe
 from dsl_core.errors import CalibrationError
-from dsl_core.model.chain import ChainCorrection
-from dsl_core.model.depth_stage import DepthStageCalibration
+from dsl_core.model.calibration.chain import ChainCorrection
+from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel, correspondence, zero_order

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.drift import smooth_part
+from dsl_core.calibration.drift.geometry import smooth_part
 from dsl_core.campaign.drift import drift_figures, quick_plan
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.figure import failures

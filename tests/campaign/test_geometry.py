@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.calibration.pose_series import observe_series, picture_gamma
+from dsl_core.calibration.geometry.pose_series import observe_series, picture_gamma
 from dsl_core.campaign.assembly import nominal_rig
-from dsl_core.campaign.board_poses import default_poses, in_view
-from dsl_core.campaign.geometry import GeometryRecipe, read_pose
-from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.geometry.board_poses import default_poses, in_view
+from dsl_core.campaign.geometry.recipe import GeometryRecipe, read_pose
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Charuco, Checkerboard
-from dsl_core.model.geometry_calibration import GeometryCalibration
+from dsl_core.model.calibration.geometry import GeometryCalibration
+from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.placement import Placement
-from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import project, rays_at
 from dsl_core.progress import NoProgress

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.campaign.recipe import Bench
+from dsl_core.campaign.common.recipe import Bench
 from dsl_core.campaign.recipes import load_recipe
-from dsl_core.campaign.selftest import SelfTestRecipe, run_selftest
-from dsl_core.campaign.selftest_store import ARCHIVE_NAME
+from dsl_core.campaign.selftest.recipe import SelfTestRecipe, run_selftest
+from dsl_core.campaign.selftest.store import ARCHIVE_NAME
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DeviceError, StoreError
+from dsl_core.model.calibration.selftest import Measured, SelfTest
 from dsl_core.model.figure import Figure, failures
-from dsl_core.model.selftest import Measured, SelfTest
 from dsl_core.progress import CallbackProgress, CancelToken, NoProgress
 from dsl_core.simulation.faults import FaultPlan, with_faults
 from dsl_core.simulation.published_rig import published_rig

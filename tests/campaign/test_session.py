@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from dsl_core.campaign.assembly import accepted_calibrations, assemble, nominal_rig
+from dsl_core.campaign.common.recipe import Recipe, Step
 from dsl_core.campaign.guide import calibrate_all, run_calibration
-from dsl_core.campaign.recipe import Recipe, Step
 from dsl_core.campaign.recipes import _build, _value
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.base import CameraInfo, DeviceRig
@@ -19,7 +19,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, Cancelled, StoreError
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import load_rig, save_rig
-from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.progress import NoProgress
 from tests.cases.fake_recipe import FakeRecipe

@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.campaign.color_checker import ColorCheckerRecipe
-from dsl_core.campaign.emission_readings import DRIVE
-from dsl_core.campaign.recipe import Bench, Recipe
-from dsl_core.campaign.spectralon import SpectralonRecipe
+from dsl_core.campaign.color_checker.recipe import ColorCheckerRecipe
+from dsl_core.campaign.common.recipe import Bench, Recipe
+from dsl_core.campaign.spectralon.emission_readings import DRIVE
+from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
 from dsl_core.model.base import Record
-from dsl_core.model.color_checker import ColorCheckerCalibration
+from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
+from dsl_core.model.calibration.spectralon import SpectralonCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
-from dsl_core.model.spectralon import SpectralonCalibration
 from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.spectra import chain_response
 from dsl_core.progress import NoProgress

@@ -8,7 +8,7 @@ import pytest
 
 from dsl_core.campaign.recipes import recipe_names
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 

@@ -12,7 +12,7 @@ from dsl_core.capture.drift import pick_reference_shots
 from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
-from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 

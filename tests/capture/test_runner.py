@@ -18,7 +18,7 @@ from dsl_core.capture.sink import MemorySink
 from dsl_core.capture.status import State, Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DeviceError, PlanError, StoreError
-from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.progress import CallbackProgress

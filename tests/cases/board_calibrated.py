@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from dsl_core.calibration.bundle import rotation_of
-from dsl_core.calibration.geometric import calibrate_geometry
-from dsl_core.calibration.projector_corners import PoseObservation
+from dsl_core.calibration.geometry.bundle import rotation_of
+from dsl_core.calibration.geometry.projector_corners import PoseObservation
+from dsl_core.calibration.geometry.solve import calibrate_geometry
 from dsl_core.model.board import Checkerboard, corner_positions_mm
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import project

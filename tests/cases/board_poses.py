@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.bundle import rotation_of
-from dsl_core.calibration.projector_corners import PoseObservation
+from dsl_core.calibration.geometry.bundle import rotation_of
+from dsl_core.calibration.geometry.projector_corners import PoseObservation
 from dsl_core.model.board import Checkerboard, corner_positions_mm
+from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.plan import GrayCode
-from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.optics.pinhole import project
 from dsl_core.patterns.gray_code import code_images
 

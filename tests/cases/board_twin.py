@@ -7,14 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.campaign.board_poses import BoardPose, outline_mm
+from dsl_core.campaign.geometry.board_poses import BoardPose, outline_mm
 from dsl_core.model.board import Checkerboard
+from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import GrayCode
-from dsl_core.model.pose_frames import PoseFrames
 from dsl_core.optics.pinhole import project
 from dsl_core.patterns.gray_code import code_image, frame_count
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 
 BOARD = Checkerboard(columns=11, rows=7, square_mm=20.0)

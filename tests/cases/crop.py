@@ -10,7 +10,7 @@ import torch
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.rig import Rig
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.sim_devices import assemble
 from dsl_core.simulation.world import World
 

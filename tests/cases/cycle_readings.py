@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.selftest_readings import Readings
+from dsl_core.calibration.selftest.readings import Readings
 
 BLACK_DN = 260.0
 #: Channels (columns) of the camera under each LED (rows), DN per ms.

@@ -11,7 +11,7 @@ from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath, View
 from dsl_core.simulation.effects.view import make_view
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 from dsl_core.solve.threads import one_kernel_thread
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from dsl_core import pipeline
-from dsl_core.campaign.recipe import Bench, Step
+from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.errors import CalibrationError
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement

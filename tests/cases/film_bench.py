@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from dsl_core.campaign.recipe import Bench, Recipe, Step
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from dsl_core.io.result_file import save_result
+from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import Flag, build_result
 
 SHAPE = (36, 48)

@@ -14,7 +14,7 @@ from dsl_core.devices.conformance import CameraConformance, ProjectorConformance
 from dsl_core.devices.registry import open_rig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError, StoreError
-from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.campaign.products import write_calibration_report
-from dsl_core.evaluation.calibration_report import CalibrationContent, render_calibration_report
 from dsl_core.evaluation.cost import StageCost
-from dsl_core.evaluation.curves import HEIGHT
-from dsl_core.model.accepted import AcceptedCalibration
+from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
+from dsl_core.evaluation.report.curves import HEIGHT
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import CameraConditions, CaptureConditions, ProjectorConditions
 from dsl_core.model.figure import Figure

@@ -13,8 +13,8 @@ import pytest
 from matplotlib.image import imread
 
 from dsl_core.evaluation.cost import StageCost
-from dsl_core.evaluation.pictures import flag_picture, value_picture
-from dsl_core.evaluation.report import ReportContent, render_report
+from dsl_core.evaluation.report.pictures import flag_picture, value_picture
+from dsl_core.evaluation.report.scan_report import ReportContent, render_report
 from dsl_core.evaluation.summary import evaluate
 from dsl_core.evaluation.verdict import Goal, verdicts
 from dsl_core.model.plan import CapturePlan

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.annotations_file import (
+from dsl_core.io.result.annotations_file import (
     Annotations,
     PinRecord,
     RegionRecord,

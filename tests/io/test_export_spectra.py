@@ -9,7 +9,7 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.spectra import NamedSpectrum, export_spectra, spectra_as_text
-from dsl_core.io.reference_file import read_reference
+from dsl_core.io.spectra.reference_file import read_reference
 
 NM = np.arange(430.0, 661.0, 10.0)
 RAMP = np.linspace(0.1, 0.9, NM.size).astype(np.float32)

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core import exchange
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.published import export_dataset
-from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.model.rig import Rig
 from dsl_core.progress import CallbackProgress
+from dsl_core.workflows import exchange
 from tests.cases.small_rig import small_rig
 
 RIG = small_rig()

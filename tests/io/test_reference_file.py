@@ -10,7 +10,7 @@ import pytest
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.export.spectra import NamedSpectrum, export_spectra
-from dsl_core.io.reference_file import read_reference, read_references
+from dsl_core.io.spectra.reference_file import read_reference, read_references
 
 NM = np.arange(400.0, 701.0, 10.0)
 GRASS, BRICK = np.linspace(0.05, 0.4, NM.size), np.linspace(0.3, 0.6, NM.size)

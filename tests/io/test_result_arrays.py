@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import Cancelled
-from dsl_core.io.result_arrays import load_arrays
-from dsl_core.io.result_file import save_result
+from dsl_core.io.result.result_arrays import load_arrays
+from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import build_result
 from dsl_core.progress import CallbackProgress, CancelToken
 

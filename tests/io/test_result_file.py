@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 
 from dsl_core.errors import StoreError
-from dsl_core.io import result_file
-from dsl_core.io.result_file import load_result, save_result
+from dsl_core.io.result import result_file
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.cases.small_result import UNLIT, WAVELENGTHS_NM, small_result
 
 #: Half a step of the packed cubes (float32 rounding included); every other variable is exact.

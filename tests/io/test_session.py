@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io import session
-from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.io.scan import session
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 
@@ -164,7 +164,7 @@ def test_the_lock_of_a_killed_process_is_free(tmp_path: Path, plan: CapturePlan)
     folder = tmp_path / "scan.dsl"
     SessionWriter.create(folder, plan).close()
     code = (
-        "import sys, os; from pathlib import Path; from dsl_core.io.session_lock import SessionLock\n"
+        "import sys, os; from pathlib import Path; from dsl_core.io.scan.lock import SessionLock\n"
         "lock = SessionLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()"
     )
     with subprocess.Popen(

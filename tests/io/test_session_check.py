@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.frame_store import FrameStore
-from dsl_core.io.session import SessionReader, SessionWriter
-from dsl_core.io.session_check import find_problems, require_complete
+from dsl_core.io.scan.check import find_problems, require_complete
+from dsl_core.io.scan.frame_store import FrameStore
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectrum_file import read_spectrum
+from dsl_core.io.spectra.spectrum_file import read_spectrum
 
 NM = np.arange(380.0, 781.0, 5.0)
 VALUES = np.exp(-0.5 * ((NM - 550) / 40) ** 2) * 0.02

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.published import export_dataset
-from dsl_core.io.result_file import RESULT_FOLDER, save_result
-from dsl_core.io.session import SessionReader
+from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.io.staging import staged
 from dsl_core.model.plan import CapturePlan, LineComb, Shot
 from tests.cases.small_result import small_result

@@ -12,8 +12,8 @@ from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, Ord
 from dsl_core.optics.line_profile import band_profile
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.scenes.catalogue import make_scene
 
 BANDS_NM = np.arange(400.0, 701.0, 5.0)
 

@@ -26,8 +26,8 @@ from dsl_core.optics.sensor import digitise
 from dsl_core.patterns.images import pattern_image
 from dsl_core.reconstruction.geometry import Geometry, reconstruct_geometry
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
-from dsl_core.simulation.pattern_table import PatternTable
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendering.pattern_table import PatternTable
 from tests.cases.twin_scan import MemoryScan
 
 SIZE, DEPTH_MM = (96, 62), 700.0

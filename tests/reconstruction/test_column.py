@@ -11,12 +11,12 @@ from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.light_path import zero_order_profile
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.reconstruction.column import dark_offset, halo_of_line, refine
+from dsl_core.reconstruction.columns.column import dark_offset, halo_of_line, refine
 from dsl_core.reconstruction.depth import triangulate
 from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.scenes.catalogue import make_scene
 
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=318, frames=318)
 RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=31.0)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import torch
 
-from dsl_core.reconstruction.spectra import with_offset
-from dsl_core.reconstruction.spectral_solver import Prior, Spectra
-from dsl_core.reconstruction.spectral_system import without_offset
+from dsl_core.reconstruction.spectral.solver import Prior, Spectra
+from dsl_core.reconstruction.spectral.spectra import with_offset
+from dsl_core.reconstruction.spectral.system import without_offset
 
 FRAMES, BANDS = 12, 4
 

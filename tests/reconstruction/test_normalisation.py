@@ -10,7 +10,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.model.rig import Sensor
 from dsl_core.optics.sensor import bayer_channels, digitise
 from dsl_core.reconstruction.hdr import BlackFrame, black_frame
-from dsl_core.reconstruction.normalisation import channel_ratios
+from dsl_core.reconstruction.spectral.normalisation import channel_ratios
 
 SENSOR = Sensor(bayer="GBRG", read_noise_dn=1.0)
 SHAPE = (80, 60)

@@ -14,16 +14,16 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.noise import own_channel
 from dsl_core.planning.views import plane_view
 from dsl_core.planning.virtual import VirtualPixels
-from dsl_core.reconstruction.column import Column
-from dsl_core.reconstruction.first_orders import first_order_share
-from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.pattern_column import (
+from dsl_core.reconstruction.columns.column import Column
+from dsl_core.reconstruction.columns.first_orders import first_order_share
+from dsl_core.reconstruction.columns.pattern_column import (
     one_if_grey,
     radiance_profiles,
     refine_by_profiles,
     rounding_error,
 )
-from dsl_core.reconstruction.spectral_system import Bands, direct_light
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.spectral.system import Bands, direct_light
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.small_rig import small_rig
 

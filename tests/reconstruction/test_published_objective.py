@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from dsl_core.reconstruction.published_objective import AdamOptions, Measured, fit, objective
+from dsl_core.reconstruction.spectral.published_objective import AdamOptions, Measured, fit, objective
 
 
 def measured(truth: torch.Tensor, kappa: float) -> Measured:

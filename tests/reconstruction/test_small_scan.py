@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core import pipeline, sessions
-from dsl_core.calibration.correspondence import fit_grid, sample_grating
+from dsl_core import pipeline
+from dsl_core.calibration.film.correspondence import fit_grid, sample_grating
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, PlanError
 from dsl_core.evaluation.summary import Evaluation
@@ -19,10 +19,11 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.progress import CallbackProgress, CancelToken
-from dsl_core.reconstruction import column_maps
-from dsl_core.reconstruction.column_maps import ColumnFinder, ColumnMaps
-from dsl_core.reconstruction.published_objective import AdamOptions, PublishedReconstruction
-from dsl_core.reconstruction.spectra import SpectralReconstruction
+from dsl_core.reconstruction.columns import maps as column_maps
+from dsl_core.reconstruction.columns.maps import ColumnFinder, ColumnMaps
+from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from dsl_core.workflows import sessions
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
 GRID = WavelengthGrid(step_nm=10.0)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from torch import Tensor
 
-from dsl_core.reconstruction.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral_solver import (
+from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.solver import (
     Posterior,
     Prior,
     band_mean,

@@ -12,8 +12,8 @@ from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.image_formation import ImageFormation, OrderPath
 from dsl_core.patterns.images import spectral_profiles
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.spectra import LEAST_TILE, TILE, tile_shape
-from dsl_core.reconstruction.spectral_system import BandedAccumulator, Bands, band_halfwidth_px
+from dsl_core.reconstruction.spectral.spectra import LEAST_TILE, TILE, tile_shape
+from dsl_core.reconstruction.spectral.system import BandedAccumulator, Bands, band_halfwidth_px
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve import banded
 

@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from app.panels.calibrate_page import CalibratePage
-from app.panels.drift_window import DriftWindow
-from app.state.calibrate import DriftVerdict
-from app.state.rig import RigChoice
+from dsl_app.calibrate.drift_window import DriftWindow
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.calibrate.state import DriftVerdict
+from dsl_app.connection.state import RigChoice
+
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.figure import Figure
 from tests.screens.stage import CHART_RIG, Stage

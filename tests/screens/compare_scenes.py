@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from dsl_app.compare.page import ComparePage
+from dsl_app.compare.pair.state import Shown
+from dsl_app.compare.series.state import Kind
 
-from app.panels.compare_page import ComparePage
-from app.state.compare import Shown
-from app.state.series import Kind
 from tests.cases.stage_series import write_stage, write_sweep
 from tests.screens.stage import Stage
 

@@ -7,12 +7,14 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.settings import HOME_VARIABLE
-from dsl_core import pipeline, sessions
+from dsl_app.shared.settings import HOME_VARIABLE
+
+from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
-from dsl_core.io.origin import rig_notes
-from dsl_core.io.result_file import save_result
+from dsl_core.io.result.result_file import save_result
+from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.presets import PRESETS
+from dsl_core.workflows import sessions
 from tests.cases.tiny_campaign import command_all, give
 
 #: The rig of the scans: large enough to look at, small enough to be made while one waits.

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from dsl_app.results.again.dialog import AgainDialog
+from dsl_app.results.cloud.scene import TurnedScene
+from dsl_app.results.export_dialog import ExportDialog
+from dsl_app.results.library_dialog import LibraryDialog
+from dsl_app.results.page import ResultsPage
+from dsl_app.results.state import Quality, ResultsState, Seek, View
 from PySide6.QtWidgets import QDialog, QTabWidget
 
-from app.panels.again_dialog import AgainDialog
-from app.panels.export_dialog import ExportDialog
-from app.panels.library_dialog import LibraryDialog
-from app.panels.results_page import ResultsPage
-from app.panels.scene import TurnedScene
-from app.state.results import Quality, ResultsState, Seek, View
 from tests.io.test_reference_file import write_library
 from tests.screens.stage import Stage
 

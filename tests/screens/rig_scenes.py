@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.panels.rig_page import RigPage
-from app.state.rig import Link, RigChoice
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.rig.page import RigPage
+
 from tests.screens.stage import Stage
 
 

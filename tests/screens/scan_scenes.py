@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
+from dsl_app.connection.state import RigChoice
+from dsl_app.scan.controller import ScanController
+from dsl_app.scan.forecast.controller import ForecastController
+from dsl_app.scan.forecast.job import usual_candidates
+from dsl_app.scan.forecast.state import Measured
+from dsl_app.scan.page import ScanPage
+from dsl_app.scan.state import Phase, ScanState
 
-from app.controllers.forecast import ForecastController
-from app.controllers.forecast_job import usual_candidates
-from app.controllers.scan import ScanController
-from app.panels.scan_page import ScanPage
-from app.state.forecast import Measured
-from app.state.rig import RigChoice
-from app.state.scan import Phase, ScanState
 from dsl_core.planning.designed import DesignedSet, packed, save_design
 from dsl_core.simulation.faults import FaultPlan, with_faults
 from tests.screens.stage import CHART_RIG, Stage

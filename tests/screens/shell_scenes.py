@@ -7,13 +7,13 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from dsl_app.importing.dialog import TakeInDialog
+from dsl_app.session.keeper import SessionKeeper
+from dsl_app.session.records import ResultsPart, Session
+from dsl_app.shell.actions import PAGES
+from dsl_app.shell.tour import Tour
 from PySide6.QtWidgets import QMenu
 
-from app.actions import PAGES
-from app.controllers.session_keeper import SessionKeeper
-from app.panels.take_in_dialog import TakeInDialog
-from app.state.session import ResultsPart, Session
-from app.widgets.tour import Tour
 from tests.app.published_folders import make_folders
 from tests.screens.results_scenes import marked
 from tests.screens.stage import Stage

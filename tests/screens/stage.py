@@ -10,16 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from dsl_app.composition.window import IMPORTS, Composition, Wish
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.shared.settings import HOME_VARIABLE
+from dsl_app.shell.application import make_window
+from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QCursor, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QDialog, QPushButton, QWidget
 
-from app.application import make_window
-from app.composition import IMPORTS, Composition, Wish
-from app.main_window import MainWindow
-from app.settings import HOME_VARIABLE
-from app.state.rig import Link, RigChoice
 from tests.screens.look import Look
 from tests.screens.material import CHART, Material
 

@@ -9,7 +9,8 @@ import time
 import traceback
 from pathlib import Path
 
-from app.application import make_application
+from dsl_app.shell.application import make_application
+
 from tests.screens.look import Look
 from tests.screens.material import Material
 from tests.screens.scenes import SCENES

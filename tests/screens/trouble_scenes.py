@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from dsl_app.scan.state import Phase
+from dsl_app.shell.actions import PAGES
 
-from app.actions import PAGES
-from app.state.scan import Phase
 from tests.screens.results_scenes import opened
 from tests.screens.scan_scenes import PATIENT, planned_scan
 from tests.screens.stage import Stage

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from dsl_app.calibrate.evidence.parts import ChartBox
+from dsl_app.calibrate.evidence.selftest import READING
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.calibrate.state import ABOUT
+from dsl_app.calibrate.wizard.state import Doing, WizardState
+from dsl_app.calibrate.wizard.window import CalibrationWizard
 from PySide6.QtWidgets import QLineEdit
 
-from app.panels.calibrate_page import CalibratePage
-from app.state.calibrate import ABOUT
-from app.state.wizard import Doing, WizardState
-from app.wizards.evidence_parts import ChartBox
-from app.wizards.selftest_evidence import READING
-from app.wizards.wizard import CalibrationWizard
 from dsl_core.io.campaign_folder import CampaignFolder
 from tests.cases.tiny_campaign import with_options
 from tests.screens.calibrate_scenes import open_campaign

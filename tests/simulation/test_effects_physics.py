@@ -17,8 +17,8 @@ from dsl_core.simulation.effects.path import LightPath
 from dsl_core.simulation.effects.specular import highlight
 from dsl_core.simulation.effects.subsurface import profile, stays, within
 from dsl_core.simulation.effects.view import make_view
-from dsl_core.simulation.finish import Finish
-from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.scenes.finish import Finish
 from tests.cases.effect_scenes import HEIGHT, SIZE, WIDTH, pictures, world_of
 
 WHITE = np.full((HEIGHT, WIDTH), 255, np.uint8)

@@ -14,7 +14,7 @@ from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, 
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.planner import EffectPlan, describe, plan_effects
 from dsl_core.simulation.effects.tolerance import Tolerance
-from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from dsl_core.simulation.world import World
 from tests.cases.effect_scenes import HEIGHT, WIDTH, world_of

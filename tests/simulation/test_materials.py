@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.optics.colour import colour_library, delta_e_2000, reflectance_to_lab
-from dsl_core.simulation import materials
-from dsl_core.simulation.truth import FINE_NM
+from dsl_core.simulation.scenes import materials
+from dsl_core.simulation.scenes.truth import FINE_NM
 
 
 def at(spectrum: materials.Spectrum, wavelength_nm: float) -> float:

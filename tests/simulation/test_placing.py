@@ -10,7 +10,7 @@ from dsl_core.patterns.trial_pictures import trial_picture
 from dsl_core.simulation.bandpass_filters import LABELS_NM, true_transmission
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
-from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from dsl_core.simulation.world import World
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.calibration.projector_corners import refine_corners
-from dsl_core.calibration.targets import find_corners
+from dsl_core.calibration.geometry.boards import find_corners
+from dsl_core.calibration.geometry.projector_corners import refine_corners
 from dsl_core.errors import PlanError
 from dsl_core.model.board import Charuco, corner_positions_mm
-from dsl_core.model.pose_frames import PoseFrames
+from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.optics.pinhole import project
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scene_board import INK, PAPER, printed_board
-from dsl_core.simulation.scenes import SceneTruth, make_scene
+from dsl_core.simulation.scenes.board import INK, PAPER, printed_board
+from dsl_core.simulation.scenes.catalogue import SceneTruth, make_scene
 
 CENTRE = published_rig().pose.projector_centre_mm
 CAMERA = published_rig().camera.resized(445, 290)

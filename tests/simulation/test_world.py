@@ -16,12 +16,12 @@ from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.bandpass_filters import true_transmission
-from dsl_core.simulation.pattern_table import PatternTable, between
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.scenes import make_scene
+from dsl_core.simulation.rendering.pattern_table import PatternTable, between
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.rendering.spectral_tables import BROAD, NM, Slicing
+from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.sim_devices import SimCamera, SimSpectroradiometer, open_twin
-from dsl_core.simulation.spectral_tables import BROAD, NM, Slicing
 from dsl_core.simulation.world import World
 
 SIZE = (64, 42)
@@ -56,7 +56,7 @@ def test_lines_and_slices_render_the_same_light(
 ) -> None:
     image = bands_of_columns(band)
     lines = chart.expected(image)
-    monkeypatch.setattr("dsl_core.simulation.renderer.MAX_RUNS", 0)
+    monkeypatch.setattr("dsl_core.simulation.rendering.renderer.MAX_RUNS", 0)
     sliced = chart.expected(image)
     assert not np.array_equal(lines, sliced)
     scale = lines.max()
@@ -170,7 +170,7 @@ def test_broad_slices_are_close_to_fine_ones(
     image = np.empty((360, 640), np.uint8)
     image[:] = levels[:360, None] if pattern == "rows" else levels
     broad = renderer(small_rig()).expected(image)
-    monkeypatch.setattr("dsl_core.simulation.renderer.BROAD", Slicing(1, 1, 0.0))
+    monkeypatch.setattr("dsl_core.simulation.rendering.renderer.BROAD", Slicing(1, 1, 0.0))
     fine = renderer(small_rig()).expected(image)
     error = (broad - fine) / fine.max()
     assert BROAD.nm == 10

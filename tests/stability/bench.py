@@ -29,7 +29,7 @@ from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
 from dsl_core.reconstruction.scan_result import assemble, known_pixels
-from dsl_core.reconstruction.spectra import SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from tests.cases.crop import cropped_rig
 from tests.cases.twin_scan import MemoryScan
 

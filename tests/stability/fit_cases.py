@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from dsl_core.calibration.correspondence import GridSamples, fit_grid
-from dsl_core.calibration.efficiency import RatioSample, fit_efficiency
-from dsl_core.calibration.plane import fit_plane
-from dsl_core.calibration.tiles import tile_columns
-from dsl_core.calibration.zero_order import fit_zero_order
+from dsl_core.calibration.common.plane import fit_plane
+from dsl_core.calibration.common.tiles import tile_columns
+from dsl_core.calibration.film.correspondence import GridSamples, fit_grid
+from dsl_core.calibration.light.zero_order import fit_zero_order
+from dsl_core.calibration.orders.efficiency import RatioSample, fit_efficiency
 from dsl_core.model.plan import ScanLines
 from dsl_core.optics.filters import FINE_NM
 from dsl_core.optics.light_path import zero_order_profile
 from dsl_core.reconstruction.hdr import BlackFrame
-from dsl_core.reconstruction.normalisation import channel_ratios
+from dsl_core.reconstruction.spectral.normalisation import channel_ratios
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.smooth_functions import Equations, SmoothPrior, solve_smooth
 from tests.stability.case import Case, Outcome, spread

@@ -14,7 +14,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.spectral_system import ORDERS, BandedAccumulator, Bands
+from dsl_core.reconstruction.spectral.system import ORDERS, BandedAccumulator, Bands
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.banded import factorise, multiply
 from tests.stability.double_double import Floats

@@ -9,9 +9,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from dsl_core.reconstruction.dense_solver import solve_dense
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
-from dsl_core.reconstruction.spectral_solver import Prior, Spectra, solve_spectra
+from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
 from tests.stability.case import HONEST_RMS, Case, Outcome
 from tests.stability.double_double import Floats
 from tests.stability.exact_solution import System, exact_nodes, exact_tau

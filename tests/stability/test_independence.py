@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-import dsl_core.reconstruction.spectra as spectra
+import dsl_core.reconstruction.spectral.spectra as spectra
 from dsl_core import pipeline
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import CapturePlan, GrayCode

@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from dsl_core.model.result import SPECTRUM_INVALID
-from dsl_core.reconstruction.spectral_solver import Prior, solve_spectra
+from dsl_core.reconstruction.spectral.solver import Prior, solve_spectra
 from tests.stability.bench import Patch, Staged, comb_plan, grey, lines_plan, staged
 from tests.stability.case import silent_values
 

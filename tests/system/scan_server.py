@@ -22,7 +22,7 @@ from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.devices.replay import replay_rig
-from dsl_core.io.session import SessionWriter
+from dsl_core.io.scan.session import SessionWriter
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.patterns.images import pattern_image
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from dsl_core import pipeline, sessions
+from dsl_core import pipeline
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.evaluation.uncertainty import calibration
 from dsl_core.model.frames import FrameSource
@@ -18,8 +18,9 @@ from dsl_core.model.result import DEPTH_INVALID, Flag, Reach
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction import spectra
-from dsl_core.reconstruction.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral import spectra
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.workflows import sessions
 from tests.cases.crop import cropped_twin, one_torch_thread
 from tests.cases.twin_scan import MemoryScan, capture, solver_input, twin_scan
 

@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.io import atomic
-from dsl_core.io.frame_store import FrameStore
-from dsl_core.io.session import SessionReader, SessionWriter
+from dsl_core.io.scan.frame_store import FrameStore
+from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
@@ -283,7 +283,9 @@ def test_a_result_is_not_replaced_unasked(give: Give, finished: Path) -> None:
 def test_force_replaces_no_scan_and_nobodys_folder(
     give: Give, scan_copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("dsl_core.sessions.reconstruct_session", lambda *_: 1 / 0)  # told before long work
+    monkeypatch.setattr(
+        "dsl_core.workflows.sessions.reconstruct_session", lambda *_: 1 / 0
+    )  # told before long work
     onto_itself = give("reconstruct", scan_copy, "-o", scan_copy, "--force")
     assert (onto_itself.code, "holds a scan and is not replaced" in onto_itself.sentence) == (2, True)
     assert SessionReader(scan_copy).missing() == []
@@ -337,7 +339,7 @@ def test_a_full_disk_while_the_result_is_saved(
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("dsl_core.io.result_file._write_variable", full)
+    monkeypatch.setattr("dsl_core.io.result.result_file._write_variable", full)
     ending = give("reconstruct", finished / "scan.dsl", "-o", tmp_path / "a.zarr", "--depth-only")
     assert ending.code == 2
     assert "disk is full" in ending.sentence

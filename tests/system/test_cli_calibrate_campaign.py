@@ -13,7 +13,7 @@ from dsl_core.devices import registry
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 from tests.cases import fake_recipe
 
 from .conftest import Give

@@ -10,7 +10,7 @@ from dsl_core.devices.conditions import current_conditions
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import save_rig
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.rig import Rig
 
 from .conftest import SMALL_RIG, Give

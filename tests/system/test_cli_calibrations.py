@@ -10,7 +10,7 @@ from dsl_core.devices.conditions import current_conditions
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
-from dsl_core.model.accepted import CalibrationNote
+from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 

@@ -12,8 +12,8 @@ import pytest
 import dsl_core
 from dsl_core.cli.options import PlanChoice
 from dsl_core.io.plan_file import load_plan
-from dsl_core.io.result_file import load_result
-from dsl_core.io.session import SessionReader
+from dsl_core.io.result.result_file import load_result
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give

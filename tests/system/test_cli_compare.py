@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.io.result_file import load_result, save_result
+from dsl_core.io.result.result_file import load_result, save_result
 from tests.cases.small_result import small_result
 
 from .conftest import Give

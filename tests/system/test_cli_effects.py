@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dsl_core.cli import main
-from dsl_core.io.session_manifest import read_manifest
+from dsl_core.io.scan.manifest import read_manifest
 
 SMALL = ["-o", "size=64x42"]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.io.session import SessionReader
+from dsl_core.io.scan.session import SessionReader
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give, without_progress
 
@@ -65,7 +65,7 @@ def test_an_interrupted_reconstruction_leaves_nothing(
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dsl_core.io.result_file._write_variable", stop)
+    monkeypatch.setattr("dsl_core.io.result.result_file._write_variable", stop)
     ending = give("reconstruct", finished / "scan.dsl", "-o", tmp_path / "a.zarr", "--depth-only")
     assert ending.code == 130
     assert ending.sentence.startswith("Stopped.")

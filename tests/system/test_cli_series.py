@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dsl_core.series import position_of, seconds_of
+from dsl_core.workflows.series import position_of, seconds_of
 from tests.cases.stage_series import write_stage, write_sweep
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give

@@ -8,15 +8,15 @@ import pytest
 from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, DecodeError, StoreError
-from dsl_core.inspection import find_session, intensity_graph, read_block
 from dsl_core.io.calibration_library import HOME_VARIABLE, CalibrationLibrary
-from dsl_core.io.origin import model_notes, rig_notes
-from dsl_core.io.result_arrays import ResultArrays, load_arrays
-from dsl_core.io.result_file import save_result
-from dsl_core.io.session import SessionReader
+from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
+from dsl_core.io.result.result_file import save_result
+from dsl_core.io.scan.origin import model_notes, rig_notes
+from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.sessions import reconstruct_session
+from dsl_core.workflows.inspection import find_session, intensity_graph, read_block
+from dsl_core.workflows.sessions import reconstruct_session
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.session import SessionReader
-from dsl_core.io.session_check import find_problems
+from dsl_core.io.scan.check import find_problems
+from dsl_core.io.scan.session import SessionReader
 
 KILLS = 20
 ROOT = Path(__file__).parents[2]

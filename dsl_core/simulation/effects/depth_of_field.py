@@ -16,8 +16,8 @@ from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.machine import PLAIN_MS, PLAIN_NS, slowness
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.truth import Parts
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.scenes.truth import Parts
 
 Floats = NDArray[np.float64]
 #: Blurs are rendered in steps of this standard deviation, px, and mixed between.

@@ -11,7 +11,7 @@ from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.orders import FIRST, SECOND
 from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.spectral_tables import NM
+from dsl_core.simulation.rendering.spectral_tables import NM
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.patches import Patches
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.spectral_tables import NM
-from dsl_core.simulation.surface_light import surface_shading
-from dsl_core.simulation.truth import FINE_NM, Materials, Parts
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.rendering.spectral_tables import NM
+from dsl_core.simulation.rendering.surface_light import surface_shading
+from dsl_core.simulation.scenes.truth import FINE_NM, Materials, Parts
 
 Floats = NDArray[np.float64]
 #: Light is followed in bands of this width, nm, and over so many reflections.

@@ -18,8 +18,8 @@ from dsl_core.optics.sensor import raw_variance
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.spectral_tables import NM
-from dsl_core.simulation.surface_light import surface_shading
+from dsl_core.simulation.rendering.spectral_tables import NM
+from dsl_core.simulation.rendering.surface_light import surface_shading
 
 Floats = NDArray[np.float64]
 #: For what the renderer's tables add by rounding and interpolation.

@@ -12,7 +12,7 @@ from dsl_core.simulation.effects.base import Effect
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.spectral_tables import NM
+from dsl_core.simulation.rendering.spectral_tables import NM
 
 FIRST, SECOND = (1, -1), (2, -2)
 #: Pixels at which orders are traced, across and down, and how far columns may lie beside those between, px.

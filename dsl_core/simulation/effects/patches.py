@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.height_field import HeightField
-from dsl_core.simulation.surfaces import Surface
-from dsl_core.simulation.truth import Parts, SceneTruth
+from dsl_core.simulation.scenes.height_field import HeightField
+from dsl_core.simulation.scenes.surfaces import Surface
+from dsl_core.simulation.scenes.truth import Parts, SceneTruth
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.simulation.renderer import ORDERS
-from dsl_core.simulation.truth import Scene, SceneTruth
+from dsl_core.simulation.rendering.renderer import ORDERS
+from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 
 Image = NDArray[np.uint8]
 Signal = NDArray[np.float32]

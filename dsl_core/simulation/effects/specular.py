@@ -13,11 +13,11 @@ from dsl_core.simulation.effects.base import ExtraEffect
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
-from dsl_core.simulation.finish import Finish
-from dsl_core.simulation.renderer import Renderer
-from dsl_core.simulation.spectral_tables import NM
-from dsl_core.simulation.surface_light import surface_shading
-from dsl_core.simulation.truth import Materials, Parts
+from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.rendering.spectral_tables import NM
+from dsl_core.simulation.rendering.surface_light import surface_shading
+from dsl_core.simulation.scenes.finish import Finish
+from dsl_core.simulation.scenes.truth import Materials, Parts
 
 Floats = NDArray[np.float64]
 

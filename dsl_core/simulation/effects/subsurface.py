@@ -13,8 +13,8 @@ from dsl_core.simulation.effects.base import ExtraEffect
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage
-from dsl_core.simulation.finish import Finish
-from dsl_core.simulation.truth import Materials
+from dsl_core.simulation.scenes.finish import Finish
+from dsl_core.simulation.scenes.truth import Materials
 
 Floats = NDArray[np.float64]
 #: Light that wanders farther than 99.9 % of it, or than this, is taken to leave nearer, px.

@@ -11,7 +11,7 @@ from dsl_core.simulation.effects.base import Effect
 from dsl_core.simulation.effects.bound import EffectBound
 from dsl_core.simulation.effects.limits import SLACK, Limits
 from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.surface_light import surface_shading
+from dsl_core.simulation.rendering.surface_light import surface_shading
 
 
 class Shading(Effect):

@@ -12,7 +12,7 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.simulation.effects.depth_of_field import DepthOfField
 from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
-from dsl_core.simulation.renderer import Renderer
+from dsl_core.simulation.rendering.renderer import Renderer
 
 
 def make_view(path: LightPath) -> View:

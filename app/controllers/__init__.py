@@ -1,1 +1,0 @@
-"""What each page decides, without Qt."""

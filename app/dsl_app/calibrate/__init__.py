@@ -1,0 +1,1 @@
+"""The Calibrate page: campaigns, the library of calibrations and the drift check."""

@@ -1,0 +1,130 @@
+"""Which campaign is open, where its calibrations stand, and whether it is this rig's. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from dsl_app.calibrate.rows import read_rows
+from dsl_app.calibrate.state import CalibrateState, CampaignFacts, Row
+from dsl_app.calibrate.wizard.work import Recipes
+from dsl_app.connection.controller import RigController
+from dsl_app.connection.state import RigChoice
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.sentences import NO_RIG, sentence_of
+from dsl_core.campaign.assembly import campaign_recipes
+from dsl_core.campaign.recipes import recipe_names
+from dsl_core.devices.conditions import current_conditions
+from dsl_core.errors import DslError
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.conditions import CaptureConditions
+from dsl_core.progress import Progress
+
+#: Older calibrations are ageing, days.
+AGEING_DAYS = 90
+
+
+def _utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Which calibrations there are: their names in order, and how a campaign makes their recipes."""
+
+    names: tuple[str, ...] = ()
+    recipes: Recipes = campaign_recipes
+    ageing_days: int = AGEING_DAYS
+    clock: Callable[[], datetime] = _utc_now
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """The names, those of this installation if none are given."""
+        return self.names or recipe_names()
+
+    def rows(self, folder: Path, conditions: CaptureConditions | None = None) -> tuple[Row, ...]:
+        """Where every calibration of a campaign stands, read from disk; raises `StoreError`."""
+        campaign = CampaignFolder.open(folder)
+        return read_rows(campaign, self.order, conditions, self.ageing_days, self.clock())
+
+
+class CampaignController:
+    """Opens campaigns and keeps the rows of the one at hand up to date."""
+
+    def __init__(
+        self, state: CalibrateState, rig: RigController, runner: JobRunner, notifier: Notifier, kinds: Kinds
+    ) -> None:
+        self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._kinds = kinds
+        self._stops = [
+            rig.state.devices.changed.connect(lambda _: self.refresh()),
+            rig.state.choice.changed.connect(lambda _: self.refresh()),
+        ]
+
+    def open(self, folder: Path) -> None:
+        """Open a campaign that was begun before; a wrong folder is named."""
+        self._take(lambda: CampaignFolder.open(folder))
+
+    def begin(self, folder: Path) -> None:
+        """Begin a campaign of the rig that is chosen, in a new folder."""
+        choice = self._rig.state.choice.value
+        self._take(lambda: CampaignFolder.begin(folder, choice.name, dict(choice.options)))
+
+    def _take(self, make: Callable[[], CampaignFolder]) -> None:
+        try:
+            campaign = make()
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+            return
+        info = campaign.info
+        rig = RigChoice(info.rig, tuple(info.options.items()))
+        self.state.note.set("")
+        self.state.campaign.set(CampaignFacts(campaign.path.absolute(), rig))
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read anew where every calibration stands."""
+        facts, devices = self.state.campaign.value, self._rig.state.devices.value
+        self.state.foreign.set(facts is not None and devices is not None and not self._fits(facts))
+        self.state.trouble.set(self.obstacle())
+        if facts is None:
+            return
+        conditions = current_conditions(devices) if devices is not None and self._fits(facts) else None
+
+        def work(progress: Progress) -> tuple[Row, ...]:
+            progress.report("read the campaign", 0, 0)
+            return self._kinds.rows(facts.path, conditions)
+
+        def done(rows: tuple[Row, ...]) -> None:
+            if self.state.campaign.value == facts:
+                self.state.rows.set(rows)
+
+        self._runner.submit(Job("Read the campaign", work, done, self._tell, is_minor=True))
+
+    def _fits(self, facts: CampaignFacts) -> bool:
+        choice = self._rig.state.choice.value
+        return (choice.name, dict(choice.options)) == (facts.rig.name, dict(facts.rig.options))
+
+    def obstacle(self) -> str:
+        """What keeps from calibrating, empty for nothing."""
+        facts, devices = self.state.campaign.value, self._rig.state.devices.value
+        if facts is None:
+            return ""
+        if devices is not None and not self._fits(facts):
+            mine, known = self._rig.state.choice.value.words, facts.rig.words
+            return (
+                f"This campaign was begun with the rig {known}, but {mine} is connected. Connect the"
+                " campaign's rig, or open another campaign."
+            )
+        return NO_RIG if devices is None else ""
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+    def close(self) -> None:
+        """Follow the rig no more."""
+        for stop in self._stops:
+            stop()

@@ -1,0 +1,207 @@
+"""The head of the Calibrate page: which campaign is open, and what is done with all of it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.calibrate.commands import CalibrateCommands
+from dsl_app.calibrate.state import CalibrateState, CampaignFacts
+from dsl_app.connection.state import RigState
+from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_core.devices.base import DeviceRig
+
+NOTHING = (
+    "No campaign is open. A campaign is a folder that keeps all captures, fits and verdicts of one rig;"
+    " begin one, or open one that was begun."
+)
+
+
+class NewCampaignDialog(QDialog):
+    """Asks for the name and place of a campaign's folder."""
+
+    def __init__(self, home: Path, rig: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("New campaign")
+        self.resize(540, 200)
+        self.name = QLineEdit(_free_name(home))
+        self.name.setAccessibleName("Name of the campaign")
+        self.name.setToolTip("Name of the folder; the calibrated rig gets it in the library")
+        self.folder = QLineEdit(str(home))
+        self.folder.setAccessibleName("Folder of campaigns")
+        self.folder.setToolTip("Folder in which the campaign's own folder is made")
+        self.browse = QPushButton("Choose…")
+        self.browse.setToolTip("Choose the folder of campaigns")
+        self.browse.clicked.connect(self._browse)
+        self._text = label("", "warn")
+        self._text.setWordWrap(True)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
+        self.begin.setToolTip("Make the folder and begin the campaign")
+        buttons.accepted.connect(self.accept)
+        buttons.rejected.connect(self.reject)
+        row = QHBoxLayout()
+        row.addWidget(self.folder, 1)
+        row.addWidget(self.browse)
+        form = QFormLayout()
+        form.addRow("Name", self.name)
+        form.addRow("In folder", row)
+        form.addRow("Rig", label(rig, "muted"))
+        column = QVBoxLayout(self)
+        column.addLayout(form)
+        column.addWidget(self._text)
+        column.addStretch(1)
+        column.addWidget(buttons)
+        for field in (self.name, self.folder):
+            field.textChanged.connect(lambda _: self._check())
+        self.name.selectAll()
+
+    @property
+    def target(self) -> Path:
+        """The folder of the campaign."""
+        return Path(self.folder.text()).expanduser() / self.name.text().strip()
+
+    def _browse(self) -> None:
+        name = QFileDialog.getExistingDirectory(self, "Folder of campaigns", self.folder.text())
+        if name:
+            self.folder.setText(name)
+
+    def _check(self) -> None:
+        trouble = ""
+        if not self.name.text().strip() or "/" in self.name.text():
+            trouble = "Give the campaign a name without slashes."
+        elif self.target.exists():
+            trouble = f"{self.target.name} exists already in this folder. Choose another name, or open it."
+        self._text.setText(trouble)
+        self.begin.setEnabled(not trouble)
+
+
+class CampaignBox(QFrame):
+    """Which campaign is open; buttons for a new one, another one, everything, and the library.
+
+    ``folder`` is where new campaigns are proposed; ``begun`` tells that a person began one.
+    """
+
+    begun = Signal()
+
+    def __init__(self, state: CalibrateState, rig: RigState, commands: CalibrateCommands, home: Path) -> None:
+        super().__init__()
+        self._state, self._rig, self._commands, self._home = state, rig, commands, home
+        self._name, self._where = label("", "title"), label("", "muted")
+        self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._where.setWordWrap(True)
+        self.new = push_button("&New campaign…", "Begin a campaign of the rig at hand in a folder of its own")
+        self.open = push_button("&Open campaign…", "Go on with a campaign that was begun before")
+        self.everything = push_button(
+            "Calibrate &everything",
+            "Run all calibrations in order, without questions, on a rig that places targets itself",
+        )
+        self.everything.setProperty("role", "primary")
+        self.cancel = push_button("&Stop", "End at the next safe point; everything captured is kept")
+        self.keep = push_button(
+            "&Keep in library", "Assemble the rig as far as it is calibrated and keep it in the library"
+        )
+        self._progress = label("", "muted")
+        self._progress.setAccessibleName("Progress of calibrating everything")
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        words.addWidget(self._name)
+        words.addWidget(self._where)
+        words.addWidget(self._progress)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.addLayout(words, 1)
+        for button in (self.new, self.open, self.keep, self.cancel, self.everything):
+            row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
+
+    def _connect(self) -> None:
+        state, commands = self._state, self._commands
+        self.new.clicked.connect(lambda: self.ask_new())
+        self.open.clicked.connect(self._ask_open)
+        self.everything.clicked.connect(commands.run_everything)
+        self.cancel.clicked.connect(commands.cancel_everything)
+        self.keep.clicked.connect(commands.keep)
+        self.stops = [
+            state.campaign.follow(self._show_campaign),
+            state.everything.follow(lambda _: self._show_work()),
+            state.rows.follow(lambda _: self._show_work()),
+            state.foreign.follow(lambda _: self._show_work()),
+            self._rig.devices.follow(lambda _: self._show_work()),
+        ]
+
+    def ask_new(self) -> bool:
+        """Ask for a new campaign; whether one was begun."""
+        dialog = NewCampaignDialog(self._home, self._rig.choice.value.words, self)
+        before = self._state.campaign.value
+        wanted, target = dialog.exec() == QDialog.DialogCode.Accepted, dialog.target
+        # Else it would stay as long as the page; before its answer is read, it must not go.
+        dialog.deleteLater()
+        if not wanted:
+            return False
+        self._commands.begin_campaign(target)
+        return self._state.campaign.value != before
+
+    def _ask_open(self) -> None:
+        facts = self._state.campaign.value
+        start = self._home if facts is None else facts.path.parent
+        name = QFileDialog.getExistingDirectory(self, "Open a campaign", str(start))
+        if name:
+            self._commands.open_campaign(Path(name))
+
+    def _show_campaign(self, facts: CampaignFacts | None) -> None:
+        if facts is None:
+            self._name.setText("Calibrate")
+            self._where.setText(NOTHING)
+        else:
+            self._name.setText(facts.path.name)
+            # Zero-width spaces let long paths break at their slashes.
+            place = str(facts.path.parent).replace("/", "/" + chr(0x200B))
+            self._where.setText(f"in {place}  ·  rig {facts.rig.words}")
+        self._show_work()
+
+    def _show_work(self) -> None:
+        state, devices = self._state, self._rig.devices.value
+        running, open_ = bool(state.everything.value), state.campaign.value is not None
+        usable = open_ and devices is not None and not state.foreign.value and not running
+        self.everything.setVisible(not running)
+        self.everything.setEnabled(usable and _places_itself(devices))
+        self.keep.setVisible(open_ and not running)
+        self.keep.setEnabled(usable and any(row.state.is_accepted for row in state.rows.value))
+        self.cancel.setVisible(running)
+        for button in (self.new, self.open):
+            button.setEnabled(not running)
+        self._progress.setText(state.everything.value)
+        self._progress.setVisible(running)
+        set_role(self._progress, "warn" if state.everything.value == "stopping" else "muted")
+
+
+def _places_itself(devices: DeviceRig | None) -> bool:
+    return devices is not None and devices.place is not None
+
+
+def _free_name(home: Path) -> str:
+    """A name by the day that is not taken in a folder."""
+    stem = f"campaign-{datetime.now():%Y%m%d}"
+    name, count = stem, 1
+    while (home / name).exists():
+        count += 1
+        name = f"{stem}-{count}"
+    return name

@@ -1,0 +1,243 @@
+"""What the Calibrate page decides: the campaign, its rows, one wizard at a time, or everything. No Qt."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from dsl_app.calibrate.campaign import CampaignController, Kinds
+from dsl_app.calibrate.campaign_lock import CampaignLock
+from dsl_app.calibrate.everything import Everything, words_of
+from dsl_app.calibrate.library import LibraryController
+from dsl_app.calibrate.state import ABOUT, CalibrateState, CampaignFacts
+from dsl_app.calibrate.wizard.controller import WizardController
+from dsl_app.calibrate.wizard.state import WizardState
+from dsl_app.calibrate.words import calibrate_command
+from dsl_app.connection.controller import RIG, RigController
+from dsl_app.shared.evented import Event
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Offerer
+from dsl_app.shared.sentences import sentence_of
+from dsl_core.campaign.guide import calibrated_rig
+from dsl_core.campaign.products import Products, write_products
+from dsl_core.errors import DslError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.file_names import CAMPAIGN_NAME
+from dsl_core.progress import Progress
+
+NO_CAMPAIGN = "No campaign is open. Begin one, or open one that was begun."
+
+
+class CalibrateController:
+    """Opens campaigns and runs their calibrations; ``wizard_ready`` fires with each wizard to show."""
+
+    def __init__(
+        self,
+        state: CalibrateState,
+        rig: RigController,
+        runner: JobRunner,
+        notifier: Offerer,
+        library: CalibrationLibrary | None = None,
+        kinds: Kinds | None = None,
+    ) -> None:
+        self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._kinds = kinds or Kinds()
+        self._campaign = CampaignController(state, rig, runner, notifier, self._kinds)
+        self._store = library or CalibrationLibrary()
+        self.library = LibraryController(state, rig, runner, notifier, self._store)
+        self.wizard_ready: Event[tuple[WizardState, WizardController]] = Event()
+        self._wizard: WizardController | None = None
+        self._lock = CampaignLock()
+        self._everything = Everything(state, rig, self._kinds, self._store, self._ended)
+
+    # Campaign --------------------------------------------------------------------------------------
+
+    def open(self, path: Path) -> bool:
+        """Open a campaign by its folder or a file in it, or take a calibration's file into the library.
+
+        False for anything else.
+        """
+        folder = path.parent if path.name == CAMPAIGN_NAME else path
+        if (folder / CAMPAIGN_NAME).is_file():
+            self.open_campaign(folder)
+            return True
+        return self.library.offer(path)
+
+    def open_campaign(self, folder: Path) -> None:
+        """Open a campaign that was begun before; a wrong folder is named."""
+        if not self._is_busy():
+            self._campaign.open(folder)
+
+    def begin_campaign(self, folder: Path) -> None:
+        """Begin a campaign of the rig that is chosen, in a new folder."""
+        if not self._is_busy():
+            self._campaign.begin(folder)
+
+    def refresh(self) -> None:
+        """Read anew where every calibration stands."""
+        self._campaign.refresh()
+
+    def connect_rig(self) -> None:
+        """Connect the rig that the campaign was begun with."""
+        facts = self.state.campaign.value
+        if facts is not None and not self._is_busy():
+            self._rig.connect(facts.rig)
+
+    # One calibration -------------------------------------------------------------------------------
+
+    def run(self, name: str) -> None:
+        """Open the wizard of a calibration, which goes on where it was left."""
+        facts = self._ready()
+        if facts is None or not self._take_lock(facts.path):
+            return
+        title = ABOUT[name].title if name in ABOUT else name
+        state = WizardState(name, title)
+        wizard = WizardController(
+            state,
+            facts.path,
+            self._rig,
+            self._runner,
+            self._kinds.recipes,
+            lambda: (self._name_when_complete(facts.path), self._store),
+        )
+        self._wizard = wizard
+        self.state.opening.set(title)
+        state.closed.connect(lambda _: self._closed())
+
+        def failed(error: Exception) -> None:
+            self._closed()
+            self._notifier.tell("error", sentence_of(error))
+
+        wizard.open(lambda: self._opened(state, wizard), failed)
+
+    def _opened(self, state: WizardState, wizard: WizardController) -> None:
+        self.state.opening.set("")
+        self.wizard_ready.emit((state, wizard))
+
+    def _closed(self) -> None:
+        self._wizard = None
+        self.state.opening.set("")
+        self._lock.release()
+        self.refresh()
+        self.library.load()
+
+    def _name_when_complete(self, path: Path) -> str | None:
+        """The library's name of the campaign once all its calibrations are accepted; read from disk."""
+        return library_name(path) if all(r.state.is_accepted for r in self._kinds.rows(path)) else None
+
+    # Everything ------------------------------------------------------------------------------------
+
+    def run_everything(self) -> None:
+        """Run all calibrations in order on a rig that places its targets itself; goes on where it stood."""
+        facts, devices = self._ready(), self._rig.state.devices.value
+        if facts is None or devices is None:
+            return
+        if devices.place is None:
+            self._notifier.tell(
+                "info", "This rig cannot place its targets itself. Run the calibrations one by one."
+            )
+            return
+        if not self._take_lock(facts.path):
+            return
+        self._everything.run(facts.path, devices, library_name(facts.path))
+
+    def cancel_everything(self) -> None:
+        """Stop it at the next safe point; everything captured stays."""
+        self._everything.cancel()
+
+    def take_news(self) -> None:
+        """Say how far everything is; called by the window's clock."""
+        self._everything.take_news()
+
+    def _ended(self, note: str, error: Exception | None) -> None:
+        self._lock.release()
+        self.state.note.set(note)
+        self.refresh()
+        self.library.load()
+        if error is not None:
+            text = f"The calibration of everything stopped: {sentence_of(error)}"
+            self.state.note.set(text)
+            self._notifier.tell("error", text)
+
+    # The rig so far --------------------------------------------------------------------------------
+
+    def keep(self) -> None:
+        """Assemble the rig of everything accepted so far and keep it in the library."""
+        facts, devices = self._ready(), self._rig.state.devices.value
+        if facts is None or devices is None:
+            return
+
+        def work(progress: Progress) -> Products:
+            progress.report("assemble the rig", 0, 0)
+            campaign = CampaignFolder.open(facts.path)
+            recipes = self._kinds.recipes(campaign)
+            name = library_name(facts.path)
+            rig = calibrated_rig(campaign, devices, name, recipes)
+            return write_products(campaign, rig, name, recipes=recipes, library=self._store)
+
+        def done(made: Products) -> None:
+            self.state.note.set(words_of(made))
+            self.library.load()
+
+        self._runner.submit(Job("Keep the rig", work, done, self._tell))
+
+    # What keeps from it ----------------------------------------------------------------------------
+
+    def _ready(self) -> CampaignFacts | None:
+        """The campaign, when a calibration may run now; else the person is told why not."""
+        facts = self.state.campaign.value
+        if self._is_busy():
+            return None
+        trouble = NO_CAMPAIGN if facts is None else self._campaign.obstacle()
+        if trouble:
+            self._notifier.tell("warning", trouble)
+            return None
+        return facts
+
+    def _is_busy(self) -> bool:
+        """Whether a calibration runs; then the person is told which."""
+        running = "" if self._wizard is None else self._wizard.state.title
+        if self._everything.is_running:
+            running = "The calibration of everything"
+        if running:
+            self._notifier.tell("warning", f"{running} is still running. Finish or leave it first.")
+        return bool(running)
+
+    def _take_lock(self, path: Path) -> bool:
+        user = next((job for job in self._runner.active if job.exclusive == RIG), None)
+        if user is not None and not self._rig.state.live.value:
+            self._notifier.tell("warning", f"{user.title} uses the rig. Wait for it, or cancel it.")
+            return False
+        try:
+            self._lock.take(path)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+            return False
+        return True
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+    def command_line(self, name: str = "") -> str:
+        """The command that runs a calibration, or all of them."""
+        facts = self.state.campaign.value
+        return calibrate_command(name, facts, self._rig.state.choice.value)
+
+    def close(self) -> None:
+        """End what runs and follow the rig no more."""
+        self._campaign.close()
+        if self._wizard is not None:
+            self._wizard.leave()
+        self.cancel_everything()
+        self._lock.release()
+
+
+def library_name(folder: Path) -> str:
+    """The name a campaign's rig gets in the library.
+
+    >>> library_name(Path("a/room 12 & 13"))
+    'room 12 - 13'
+    """
+    name = re.sub(r"[^\w .+-]", "-", folder.name).lstrip(" .+-")
+    return name or "campaign"

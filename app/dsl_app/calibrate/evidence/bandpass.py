@@ -1,0 +1,175 @@
+"""Evidence of the bandpass filters: which filters were found, and the efficiency of the film's orders."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+
+from dsl_app.calibrate.evidence.base import Evidence
+from dsl_app.calibrate.evidence.curves import COVER, Named, draw_curves, draw_points
+from dsl_app.calibrate.evidence.parts import Cell, ChartBox, NumberTable, with_spread
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
+from dsl_core.model.spectral import SpectralCurve
+
+if TYPE_CHECKING:
+    from dsl_core.campaign.session import CalibrationSession
+    from dsl_core.model.base import Record
+    from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+#: An order stands out when its light is so many deviations above nothing.
+STANDS_OUT = 3.0
+CHANNELS = ("red", "green", "blue")
+HEADS = (
+    ("Asked, nm", "Nominal centre of the filter that was asked for"),
+    ("Passes, nm", "Effective wavelength of what its curve passes"),
+    ("Found, nm", "Where the places of its first orders say it is, with one standard deviation"),
+    ("Off, nm", "Found minus passes"),
+    ("Orders", "Orders of the film that stand out of the noise"),
+    ("Curve", "Whether its transmission was measured or is that of a nominal filter"),
+    ("Verdict", "What is wrong with the filter"),
+)
+
+
+class BandpassEvidence(Evidence):
+    """A table of filters above the efficiency of first orders, the bound of second ones, and the response."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._record: BandpassCalibration | None = None
+        self.table = NumberTable("Filters", HEADS, words=(4, 5, 6))
+        self.efficiency = ChartBox(
+            "Efficiency of first orders",
+            "Points are single filters, lines the fitted curves, both with 95 % bands; relative to the zero"
+            " order.",
+            "Of the zero order",
+            "Wavelength (nm)",
+        )
+        self.response = ChartBox(
+            "Response of the camera",
+            "Relative response of each channel with its 95 % band.",
+            "Response",
+            "Wavelength (nm)",
+        )
+        self.seconds = label("", "muted")
+        self.warnings = label("", "warn")
+        for words in (self.seconds, self.warnings):
+            words.setWordWrap(True)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        charts = QWidget()
+        row = QHBoxLayout(charts)
+        row.setContentsMargins(0, 6, 0, 0)
+        row.addWidget(self.efficiency, 1)
+        row.addWidget(self.response, 1)
+        parts = QSplitter(Qt.Orientation.Vertical)
+        parts.setChildrenCollapsible(False)
+        parts.addWidget(self.table)
+        parts.addWidget(charts)
+        parts.setSizes([180, 260])
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.warnings)
+        column.addWidget(parts, 1)
+        column.addWidget(self.seconds)
+
+    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
+        """Show a fit."""
+        assert isinstance(record, BandpassCalibration)
+        self._record = record
+        self._draw()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        super().apply_theme(theme)
+        for part in (self.table, self.efficiency, self.response):
+            part.apply_theme(theme)
+        self._draw()
+
+    def _draw(self) -> None:
+        record = self._record
+        if record is None:
+            return
+        self.table.fill([_row(each, record.warnings) for each in record.filters])
+        self.warnings.setText("\n".join(f"{_sentence(each)}." for each in record.warnings))
+        self.warnings.setVisible(bool(record.warnings))
+        self.efficiency.draw(lambda: self._draw_efficiency(record))
+        self.response.draw(lambda: self._draw_response(record))
+        self.seconds.setText(_second_orders(record))
+
+    def _draw_response(self, record: BandpassCalibration) -> None:
+        self.response.begin()
+        draw_curves(
+            self.response,
+            [
+                Named(name, colour, curve)
+                for name, colour, curve in zip(CHANNELS, RGB_COLOURS, record.response, strict=True)
+            ],
+        )
+
+    def _draw_efficiency(self, record: BandpassCalibration) -> None:
+        self.efficiency.begin()
+        colours = {1: self._theme.pins[0], -1: self._theme.pins[1]}
+        curves = [
+            Named(f"order {_signed(order)}", colour, record.efficiency[order])
+            for order, colour in colours.items()
+        ]
+        bound = Named("orders ±2, at most", self._theme.muted, _bound_of_seconds(record), dashed=True)
+        draw_curves(self.efficiency, [*curves, bound])
+        for order, colour in colours.items():
+            samples = [
+                (each.effective_nm, sample.ratio, sample.ratio_std)
+                for each in record.filters
+                for sample in each.orders
+                if sample.order == order
+            ]
+            if samples:
+                nm, ratio, std = np.array(samples).T
+                draw_points(self.efficiency, nm, ratio, std, colour)
+
+
+def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell | str]:
+    own = [warning for warning in warnings if warning.startswith(f"the filter of {each.filter_nm:g} nm:")]
+    found, off = "not found", ""
+    if each.found_nm is not None:
+        spread = "" if each.found_std_nm is None else f" ± {each.found_std_nm:.1f}"
+        found, off = f"{each.found_nm:.1f}{spread}", f"{each.found_nm - each.effective_nm:+.1f}"
+    orders = [sample.order for sample in each.orders if sample.ratio > STANDS_OUT * sample.ratio_std]
+    return [
+        f"{each.filter_nm:g}",
+        f"{each.effective_nm:.1f}",
+        Cell(found, "warn" if own else ""),
+        Cell(off, "warn" if own else ""),
+        ", ".join(map(_signed, sorted(orders))) or "none",
+        Cell("measured" if each.curve_measured else "nominal", "muted"),
+        Cell(_sentence(own[0].split(": ", 1)[1]), "warn") if own else Cell("as asked for", "good"),
+    ]
+
+
+def _bound_of_seconds(record: BandpassCalibration) -> SpectralCurve:
+    """What second orders stay below, with 95 % probability."""
+    share = record.second_order_share + COVER * record.second_order_share_std
+    nm = np.array(record.efficiency[1].wavelengths_nm)
+    return SpectralCurve.of(nm, share * np.maximum(*(record.efficiency[order].at(nm) for order in (1, -1))))
+
+
+def _second_orders(record: BandpassCalibration) -> str:
+    share, std = 100 * record.second_order_share, 100 * record.second_order_share_std
+    return (
+        f"Second orders: {share:.2f} ± {std:.2f} % of the first, at most {share + COVER * std:.2f} % (95 %)."
+        f" Blur of the projector {with_spread(record.blur_px, record.blur_std_px)} px."
+    )
+
+
+def _signed(order: int) -> str:
+    return f"{order:+d}".replace("-", "−")
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:]

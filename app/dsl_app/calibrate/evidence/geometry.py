@@ -1,0 +1,273 @@
+"""Evidence of the geometry: where corners were, the errors of every pose, and poses to leave out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QGraphicsRectItem,
+    QHBoxLayout,
+    QPushButton,
+    QSplitter,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.calibrate.evidence.base import Evidence
+from dsl_app.calibrate.evidence.curves import level_line
+from dsl_app.calibrate.evidence.parts import BAR, DOT, Cell, ChartBox, NumberTable, like_a_picture
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import label, set_role
+from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
+
+if TYPE_CHECKING:
+    from dsl_core.campaign.session import CalibrationSession
+    from dsl_core.model.base import Record
+    from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+#: Cells a side of the grid that coverage counts.
+CELLS = 8
+#: What a good calibration stays below, px; fewer poses than this say too little.
+LIMIT_PX, MIN_POSES = 0.5, 3
+HEADS = (
+    ("Pose", "Untick a pose to solve again without it"),
+    ("Corners", "Corners of the board that were found, and how many of them are outliers"),
+    ("Camera, px", "Rms error of the corners in the camera's picture"),
+    ("Projector, px", "Rms error of the corners in the projector's picture"),
+    ("At, mm", "Mean distance of the board along the camera's axis"),
+    ("Tilt, °", "Angle between board and picture"),
+    ("Square, mm", "Side of a square, triangulated, with its deviation"),
+    ("Plane, mm", "Rms distance of the triangulated corners from their best plane"),
+    ("Verdict", "Whether the pose is used, and why not"),
+)
+
+
+class GeometryEvidence(Evidence):
+    """Coverage and bars above a table of poses; unticked poses are left out when it is solved again."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._record: GeometryCalibration | None = None
+        self._keys: dict[str, str] = {}
+        self._unticked: frozenset[str] = frozenset()
+        self.coverage = ChartBox(
+            "Corners over the camera's picture",
+            "Each dot is a corner of the board; shaded cells hold one. The selected pose is marked.",
+            "Row (px)",
+            "Column (px)",
+            prepare=like_a_picture,
+        )
+        self.errors = ChartBox(
+            "Error of each pose",
+            f"Rms distance of corners from where the calibration expects them; below {LIMIT_PX} px is good.",
+            "Rms error (px)",
+            "Pose",
+            left_width=60,
+        )
+        self.table = NumberTable("Poses", HEADS, words=(0, 8))
+        self.diagnosis = label("", "muted")
+        self.diagnosis.setWordWrap(True)
+        self.again = QPushButton("Solve again")
+        self.again.setAccessibleName("Solve again with the ticked poses")
+        self.again.setToolTip(
+            "Fit lenses and pose anew with the ticked poses; captures of the others are kept"
+        )
+        self.again.clicked.connect(self._ask)
+        self.table.itemChanged.connect(self._ticked)
+        self.table.itemSelectionChanged.connect(self._draw_coverage)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        charts = QWidget()
+        row = QHBoxLayout(charts)
+        row.setContentsMargins(0, 0, 0, 6)
+        row.addWidget(self.coverage, 1)
+        row.addWidget(self.errors, 1)
+        parts = QSplitter(Qt.Orientation.Vertical)
+        parts.setChildrenCollapsible(False)
+        parts.addWidget(charts)
+        parts.addWidget(self.table)
+        parts.setSizes([260, 200])
+        foot = QHBoxLayout()
+        foot.addWidget(self.diagnosis, 1)
+        foot.addWidget(self.again, 0, Qt.AlignmentFlag.AlignTop)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(parts, 1)
+        column.addLayout(foot)
+
+    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
+        """Show a fit."""
+        assert isinstance(record, GeometryCalibration)
+        self._record = record
+        self._keys = {step.title: step.key for step in session.steps}
+        self._unticked = frozenset(each.name for each in record.left_out if each.by_hand)
+        self._fill()
+        self._draw()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        super().apply_theme(theme)
+        for part in (self.coverage, self.errors):
+            part.apply_theme(theme)
+        self.table.blockSignals(True)
+        self.table.apply_theme(theme)
+        self.table.blockSignals(False)
+        self._draw()
+
+    # Poses to leave out ----------------------------------------------------------------------------
+
+    def _fill(self) -> None:
+        record = self._record
+        assert record is not None
+        rows = {pose.name: _row(pose) for pose in record.poses}
+        rows |= {each.name: [each.name, *[""] * 7, Cell(each.reason, "warn")] for each in record.left_out}
+        order = [*(name for name in self._keys if name in rows), *(n for n in rows if n not in self._keys)]
+        self.table.blockSignals(True)
+        self.table.fill([rows[name] for name in order])
+        unreadable = {each.name for each in record.left_out if not each.by_hand}
+        for item in self._names():
+            if item.text() in self._keys and item.text() not in unreadable:
+                ticked = item.text() not in self._unticked
+                item.setCheckState(Qt.CheckState.Checked if ticked else Qt.CheckState.Unchecked)
+        self.table.blockSignals(False)
+        self._ticked()
+
+    def _names(self) -> list[QTableWidgetItem]:
+        found = [self.table.item(row, 0) for row in range(self.table.rowCount())]
+        return [item for item in found if item is not None]
+
+    def _choices(self) -> list[QTableWidgetItem]:
+        """The names that have a box."""
+        return [item for item in self._names() if item.data(Qt.ItemDataRole.CheckStateRole) is not None]
+
+    def _is_ticked(self, item: QTableWidgetItem) -> bool:
+        return item.checkState() == Qt.CheckState.Checked
+
+    def _ticked(self) -> None:
+        choices = self._choices()
+        ticked = sum(self._is_ticked(item) for item in choices)
+        wanted = frozenset(item.text() for item in choices if not self._is_ticked(item))
+        changed = wanted != self._unticked
+        self.again.setEnabled(changed and ticked >= MIN_POSES)
+        self.again.setText(f"Solve again with {ticked} poses" if changed else "Solve again")
+        self._diagnose(changed and ticked < MIN_POSES)
+
+    def _ask(self) -> None:
+        keys = [self._keys[item.text()] for item in self._choices() if not self._is_ticked(item)]
+        self.settings_wanted.emit({"left_out": ",".join(keys)})
+
+    def _diagnose(self, too_few: bool) -> None:
+        record = self._record
+        assert record is not None
+        words, role = "Nothing about these poses is doubtful.", "muted"
+        if record.warnings:
+            words, role = " ".join(record.warnings), "warn"
+        if too_few:
+            words, role = f"At least {MIN_POSES} poses are needed; tick more of them.", "bad"
+        self.diagnosis.setText(words)
+        set_role(self.diagnosis, role)
+
+    # Charts ----------------------------------------------------------------------------------------
+
+    def _draw(self) -> None:
+        record = self._record
+        if record is not None:
+            self.coverage.draw(self._draw_coverage)
+            self.errors.draw(lambda: self._draw_errors(record))
+
+    def _draw_coverage(self) -> None:
+        record = self._record
+        if record is None:
+            return
+        known = [pose for pose in record.poses if pose.corners_px]
+        if not known:
+            self.coverage.say("This calibration was made before corners were kept. Fit it again to see them.")
+            return
+        theme, size = self._theme, (record.camera.width_px, record.camera.height_px)
+        self.coverage.begin()
+        used = np.concatenate([pose.corners_px for pose in known if pose.used])
+        self.coverage.item.addItem(_cells(used, size, theme.accent))
+        rows = self.table.selectionModel().selectedRows()
+        chosen = {item.text() for item in self._names() if item.row() in {each.row() for each in rows}}
+        for pose in known:
+            colour = theme.warn if pose.name in chosen else theme.text if pose.used else theme.muted
+            self.coverage.item.addItem(
+                pg.ScatterPlotItem(
+                    pos=np.array(pose.corners_px),
+                    size=6 if pose.name in chosen else 3,
+                    brush=colour if pose.used else None,
+                    pen=None if pose.used else pg.mkPen(colour),
+                )
+            )
+        frame = QGraphicsRectItem(-0.5, -0.5, *size)
+        frame.setPen(pg.mkPen(theme.muted, width=1))
+        self.coverage.item.addItem(frame)
+        self.coverage.item.setRange(xRange=(0, size[0]), yRange=(0, size[1]), padding=0.02)
+        keys = [(f"covered, {100 * record.camera_coverage:.0f} % of the cells", theme.accent, BAR)]
+        chosen_keys = [(name, theme.warn, DOT) for name in sorted(chosen)]
+        self.coverage.name_curves([*keys, *chosen_keys])
+
+    def _draw_errors(self, record: GeometryCalibration) -> None:
+        theme = self._theme
+        self.errors.begin()
+        colours = (theme.pins[0], theme.pins[1])
+        at = np.arange(len(record.poses))
+        values = np.array([(pose.camera_rms_px, pose.projector_rms_px) for pose in record.poses]).T
+        faint = [not pose.used for pose in record.poses]
+        for side, (heights, colour) in enumerate(zip(values, colours, strict=True)):
+            brushes = [_brush(colour, 70 if pale else 255) for pale in faint]
+            bars = pg.BarGraphItem(
+                x=at + (side - 0.5) * 0.36, height=heights, width=0.32, brushes=brushes, pen=pg.mkPen(None)
+            )
+            self.errors.item.addItem(bars)
+        top = float(values.max())
+        if top > LIMIT_PX / 2:
+            level_line(self.errors, LIMIT_PX, theme.bad, "limit")
+            top = max(top, 1.1 * LIMIT_PX)
+        self.errors.item.setRange(xRange=(-0.6, len(at) - 0.4), yRange=(0, 1.1 * top), padding=0)
+        ticks = [(i, pose.name.removeprefix("Pose ")) for i, pose in enumerate(record.poses)]
+        self.errors.item.getAxis("bottom").setTicks([ticks])
+        names = (
+            f"camera, {record.camera_rms_px:.3f} px in all",
+            f"projector, {record.projector_rms_px:.3f} px",
+        )
+        self.errors.name_curves([(name, colour, BAR) for name, colour in zip(names, colours, strict=True)])
+
+
+def _row(pose: PoseQuality) -> list[Cell | str]:
+    corners = f"{pose.corners}" + (f" ({pose.outliers} off)" if pose.outliers else "")
+    return [
+        pose.name,
+        corners,
+        f"{pose.camera_rms_px:.3f}",
+        f"{pose.projector_rms_px:.3f}",
+        f"{pose.distance_mm:.0f}",
+        f"{pose.tilt_deg:.0f}",
+        f"{pose.measured.square_mm:.3f} ± {pose.measured.square_std_mm:.3f}",
+        f"{pose.measured.plane_rms_mm:.3f}",
+        Cell("used", "good") if pose.used else Cell("does not fit the others", "bad"),
+    ]
+
+
+def _cells(corners_px: Any, size: tuple[int, int], colour: str) -> Any:
+    """The cells of the picture that hold a corner, tinted."""
+    held, _, _ = np.histogram2d(
+        corners_px[:, 1], corners_px[:, 0], bins=CELLS, range=((-0.5, size[1] - 0.5), (-0.5, size[0] - 0.5))
+    )
+    picture = np.zeros((CELLS, CELLS, 4), np.uint8)
+    picture[held > 0] = (*bytes.fromhex(colour[1:]), 60)
+    image = pg.ImageItem(picture, axisOrder="row-major")
+    image.setRect(-0.5, -0.5, *size)
+    return image
+
+
+def _brush(colour: str, alpha: int) -> QColor:
+    made = QColor(colour)
+    made.setAlpha(alpha)
+    return made

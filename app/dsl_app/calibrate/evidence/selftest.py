@@ -1,0 +1,205 @@
+"""Evidence of the self-test: linearity, gamma, the beat of the light's colour cycle, and latency."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtWidgets import QGridLayout
+
+from dsl_app.calibrate.evidence.base import Evidence
+from dsl_app.calibrate.evidence.curves import COVER, draw_points, level_line
+from dsl_app.calibrate.evidence.parts import BAR, DOT, LINE, Aside, ChartBox, with_spread
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
+
+if TYPE_CHECKING:
+    from dsl_core.calibration.selftest.curves import SelfTestCurves
+    from dsl_core.campaign.session import CalibrationSession
+    from dsl_core.model.base import Record
+    from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+CHANNELS = ("red", "green", "blue")
+#: What a good rig stays below, percent: distance from the line, of full scale; rms distance from the power
+#: law; beat at an advised exposure.
+LINEARITY_PERCENT, GAMMA_PERCENT, BEAT_PERCENT = 0.5, 1.0, 0.3
+#: Drive below which the little light is mostly noise.
+DIM = 0.15
+READING = "Reading the frames' means…"
+
+
+class SelfTestEvidence(Evidence):
+    """Four plots; what the record does not hold is read from the captures in another thread."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._record: SelfTest | None = None
+        self._curves: SelfTestCurves | Exception | None = None
+        self.linearity = ChartBox(
+            "Linearity of the camera",
+            "Distance of each channel's mean from a straight line over exposure, with 95 % bars.",
+            "Off the line (% of full)",
+            "Signal (DN)",
+        )
+        self.gamma = ChartBox(
+            "Gamma of the projector",
+            "How far the light of each colour lies from its power law, by drive; the legend has exponents.",
+            "Off the law (%)",
+            "Drive (of full)",
+        )
+        self.beat = ChartBox(
+            "Beat of the colour cycle",
+            "Spread of the colour ratios over repeats at one exposure, with 95 % bars. Exposures that hold"
+            " whole cycles have none; the advised ones are marked.",
+            "Spread of ratios (%)",
+            "Exposure (ms)",
+        )
+        self.latency = ChartBox(
+            "Latency",
+            "Share of the frames that showed the new picture, by the wait after it was shown.",
+            "New picture seen (%)",
+            "Wait after show (ms)",
+        )
+        self._boxes = (self.linearity, self.gamma, self.beat, self.latency)
+        self._aside = Aside(self)
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(10)
+        for index, box in enumerate(self._boxes):
+            grid.addWidget(box, index // 2, index % 2)
+            grid.setRowStretch(index // 2, 1)
+            grid.setColumnStretch(index % 2, 1)
+
+    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
+        """Show a fit; its captures are read aside."""
+        assert isinstance(record, SelfTest)
+        self._record, self._curves = record, None
+        self._draw()
+        folder = session.bench.step_folder(session.steps[0])
+
+        def read() -> SelfTestCurves:
+            from dsl_core.calibration.selftest.curves import selftest_curves
+            from dsl_core.campaign.selftest.store import load_capture
+
+            return selftest_curves(load_capture(folder))
+
+        self._aside.read(read, self._take)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        super().apply_theme(theme)
+        for box in self._boxes:
+            box.apply_theme(theme)
+        self._draw()
+
+    def _take(self, curves: SelfTestCurves | Exception) -> None:
+        self._curves = curves
+        self._draw()
+
+    def _draw(self) -> None:
+        record, curves = self._record, self._curves
+        if record is None:
+            return
+        self.beat.draw(lambda: self._draw_beat(record.cycle))
+        if curves is None or isinstance(curves, Exception):
+            words = READING if curves is None else str(curves)
+            for box in (self.linearity, self.gamma, self.latency):
+                box.say(words)
+            return
+        self.linearity.draw(lambda: self._draw_linearity(record, curves))
+        self.gamma.draw(lambda: self._draw_gamma(record, curves))
+        self.latency.draw(lambda: self._draw_latency(record, curves))
+
+    def _draw_linearity(self, record: SelfTest, curves: SelfTestCurves) -> None:
+        box, percent = self.linearity, 100 / curves.full_scale_dn
+        box.begin()
+        for line, colour in zip(curves.lines, RGB_COLOURS, strict=True):
+            draw_points(box, line.value_dn, percent * line.residual_dn, percent * line.std_dn, colour, size=5)
+        reach = max(float(np.abs(percent * line.residual_dn).max()) for line in curves.lines)
+        span = max(1.3 * reach, 0.02)
+        if span > LINEARITY_PERCENT / 2:
+            span = max(span, 1.2 * LINEARITY_PERCENT)
+            for limit in (-LINEARITY_PERCENT, LINEARITY_PERCENT):
+                level_line(box, limit, self._theme.bad, "limit" if limit > 0 else "")
+        level_line(box, 0.0, self._theme.muted)
+        box.item.setXRange(0, max(float(line.value_dn.max()) for line in curves.lines), padding=0.03)
+        box.item.setYRange(-span, span, padding=0)
+        checks = zip(CHANNELS, record.camera.linearity_percent, RGB_COLOURS, strict=True)
+        box.name_curves(
+            [(f"{name}, at most {each.value:.3f} %", colour, DOT) for name, each, colour in checks]
+        )
+
+    def _draw_gamma(self, record: SelfTest, curves: SelfTestCurves) -> None:
+        box = self.gamma
+        box.begin()
+        colours = dict(zip(("white", *CHANNELS), (self._theme.text, *RGB_COLOURS), strict=True))
+        checks = {check.colour: check for check in record.projector.ramps}
+        span = 1.5 * GAMMA_PERCENT
+        for ramp in curves.ramps:
+            model = ramp.level ** checks[ramp.colour].gamma.value
+            off = 100 * (ramp.light / model - 1)
+            order = np.argsort(ramp.level)
+            pen = pg.mkPen(colours[ramp.colour], width=1)
+            box.item.addItem(pg.PlotCurveItem(ramp.level[order], off[order], pen=pen))
+            draw_points(box, ramp.level, off, None, colours[ramp.colour], size=5)
+            span = max(span, 1.1 * float(np.abs(off[ramp.level > DIM]).max(initial=0)))
+        for limit in (-GAMMA_PERCENT, GAMMA_PERCENT):
+            level_line(box, limit, self._theme.bad, "limit, rms" if limit > 0 else "")
+        box.item.setRange(xRange=(0, 1), yRange=(-span, span), padding=0.02)
+        box.name_curves(
+            [
+                (f"{name} {with_spread(check.gamma.value, check.gamma.std)}", colours[name], LINE)
+                for name, check in checks.items()
+            ]
+        )
+
+    def _draw_beat(self, cycle: CycleCheck) -> None:
+        box, beats = self.beat, sorted(cycle.beats, key=lambda beat: beat.exposure_ms)
+        if not beats:
+            box.say("No exposures were repeated, so nothing is known of a beat.")
+            return
+        box.begin()
+        theme, at = self._theme, np.arange(len(beats))
+        heights = np.array([beat.ratio_percent.value for beat in beats])
+        std = np.array([beat.ratio_percent.std for beat in beats])
+        advised = [any(abs(beat.exposure_ms - ms) < 1e-3 for ms in cycle.advised_ms) for beat in beats]
+        brushes = [theme.good if good else theme.muted for good in advised]
+        box.item.addItem(
+            pg.BarGraphItem(x=at, height=heights, width=0.55, brushes=brushes, pen=pg.mkPen(None))
+        )
+        bars = pg.ErrorBarItem(x=at, y=heights, height=2 * COVER * std, beam=0.12, pen=theme.text)
+        box.item.addItem(bars)
+        level_line(box, BEAT_PERCENT, theme.bad, "limit")
+        box.item.getAxis("bottom").setTicks(
+            [[(i, f"{beat.exposure_ms:.1f}") for i, beat in enumerate(beats)]]
+        )
+        top = max(float((heights + COVER * std).max()), 1.2 * BEAT_PERCENT)
+        box.item.setRange(xRange=(-0.6, len(beats) - 0.4), yRange=(0, 1.1 * top), padding=0)
+        period = cycle.period_ms
+        words = "steady light" if period is None else f"cycle of {with_spread(period.value, period.std)} ms"
+        box.name_curves([("advised", theme.good, BAR), ("others", theme.muted, BAR), (words, theme.text, "")])
+
+    def _draw_latency(self, record: SelfTest, curves: SelfTestCurves) -> None:
+        box, theme, latency = self.latency, self._theme, record.latency
+        box.begin()
+        share = 100 * curves.right_share
+        box.item.plot(curves.waits_ms, share, pen=pg.mkPen(theme.pins[0], width=1))
+        draw_points(box, curves.waits_ms, share, None, theme.pins[0])
+        wait = pg.InfiniteLine(latency.wait_ms.value, movable=False, pen=pg.mkPen(theme.accent, dash=[4, 4]))
+        box.item.addItem(wait, ignoreBounds=True)
+        box.item.setXRange(0, max(float(curves.waits_ms.max()), 1.0), padding=0.04)
+        box.item.setYRange(0, 105, padding=0.02)
+        box.name_curves(
+            [
+                (
+                    f"safe after {with_spread(latency.wait_ms.value, latency.wait_ms.std)} ms",
+                    theme.accent,
+                    "┅",
+                ),
+                (f"show takes {latency.blocking_ms.value:.1f} ms", theme.text, ""),
+                (f"stale {latency.stale_frames} of {latency.checked}", theme.text, ""),
+            ]
+        )

@@ -1,0 +1,174 @@
+"""Evidence of the Spectralon: emission of the LEDs, how evenly the camera sees, and the white signals."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+
+from dsl_app.calibrate.evidence.base import Evidence
+from dsl_app.calibrate.evidence.curves import Named, draw_curves
+from dsl_app.calibrate.evidence.parts import Cell, ChartBox, NumberTable, like_a_picture, with_spread
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.model.calibration.spectralon import SpectralonCalibration
+
+if TYPE_CHECKING:
+    from dsl_core.campaign.session import CalibrationSession
+    from dsl_core.model.base import Record
+    from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+NAMES = ("red", "green", "blue")
+HEADS = (
+    ("Channel", "Channel of the camera"),
+    *(
+        (f"{name.capitalize()} LED", f"Signal under {name} at full drive, with its deviation")
+        for name in NAMES
+    ),
+    (
+        "White / sum",
+        "Signal under white over the sum of those under red, green and blue: one where light adds",
+    ),
+)
+
+
+class SpectralonEvidence(Evidence):
+    """Emission with its bands beside the flat field, the signals of white below."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._record: SpectralonCalibration | None = None
+        self.emission = ChartBox(
+            "Emission of the LEDs",
+            "Relative spectral radiance of each LED at full drive with its 95 % band.",
+            "Emission",
+            "Wavelength (nm)",
+        )
+        self.field = ChartBox(
+            "Flat field",
+            "Relative gain of the camera over its image, without the light's own fall-off; one is the mean.",
+            "Row (px)",
+            "Column (px)",
+            prepare=self._prepare_field,
+        )
+        self.image = pg.ImageItem(axisOrder="row-major")
+        self.bar: Any = None
+        self.table = NumberTable("Signals of white", HEADS)
+        self.words = label("", "muted")
+        self.words.setWordWrap(True)
+        self._lay_out()
+
+    def _prepare_field(self, plot: Any) -> None:
+        like_a_picture(plot)
+        self.bar = pg.ColorBarItem(interactive=False, width=12, colorMap=pg.colormap.get("viridis"))
+        self.bar.setImageItem(self.image, insert_in=plot.getPlotItem())
+        self._theme_bar()
+
+    def _lay_out(self) -> None:
+        charts = QWidget()
+        row = QHBoxLayout(charts)
+        row.setContentsMargins(0, 0, 0, 6)
+        row.addWidget(self.emission, 1)
+        row.addWidget(self.field, 1)
+        below = QWidget()
+        column = QVBoxLayout(below)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(label("Signals of white at unit shading, DN/ms", "heading"))
+        column.addWidget(self.table, 1)
+        column.addWidget(self.words)
+        parts = QSplitter(Qt.Orientation.Vertical)
+        parts.setChildrenCollapsible(False)
+        parts.addWidget(charts)
+        parts.addWidget(below)
+        parts.setSizes([330, 170])
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.addWidget(parts)
+
+    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
+        """Show a fit."""
+        assert isinstance(record, SpectralonCalibration)
+        self._record = record
+        self._draw()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        super().apply_theme(theme)
+        for part in (self.table, self.emission, self.field):
+            part.apply_theme(theme)
+        self._theme_bar()
+        self._draw()
+
+    def _theme_bar(self) -> None:
+        for side in ("left", "right") if self.bar is not None else ():
+            axis = self.bar.getAxis(side)
+            axis.setTextPen(self._theme.muted)
+            axis.setPen(self._theme.line)
+
+    def _draw(self) -> None:
+        record = self._record
+        if record is None:
+            return
+        self.emission.draw(lambda: self._draw_emission(record))
+        self.field.draw(lambda: self._draw_field(record))
+        self.table.fill(_rows(record))
+        self.words.setText(_words(record))
+
+    def _draw_emission(self, record: SpectralonCalibration) -> None:
+        self.emission.begin()
+        draw_curves(
+            self.emission,
+            [
+                Named(name, colour, curve)
+                for name, colour, curve in zip(NAMES, RGB_COLOURS, record.emission.curves, strict=True)
+            ],
+        )
+
+    def _draw_field(self, record: SpectralonCalibration) -> None:
+        flat = record.flat_field
+        gain = np.array(flat.gain)
+        if min(gain.shape) < 2:
+            self.field.say("The camera sees evenly: no variation over the image stands out of the noise.")
+            return
+        self.field.begin()
+        self.field.item.addItem(self.image)
+        self.image.setImage(gain, autoLevels=False)
+        rows, columns = np.array(flat.rows_px), np.array(flat.columns_px)
+        # Nodes are centres of the pixels of this picture.
+        half_x, half_y = np.diff(columns).mean() / 2, np.diff(rows).mean() / 2
+        self.image.setRect(
+            columns[0] - half_x, rows[0] - half_y, np.ptp(columns) + 2 * half_x, np.ptp(rows) + 2 * half_y
+        )
+        spread = max(float(np.abs(gain - 1).max()), 0.005)
+        self.bar.setLevels((1 - spread, 1 + spread))
+        self.field.item.autoRange(padding=0.01)
+
+
+def _rows(record: SpectralonCalibration) -> list[list[Cell | str]]:
+    white = record.white
+    return [
+        [
+            name,
+            *(
+                with_spread(value, value * rel)
+                for value, rel in zip(white.signal[c], white.rel_std[c], strict=True)
+            ),
+            f"{white.white_over_sum[c]:.4f}",
+        ]
+        for c, name in enumerate(NAMES)
+    ]
+
+
+def _words(record: SpectralonCalibration) -> str:
+    emission, plane = record.emission, record.plane
+    added = with_spread(emission.additivity, emission.additivity_std)
+    return (
+        f"White over the sum of the LEDs, by spectra: {added}, from {emission.readings} readings."
+        f" Target {plane.distance_mm:.0f} mm away, tilted by {plane.tilt_deg:.1f}°."
+        f" What the flat field leaves: {100 * record.unevenness:.2f} % rms; reduced χ² of an even camera"
+        f" {record.flat_field_chi_square:.1f}."
+    )

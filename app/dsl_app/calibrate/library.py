@@ -1,0 +1,168 @@
+"""What the library's panel decides: list, restore, export, import, report, drift check, use. No Qt."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dsl_app.calibrate.state import CalibrateState, DriftVerdict
+from dsl_app.connection.controller import RIG, RigController
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Offerer
+from dsl_app.shared.sentences import NO_RIG, sentence_of
+from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
+from dsl_core.model.figure import failures
+from dsl_core.progress import Progress
+
+#: A file without this is neither a rig nor an entry of the library.
+_MARK = b'"white_scale"'
+
+
+@dataclass(frozen=True)
+class _Differs:
+    """Settings that keep a calibration from being checked, as clauses."""
+
+    clauses: tuple[str, ...]
+
+
+class LibraryController:
+    """Acts on the calibrations of this computer; ``key`` is a name, or NAME@STAMP of one version."""
+
+    def __init__(
+        self,
+        state: CalibrateState,
+        rig: RigController,
+        runner: JobRunner,
+        notifier: Offerer,
+        library: CalibrationLibrary,
+    ) -> None:
+        self._state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._library = library
+
+    def load(self) -> None:
+        """List every version of every calibration."""
+
+        def work(progress: Progress) -> tuple[LibraryLine, ...]:
+            progress.report("read the library", 0, 0)
+            return self._library.lines()
+
+        self._submit("Read the library", work, self._state.library.set)
+
+    def use(self, key: str) -> None:
+        """Scan with a calibration from now on."""
+        self._state.in_use.set(key)
+        self._state.note.set(f"Scans use the calibration {key}.")
+
+    def restore(self, name: str, stamp: str) -> None:
+        """Make a version the current one; the one that was stays."""
+
+        def done(entry: LibraryEntry) -> None:
+            self._state.note.set(f"{name} is version {entry.stamp} from now on.")
+            self.load()
+
+        self._submit(f"Restore {name}", lambda progress: self._library.restore(name, stamp), done)
+
+    def export(self, key: str, target: Path, form: str, overwrite: bool) -> None:
+        """Write a calibration for another computer or program."""
+
+        def work(progress: Progress) -> list[Path]:
+            from dsl_core.campaign.entry_files import export_entry
+
+            return export_entry(self._library.find(key), target, form, overwrite)
+
+        def done(files: list[Path]) -> None:
+            self._notifier.tell("info", f"Written: {', '.join(map(str, files))}.")
+
+        self._submit(f"Export {key}", work, done)
+
+    def offer(self, path: Path) -> bool:
+        """Take a file into the library if it looks like a calibration; False when it does not."""
+        try:
+            is_one = path.suffix.lower() == ".json" and path.is_file() and _MARK in path.read_bytes()
+        except OSError:
+            is_one = False
+        if is_one:
+            self.take_in(path)
+        return is_one
+
+    def take_in(self, path: Path) -> None:
+        """Take an exported calibration, or a rig's file, into the library."""
+
+        def work(progress: Progress) -> LibraryEntry:
+            from dsl_core.campaign.entry_files import import_entry
+
+            return import_entry(path, self._library)
+
+        def done(entry: LibraryEntry) -> None:
+            self._state.note.set(f"{entry.name} is in the library, version {entry.stamp}.")
+            self.load()
+
+        self._submit(f"Import {path.name}", work, done)
+
+    def report(self, key: str) -> None:
+        """Write the report of a calibration and show it."""
+
+        def work(progress: Progress) -> Path:
+            from dsl_core.campaign.products import write_calibration_report
+
+            entry = self._library.find(key)
+            folder = Path(tempfile.mkdtemp(prefix="dsl-scan-report-"))
+            return write_calibration_report(
+                folder / f"{entry.name}.html", entry.rig, entry.accepted, entry.history
+            )
+
+        self._submit(f"Report on {key}", work, self._state.opened.emit)
+
+    @property
+    def must_be_placed(self) -> bool:
+        """Whether a person has to place the target of a drift check."""
+        devices = self._rig.state.devices.value
+        return devices is not None and devices.place is None
+
+    def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
+        """Take one quick shot of a flat target and compare it with a calibration.
+
+        Where camera or projector are set otherwise than in the calibration, checking all the same is offered.
+        """
+        devices = self._rig.state.devices.value
+        if devices is None:
+            self._notifier.tell("warning", NO_RIG)
+            return
+
+        def work(progress: Progress) -> DriftVerdict | _Differs:
+            from dsl_core.campaign.drift import PLACEMENT, measure_drift
+            from dsl_core.devices.conditions import check_conditions, use_calibration
+
+            known, own = self._library.find(key).rig, replace(devices)
+            found = check_conditions(known, own)
+            if found and not override:
+                return _Differs(found)
+            use_calibration(own, known, override)
+            if own.place is not None:
+                own.place(PLACEMENT)
+            with tempfile.TemporaryDirectory(prefix="dsl-scan-check-") as spare:
+                figures = measure_drift(own, known, Path(spare) / "check.dsl", spectralon, progress)
+            return DriftVerdict(key, figures, spectralon, found)
+
+        def done(said: DriftVerdict | _Differs) -> None:
+            if isinstance(said, _Differs):
+                self._notifier.offer(
+                    f"{key} is not for these settings: {'; '.join(said.clauses)}. Set them back or calibrate"
+                    " again. A check all the same shows what the change does.",
+                    {"Check all the same": lambda: self.check(key, spectralon, override=True)},
+                )
+                return
+            wrong = failures(said.figures)
+            text = f"The rig is not as {key} says." if wrong else f"The rig is as {key} says."
+            self._state.note.set(text)
+            self._state.drift.set(said)
+
+        self._rig.run(Job(f"Check {key} for drift", work, done, self._tell, exclusive=RIG))
+
+    def _submit(self, title: str, work: Callable[..., object], done: Callable[..., object]) -> None:
+        self._runner.submit(Job(title, work, done, self._tell))
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))

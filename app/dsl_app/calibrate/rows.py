@@ -1,0 +1,120 @@
+"""Where every calibration of a campaign stands, read from its folder. No Qt, no devices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime, timedelta
+
+from dsl_app.calibrate.state import ABOUT, About, Row, RowState
+from dsl_core.campaign.common.captures import read_note
+from dsl_core.errors import DslError
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.calibration.accepted import AcceptedCalibration
+from dsl_core.model.conditions import CaptureConditions, differences
+from dsl_core.model.figure import Figure, failures
+
+
+def read_rows(
+    campaign: CampaignFolder,
+    names: Sequence[str],
+    conditions: CaptureConditions | None,
+    ageing_days: int,
+    now: datetime,
+) -> tuple[Row, ...]:
+    """A row for each calibration of ``names``, in order; ``conditions`` are the rig's at hand, if any."""
+    rows: list[Row] = []
+    before: dict[str, str] = {}
+    for name in names:
+        row, accepted = _read(campaign, name, before, conditions, now - timedelta(days=ageing_days))
+        rows.append(row)
+        if accepted:
+            before[name] = accepted
+    return tuple(rows)
+
+
+def _read(
+    campaign: CampaignFolder,
+    name: str,
+    before: Mapping[str, str],
+    conditions: CaptureConditions | None,
+    oldest: datetime,
+) -> tuple[Row, str]:
+    """The row of a calibration, and when it was accepted (empty: never)."""
+    about = ABOUT.get(name, About(name, ""))
+    try:
+        accepted, waits = campaign.accepted(name), campaign.candidate(name) is not None
+        captured = count_captured(campaign, name)
+    except DslError as error:
+        return Row(name, about, RowState.DAMAGED, str(error)), ""
+    if accepted is None:
+        begun = captured > 0 or waits
+        reason = _candidate_words(waits) or (f"{captured} captured" if captured else "")
+        state = RowState.BEGUN if begun else RowState.MISSING
+        return Row(name, about, state, reason, captured=captured, has_candidate=waits), ""
+    state, reason = judge(accepted, before, conditions, oldest)
+    if waits:
+        reason = f"{reason} {_candidate_words(waits)}".strip()
+    row = Row(name, about, state, reason, key_figure(accepted.figures), accepted.accepted, captured, waits)
+    return row, accepted.accepted
+
+
+def judge(
+    accepted: AcceptedCalibration,
+    before: Mapping[str, str],
+    conditions: CaptureConditions | None,
+    oldest: datetime,
+) -> tuple[RowState, str]:
+    """How an accepted calibration stands, and why; ``before`` are those it should be based on."""
+    if conditions is not None and accepted.conditions is not None:
+        found = differences(accepted.conditions, conditions)
+        if found:
+            return RowState.OTHER_RIG, f"{_sentence('; '.join(found))} Set it back, or calibrate again."
+    if accepted.based_on != dict(before):
+        newer = [name for name in before if accepted.based_on.get(name) != before[name]]
+        names = " and ".join(_title(name) for name in newer) or "what it was fitted on"
+        return RowState.SUPERSEDED, f"{names} changed since. Fit again; its captures are kept."
+    failed = failures(accepted.figures)
+    if failed:
+        return RowState.OUTSIDE, failed[0].advice
+    if accepted.accepted and datetime.fromisoformat(accepted.accepted) < oldest:
+        days = (datetime.now(UTC) - datetime.fromisoformat(accepted.accepted)).days
+        return RowState.AGEING, f"{days} days old. Check it for drift, or calibrate again."
+    return RowState.GOOD, ""
+
+
+def key_figure(figures: tuple[Figure, ...]) -> Figure | None:
+    """The figure that is furthest beyond its limits, else the one nearest to them."""
+    limited = [figure for figure in figures if figure.limits]
+    return max(limited, key=_strain, default=None)
+
+
+def _strain(figure: Figure) -> float:
+    """How much of its room a figure uses: above one beyond its limits."""
+    value, low, high = figure.value, figure.low, figure.high
+    if low is not None and high is not None:
+        half = (high - low) / 2
+        return abs(value - (low + high) / 2) / half if half > 0 else float(not figure.passed)
+    # One limit: how close the value comes to it, on the scale of the limit itself.
+    ratio = value / high if high else (low / value if low and value else 0.0)
+    return max(ratio, 1.001) if not figure.passed else min(max(ratio, 0.0), 1.0)
+
+
+def count_captured(campaign: CampaignFolder, name: str) -> int:
+    """How many steps of a calibration were captured to their end; raises `StoreError`."""
+    home = campaign.home(name)
+    if not home.is_dir():
+        return 0
+    notes = (read_note(folder) for folder in sorted(home.iterdir()) if folder.is_dir())
+    return sum(note is not None and bool(note.finished) and not note.refused for note in notes)
+
+
+def _candidate_words(waits: bool) -> str:
+    return "A fit waits to be judged." if waits else ""
+
+
+def _title(name: str) -> str:
+    return ABOUT[name].title if name in ABOUT else name
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."

@@ -1,0 +1,124 @@
+"""The calibrations of a rig as the window knows them: the campaign, its rows, and the library."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_app.connection.state import RigChoice
+from dsl_app.shared.evented import Event, Value
+
+if TYPE_CHECKING:
+    from dsl_core.io.calibration_library import LibraryLine
+    from dsl_core.model.figure import Figure
+
+
+class RowState(Enum):
+    """Where a calibration of the campaign stands; the words are shown."""
+
+    MISSING = "missing"
+    BEGUN = "begun"
+    GOOD = "good"
+    AGEING = "ageing"
+    OUTSIDE = "outside its limits"
+    SUPERSEDED = "superseded"
+    OTHER_RIG = "does not fit this rig"
+    DAMAGED = "damaged"
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether a rig can be assembled with it."""
+        return self in (RowState.GOOD, RowState.AGEING, RowState.OUTSIDE)
+
+
+@dataclass(frozen=True)
+class About:
+    """What the page says of a calibration before anything of it is loaded."""
+
+    title: str
+    purpose: str
+
+
+#: By name and in order.
+ABOUT = {
+    "selftest": About("Self-test", "Camera, projector, focus and room"),
+    "geometry": About("Geometry", "Lenses and pose, from a printed board"),
+    "spectralon": About("Spectralon", "Light of the LEDs, evenness, white"),
+    "color-checker": About("Color Checker", "Response and emission, from patches"),
+    "bandpass": About("Bandpass filters", "Brightness of the film's orders"),
+    "depth-stage": About("Depth stage", "Where the film stands, how it bends"),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One calibration of the campaign.
+
+    ``reason`` says more of the state; ``figure`` is the one nearest to its limits, or beyond; ``captured``
+    counts finished steps; ``has_candidate`` says that a fit waits to be judged.
+    """
+
+    name: str
+    about: About
+    state: RowState = RowState.MISSING
+    reason: str = ""
+    figure: Figure | None = None
+    accepted: str = ""
+    captured: int = 0
+    has_candidate: bool = False
+
+
+@dataclass(frozen=True)
+class CampaignFacts:
+    """The campaign that is open; ``rig`` is the one it was begun with."""
+
+    path: Path
+    rig: RigChoice
+
+
+@dataclass(frozen=True)
+class DriftVerdict:
+    """What a quick shot said of a calibration of the library.
+
+    ``spectralon`` says that the target was one, ``overridden`` which settings differed and were let be.
+    """
+
+    name: str
+    figures: tuple[Figure, ...]
+    spectralon: bool = True
+    overridden: tuple[str, ...] = ()
+
+
+def empty_rows() -> tuple[Row, ...]:
+    """The rows while no campaign is open."""
+    return tuple(Row(name, about) for name, about in ABOUT.items())
+
+
+class CalibrateState:
+    """Values that the calibrations' controllers set and the page follows.
+
+    ``trouble`` is a sentence on why nothing can be calibrated (empty: nothing), ``note`` one on what was
+    done last. ``foreign`` says that the campaign is another rig's; ``everything`` says how far a calibration
+    of everything is (empty: none runs). ``in_use`` is the library's name that scans use; ``opened`` fires
+    with a file to show outside.
+    """
+
+    def __init__(self) -> None:
+        self.campaign: Value[CampaignFacts | None] = Value(None)
+        self.rows: Value[tuple[Row, ...]] = Value(empty_rows())
+        self.foreign = Value(False)
+        self.trouble = Value("")
+        self.note = Value("")
+        self.opening = Value("")
+        self.everything = Value("")
+        self.library: Value[tuple[LibraryLine, ...]] = Value(())
+        self.in_use = Value("")
+        self.drift: Value[DriftVerdict | None] = Value(None)
+        self.opened: Event[Path] = Event()
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every calibration is accepted and none is superseded."""
+        return all(row.state.is_accepted for row in self.rows.value)

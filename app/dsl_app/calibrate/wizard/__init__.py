@@ -1,0 +1,1 @@
+"""A calibration step by step: settings, placement, look, capture and fit."""

@@ -1,0 +1,84 @@
+"""The settings of a recipe as rows of text, and what its own words say of each."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from pydantic import BaseModel
+
+from dsl_app.calibrate.wizard.state import SettingRow
+from dsl_core.campaign.common.recipe import Recipe
+
+
+def setting_rows(recipe: Recipe, settings: Mapping[str, str]) -> tuple[SettingRow, ...]:
+    """A row for each field of a recipe, with what the campaign says of it or its default."""
+    kind: type[Any] = type(recipe)
+    if not is_dataclass(kind):
+        return ()
+    plain = kind()
+    found = []
+    for each in fields(kind):
+        default = getattr(plain, each.name)
+        text = as_text(default)
+        found.append(
+            SettingRow(each.name, _kind(default), text, settings.get(each.name, text), _doc(kind, each.name))
+        )
+    return tuple(found)
+
+
+def changed_settings(rows: tuple[SettingRow, ...], values: Mapping[str, str]) -> dict[str, str]:
+    """What the campaign has to remember: the settings that are not at their defaults."""
+    texts = {row.key: values.get(row.key, row.value).strip() for row in rows}
+    return {row.key: texts[row.key] for row in rows if texts[row.key] != row.default}
+
+
+def as_text(value: Any) -> str:
+    """A value as the command line's ``--set`` takes it, in six digits: a default that stays is not rounded.
+
+    >>> as_text((430.0, 440.0)), as_text(500 / 3), as_text(True), as_text(""), as_text(None)
+    ('430,440', '166.667', 'true', '', '')
+    """
+    match value:
+        case None:
+            return ""
+        case bool():
+            return json.dumps(value)
+        case float():
+            return f"{value:.6g}"
+        case BaseModel():
+            return value.model_dump_json()
+        case tuple() if all(isinstance(each, int | float | str) for each in value):
+            return ",".join(as_text(each) for each in value)
+        case tuple():
+            return json.dumps(value)
+    return str(value)
+
+
+def _kind(value: Any) -> str:
+    match value:
+        case bool():
+            return "switch"
+        case BaseModel():
+            return "board"
+    return "text"
+
+
+def _doc(kind: type[Any], name: str) -> str:
+    """What the class's docstring says of a field, as a sentence of its own; empty when it says nothing."""
+    text = " ".join((inspect.getdoc(kind) or "").split())
+    for sentence in re.split(r"(?<=\.)\s+(?=[`A-Z])|;\s+", text):
+        _, found, rest = sentence.partition(f"``{name}``")
+        if not found:
+            continue
+        # Up to where the sentence turns to another field.
+        own = re.split(r",?\s+(?:or|and)?\s*``\w+``", rest)[0]
+        plain = re.sub(r"^(?:is|are)\s+", "", own.replace("``", "").strip(" ,.;"))
+        if not plain:
+            plain = sentence.replace(f"``{name}``", "this").strip(" ,.;")
+        return f"{plain[0].upper()}{plain[1:]}."
+    return ""

@@ -1,0 +1,130 @@
+"""One calibration while a person goes through it step by step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_app.shared.evented import Event, Value
+from dsl_core.campaign.session import CalibrationSession, StepStatus
+from dsl_core.model.base import Record
+from dsl_core.model.calibration.accepted import AcceptedCalibration
+from dsl_core.model.figure import Figure, failures
+
+
+class Doing(Enum):
+    """What goes on now; the words are shown."""
+
+    OPENING = "opening"
+    IDLE = ""
+    LOOKING = "looking"
+    CAPTURING = "capturing"
+    STOPPING = "stopping"
+    FITTING = "fitting"
+    KEEPING = "writing"
+
+    @property
+    def is_long(self) -> bool:
+        """Whether a person has to wait for it, or stop it."""
+        return self in (Doing.OPENING, Doing.CAPTURING, Doing.STOPPING, Doing.FITTING, Doing.KEEPING)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the last look at a step found; ``trouble`` is why nothing could be measured."""
+
+    key: str
+    figures: tuple[Figure, ...] = ()
+    trouble: str = ""
+
+    @property
+    def is_good(self) -> bool:
+        """Whether everything is as it should be."""
+        return not self.trouble and not failures(self.figures)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fit with its record; ``session`` is what it was made in."""
+
+    fitted: AcceptedCalibration
+    record: Record
+    session: CalibrationSession
+    is_accepted: bool = False
+
+
+@dataclass(frozen=True)
+class SettingRow:
+    """A setting of the recipe as text; ``doc`` explains it, ``kind`` chooses how it is edited."""
+
+    key: str
+    kind: str
+    default: str
+    value: str
+    doc: str
+
+
+@dataclass(frozen=True)
+class Told:
+    """The latest report of what runs; ``total`` 0 means that the end is not known."""
+
+    stage: str = ""
+    done: int = 0
+    total: int = 0
+    remaining_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A frame as people look at it: RGB, and the share of raw pixels at full scale."""
+
+    picture: NDArray[np.uint8]
+    saturated: float
+
+
+class WizardState:
+    """Values that a wizard's controller sets and its window follows.
+
+    ``at`` counts pages: 0 are the settings, 1 to n the steps, n + 1 the fit. ``trouble`` is what went wrong
+    and what to do about it, ``note`` what was done last. ``misfit`` is the session whose captures gave no
+    fit. ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work ended.
+    """
+
+    def __init__(self, name: str, title: str) -> None:
+        self.name, self.title = name, title
+        self.doing = Value(Doing.OPENING)
+        self.statuses: Value[tuple[StepStatus, ...]] = Value(())
+        self.at = Value(0)
+        self.is_checking = Value(False)
+        self.look: Value[Look | None] = Value(None)
+        self.seen: Value[Seen | None] = Value(None)
+        self.progress = Value(Told())
+        self.trouble = Value("")
+        self.can_reconnect = Value(False)
+        self.note = Value("")
+        self.fit: Value[Fit | None] = Value(None)
+        self.misfit: Value[CalibrationSession | None] = Value(None)
+        self.settings: Value[tuple[SettingRow, ...]] = Value(())
+        self.settings_trouble = Value("")
+        self.places_itself = Value(False)
+        self.is_automatic = Value(False)
+        self.closed: Event[None] = Event()
+
+    @property
+    def last(self) -> int:
+        """The page of the fit."""
+        return len(self.statuses.value) + 1
+
+    @property
+    def status(self) -> StepStatus | None:
+        """The step that is shown; None on the pages of settings and fit."""
+        at = self.at.value
+        return self.statuses.value[at - 1] if 1 <= at < self.last else None
+
+    @property
+    def lacking(self) -> tuple[int, ...]:
+        """The pages of steps without good captures."""
+        return tuple(i for i, each in enumerate(self.statuses.value, 1) if each.state != "captured")

@@ -1,0 +1,1 @@
+"""The Compare page: two results, or a series of them."""

@@ -1,0 +1,1 @@
+"""Two results, and the difference between them."""

@@ -1,0 +1,252 @@
+"""What the Compare page decides: which results, against what, their figures and the report. No Qt."""
+
+from __future__ import annotations
+
+import shlex
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from dsl_app.compare.pair.state import CompareState, Pair, Shown, Side
+from dsl_app.shared.evented import Value
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.spectrum import Pixel
+from dsl_core.errors import DslError
+from dsl_core.evaluation.summary import Truth
+from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
+from dsl_core.progress import Progress
+
+T = TypeVar("T")
+RESULT = "zarr.json"
+
+
+class CompareController:
+    """Fills the two sides of a `CompareState` and compares them."""
+
+    def __init__(self, state: CompareState, runner: JobRunner, notifier: Notifier) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+        #: Results that were opened while another one was being read.
+        self._waiting: deque[Path] = deque()
+
+    # Sides -----------------------------------------------------------------------------------------
+
+    def open(self, path: Path) -> bool:
+        """Put a result on the first side that is free, else in place of B; False for anything else.
+
+        Results that are opened together follow one after the other.
+        """
+        if not (path / RESULT).is_file():
+            return False
+        self._waiting.append(path)
+        self._open_next()
+        return True
+
+    def _open_next(self) -> None:
+        if self._waiting and not self.state.busy.value:
+            self.open_side(self._waiting.popleft(), second=self.state.first.value is not None)
+
+    def open_side(self, path: Path, second: bool) -> None:
+        """Read a result as A, or as B."""
+        if not (path / RESULT).is_file():
+            self._notifier.tell("warning", f"{path.name} is no result. Choose a folder NAME.zarr.")
+            return
+        side = self.state.second if second else self.state.first
+        self._start(
+            f"Open {path.name}",
+            lambda progress: Side(path.stem, load_arrays(path, progress)),
+            lambda opened: self._take(side, opened),
+        )
+
+    def open_both(self, first: Path, second: Path) -> None:
+        """Read two results as A and B."""
+
+        def work(progress: Progress) -> list[Side]:
+            return [Side(path.stem, load_arrays(path, progress)) for path in (first, second)]
+
+        def done(sides: list[Side]) -> None:
+            # Each alone would be compared with what was there before.
+            self.state.first.set(sides[0])
+            self.state.second.set(sides[1])
+            self._compare()
+
+        self._start(f"Open {first.name} and {second.name}", work, done)
+
+    def use_truth(self) -> None:
+        """Take what the twin knows of the scene of A as B."""
+        first = self.state.first.value
+        if first is None:
+            self._notifier.tell("info", "Open a result as A first; its truth then becomes B.")
+            return
+
+        def work(progress: Progress) -> Side:
+            from dsl_core.io.result.result_file import load_result
+            from dsl_core.workflows.sessions import truth_of
+
+            progress.report("ask the twin", 0, 1)
+            truth = truth_of(load_result(first.arrays.path))
+            return Side(f"truth of {first.name}", truth_arrays(first.arrays, truth), truth)
+
+        self._start("Ask the twin for its truth", work, lambda side: self._take(self.state.second, side))
+
+    def swap(self) -> None:
+        """Let A and B change places; truth stays B."""
+        first, second = self.state.first.value, self.state.second.value
+        if first is not None and second is not None and second.truth is None:
+            self.state.first.set(second)
+            self.state.second.set(first)
+            self._compare()
+
+    def _take(self, place: Value[Side | None], side: Side) -> None:
+        second = self.state.second.value
+        if place is self.state.first and second is not None and second.truth is not None:
+            # Truth belongs to the result that it was asked for.
+            self.state.second.set(None)
+        place.set(side)
+        self._compare()
+
+    def _start(self, title: str, work: Callable[[Progress], T], done: Callable[[T], None]) -> None:
+        if self.state.busy.value:
+            self._notifier.tell("info", f"{self.state.busy.value} is not finished. Wait for it or cancel.")
+            return
+        self.state.busy.set(title)
+
+        def ended(result: T) -> None:
+            self.state.busy.set("")
+            done(result)
+            self._open_next()
+
+        self._runner.submit(Job(title, work, ended, self._failed, self._cancelled))
+
+    def _cancelled(self) -> None:
+        self._waiting.clear()
+        self.state.busy.set("")
+
+    def _failed(self, error: Exception) -> None:
+        self.state.busy.set("")
+        text = str(error) if isinstance(error, DslError) else f"{type(error).__name__}: {error}"
+        self.state.trouble.set(text)
+        self._notifier.tell("error", text)
+        self._open_next()
+
+    # Compare ---------------------------------------------------------------------------------------
+
+    def _compare(self) -> None:
+        self.state.pair.set(None)
+        self.state.trouble.set("")
+        first, second = self.state.first.value, self.state.second.value
+        if first is not None and second is not None:
+            self._start(
+                f"Compare {first.name}", lambda progress: make_pair(first, second, progress), self._compared
+            )
+
+    def _compared(self, pair: Pair) -> None:
+        if not pair.bands:
+            self.state.shown.set(Shown.DEPTH)
+        self.state.band.set(len(pair.bands) // 2)
+        self.state.cursor.set(None)
+        self.state.pair.set(pair)
+
+    # Look ------------------------------------------------------------------------------------------
+
+    def show(self, shown: Shown) -> None:
+        """Show depth, or a band."""
+        pair = self.state.pair.value
+        if shown is Shown.BAND and pair is not None and not pair.bands:
+            self._notifier.tell("info", "The two have no band in common; only their depth can be compared.")
+            return
+        self.state.shown.set(shown)
+
+    def set_band(self, band: int) -> None:
+        """Show a common band by its number."""
+        pair = self.state.pair.value
+        if pair is not None and 0 <= band < len(pair.bands):
+            self.state.band.set(band)
+
+    def point_at(self, pixel: Pixel) -> None:
+        """Put the cursor on a pixel, in all pictures."""
+        pair = self.state.pair.value
+        if pair is not None and pair.first.arrays.holds(pixel):
+            self.state.cursor.set(pixel)
+
+    # Report ----------------------------------------------------------------------------------------
+
+    def write_report(self, target: Path) -> None:
+        """Write the report of A against its truth as an HTML page."""
+        pair = self.state.pair.value
+        if pair is None or pair.second.truth is None:
+            self._notifier.tell("info", "A report needs the truth: compare a result of the twin with it.")
+            return
+        first, truth = pair.first, pair.second.truth
+
+        def work(progress: Progress) -> Path:
+            from dsl_core import pipeline
+            from dsl_core.evaluation.report.content import report_content
+            from dsl_core.io.result.result_file import load_result
+
+            progress.report("write the report", 0, 1)
+            result = load_result(first.arrays.path)
+            content = report_content(first.name, result, truth, pipeline.evaluate(result, truth))
+            return pipeline.write_report(content, target, overwrite=True)
+
+        self._start(
+            "Write the report",
+            work,
+            lambda path: self._notifier.tell("info", f"The report lies in {path}."),
+        )
+
+    def command_line(self) -> str:
+        """The command that compares A with its truth, or with B; empty while one of them is missing."""
+        pair = self.state.pair.value
+        if pair is None:
+            return ""
+        first, second = (shlex.quote(str(side.arrays.path)) for side in (pair.first, pair.second))
+        if pair.second.truth is not None:
+            return f"dsl-scan evaluate {first}"
+        return f"dsl-scan compare {first} {second}"
+
+
+def make_pair(first: Side, second: Side, progress: Progress) -> Pair:
+    """Two sides with their figures; raises `DecodeError` when they do not fit."""
+    from dsl_core.evaluation.difference import (
+        compare_results,
+        difference_table,
+        require_same_size,
+        shared_bands,
+    )
+
+    a, b = first.arrays, second.arrays
+    require_same_size(a["depth_mm"], b["depth_mm"])
+    both = a.has_spectra and b.has_spectra
+    bands = shared_bands(a.wavelengths_nm, b.wavelengths_nm) if both else []
+    if second.truth is not None:
+        from dsl_core import pipeline
+        from dsl_core.evaluation.verdict import verdicts
+        from dsl_core.io.result.result_file import load_result
+
+        progress.report("compare with the truth", 0, 1)
+        return Pair(
+            first, second, tuple(bands), verdicts(pipeline.evaluate(load_result(a.path), second.truth))
+        )
+    cube_a, cube_b = (side["reflectance"] if both else None for side in (a, b))
+    turned = [(k, i) for i, k in bands]
+    # A minus B: B is what A is measured against.
+    found = compare_results(b["depth_mm"], a["depth_mm"], cube_b, cube_a, turned, progress)
+    return Pair(first, second, tuple(bands), difference_table(found))
+
+
+def truth_arrays(result: ResultArrays, truth: Truth) -> ResultArrays:
+    """What is known of a scene in the form of a result with the bands of another; NaN where nothing is."""
+    arrays = {}
+    if truth.depth_mm is not None:
+        arrays["depth_mm"] = np.asarray(truth.depth_mm, np.float32)
+    else:
+        arrays["depth_mm"] = np.full(result.shape, np.nan, np.float32)
+    if truth.material is not None and truth.spectra is not None and result.has_spectra:
+        # One row more, for pixels without a material: index -1 finds it.
+        spectra = np.vstack([truth.spectra, np.full((1, truth.spectra.shape[1]), np.nan)]).astype(np.float32)
+        arrays["reflectance"] = np.ascontiguousarray(spectra.T)[:, truth.material]
+    return ResultArrays(result.path, result.wavelengths_nm, arrays)

@@ -1,0 +1,1 @@
+"""Several results: depth over stage positions, or error over time."""

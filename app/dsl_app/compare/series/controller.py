@@ -1,0 +1,315 @@
+"""What a series of results decides: which ones, where the stage stood, what they say together. No Qt."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_app.compare.series.state import Kind, Row, SeriesState
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.known_files import RESULT_NAME
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.undo import Change, UndoStack
+from dsl_core.errors import Cancelled, DecodeError, DslError
+from dsl_core.evaluation.flat_target import Region
+from dsl_core.evaluation.stage_test import stage_test
+from dsl_core.evaluation.time_sweep import SweepFigure, require_sweep
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    from dsl_core.workflows.series import Reference
+
+
+class SeriesController:
+    """Fills a `SeriesState`; results are read by one job after the other."""
+
+    def __init__(self, state: SeriesState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
+        self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
+        self._reference: Reference | None = None
+
+    # Rows ------------------------------------------------------------------------------------------
+
+    def knows(self, path: Path) -> bool:
+        """Whether a path is a result, or a folder with some."""
+        return bool(results_in(path))
+
+    def add(self, paths: Iterable[Path]) -> None:
+        """Take results, or all results of folders."""
+        known = {row.path for row in self.state.rows.value}
+        found = [result for path in paths for result in results_in(path)]
+        new = [Row(path) for path in dict.fromkeys(found) if path not in known]
+        if not found:
+            self._notifier.tell(
+                "warning", "There is no result. Choose folders NAME.zarr, or one with several."
+            )
+        elif not new:
+            self._notifier.tell("info", "All of these results are in the series already.")
+        else:
+            self._set_rows((*self.state.rows.value, *new))
+
+    def come_back(
+        self, rows: Sequence[tuple[Path, float | None]], against: Path | None, region: Region | None
+    ) -> None:
+        """Take results with their positions, and ask the same of them again; what is gone is told."""
+        here = tuple(Row(path, position_mm) for path, position_mm in rows if results_in(path))
+        gone = [path.name for path, _ in rows if not results_in(path)]
+        if gone:
+            self._notifier.tell(
+                "warning", f"The series has lost {', '.join(gone)}. Add the results from where they are now."
+            )
+        self._reference = None
+        self.state.against.set(against if against is not None and results_in(against) else None)
+        self.state.region.set(region)
+        self._set_rows(here)
+
+    def remove(self, path: Path) -> None:
+        """Take a result out of the series."""
+        rows = self.state.rows.value
+        at = next((i for i, row in enumerate(rows) if row.path == path), None)
+        if at is None:
+            self._notifier.tell("info", "Select the row of a result first.")
+            return
+        gone = rows[at]
+
+        def put_back() -> None:
+            now = self.state.rows.value
+            self._set_rows((*now[:at], gone, *now[at:]))
+
+        self._undo.push(
+            Change(
+                f"remove {gone.name}",
+                lambda: self._set_rows(tuple(row for row in self.state.rows.value if row.path != path)),
+                put_back,
+            )
+        )
+
+    def set_position(self, path: Path, position_mm: float) -> None:
+        """Say where the stage stood for a result."""
+        row = next(row for row in self.state.rows.value if row.path == path)
+        if row.position_mm == position_mm:
+            return
+        before = row.position_mm
+        self._undo.push(
+            Change(
+                f"position of {row.name}",
+                lambda: self._change(path, position_mm=position_mm),
+                lambda: self._change(path, position_mm=before),
+            )
+        )
+
+    def _change(self, path: Path, **fields: object) -> None:
+        rows = self.state.rows.value
+        self._set_rows(tuple(replace(row, **fields) if row.path == path else row for row in rows))  # type: ignore[arg-type]
+
+    def _set_rows(self, rows: tuple[Row, ...]) -> None:
+        if not rows:
+            # The next results may show another scene.
+            self._reference = None
+        # What was said of the old rows is not about the new ones.
+        self.state.test.set(None)
+        self.state.rows.set(rows)
+        self._judge()
+        self._read()
+
+    def select(self, path: Path | None) -> None:
+        """Look at a row."""
+        self.state.selected.set(path)
+
+    # Questions -------------------------------------------------------------------------------------
+
+    def ask(self, kind: Kind) -> None:
+        """Ask for depth over positions, or for accuracy over time."""
+        self.state.kind.set(kind)
+        self._set_rows(self.state.rows.value)
+
+    def show_figure(self, figure: SweepFigure) -> None:
+        """Show an error over seconds."""
+        self.state.figure.set(figure)
+
+    def compare_with(self, path: Path | None) -> None:
+        """Compare the scans of a sweep with one of them, or with the truth."""
+        if path == self.state.against.value:
+            return
+        self.state.against.set(path)
+        self._reference = None
+        self._set_rows(tuple(replace(row, point=None, point_trouble="") for row in self.state.rows.value))
+
+    def set_region(self, region: Region | None) -> None:
+        """Count only a part of the picture, or all of it."""
+        before = self.state.region.value
+        if region != before:
+            self._undo.push(Change("region", lambda: self._look_at(region), lambda: self._look_at(before)))
+
+    def _look_at(self, region: Region | None) -> None:
+        self.state.region.set(region)
+        self._set_rows(tuple(replace(row, target=None, target_trouble="") for row in self.state.rows.value))
+
+    # Read ------------------------------------------------------------------------------------------
+
+    def _read(self) -> None:
+        """Read the next result that is not read yet; those that follow are read when it has ended."""
+        state = self.state
+        kind, asked = state.kind.value, (state.region.value, state.against.value)
+        row = next((row for row in state.rows.value if not row.is_read(kind)), None)
+        if row is None or state.busy.value:
+            return
+
+        def work(progress: Progress) -> Row:
+            return read_plane(row, asked[0], progress) if kind is Kind.STAGE else self._compare(row, progress)
+
+        def done(read: Row) -> None:
+            state.busy.set("")
+            if asked == (state.region.value, state.against.value):
+                self._take(kind, read)
+            else:
+                self._read()
+
+        def failed(error: Exception) -> None:
+            state.busy.set("")
+            self._take(kind, _without(row, kind, f"{type(error).__name__}: {error}"))
+
+        state.busy.set(f"Read {row.name}")
+        self._runner.submit(Job(f"Read {row.name}", work, done, failed, lambda: self._cancelled(kind)))
+
+    def _take(self, kind: Kind, read: Row) -> None:
+        """Keep what was read of a row, and a position that was typed meanwhile."""
+        if self.state.selected_row is None:
+            self.select(read.path)
+        if kind is Kind.SWEEP:
+            self._change(read.path, point=read.point, point_trouble=read.point_trouble)
+            return
+        read = self._of_one_size(read)
+        known = self._position(read.path)
+        self._change(
+            read.path,
+            position_mm=read.position_mm if known is None else known,
+            target=read.target,
+            target_trouble=read.target_trouble,
+        )
+
+    def _of_one_size(self, read: Row) -> Row:
+        first = next((row.target for row in self.state.rows.value if row.target is not None), read.target)
+        if read.target is None or first is None or first.shape == read.target.shape:
+            return read
+        sizes = [f"{width} × {height}" for height, width in (read.target.shape, first.shape)]
+        return _without(read, Kind.STAGE, f"It has {sizes[0]} pixels, the first result {sizes[1]}.")
+
+    def _cancelled(self, kind: Kind) -> None:
+        why = "Not read, as the work was cancelled. Remove it and add it again."
+        self.state.busy.set("")
+        self._set_rows(
+            tuple(row if row.is_read(kind) else _without(row, kind, why) for row in self.state.rows.value)
+        )
+
+    def _position(self, path: Path) -> float | None:
+        """What was typed while the result was being read."""
+        return next((row.position_mm for row in self.state.rows.value if row.path == path), None)
+
+    def _compare(self, row: Row, progress: Progress) -> Row:
+        """The row with its errors; the reference is read with the first one."""
+        from dsl_core.workflows.series import ResultReference, TruthReference
+
+        against = self.state.against.value
+        if against == row.path:
+            return _without(row, Kind.SWEEP, "The others are compared with it.")
+        try:
+            if self._reference is None:
+                self._reference = TruthReference() if against is None else ResultReference(against, progress)
+            return replace(row, point=self._reference.judge(row.path, progress))
+        except Cancelled:
+            raise
+        except DslError as error:
+            return _without(row, Kind.SWEEP, str(error))
+
+    # Judge -----------------------------------------------------------------------------------------
+
+    def _judge(self) -> None:
+        state = self.state
+        counted = state.counted
+        try:
+            if state.kind.value is Kind.STAGE:
+                targets = [row.target for row in counted if row.target is not None]
+                positions = [row.position_mm for row in counted if row.position_mm is not None]
+                state.test.set(stage_test(positions, targets))
+            else:
+                require_sweep([row.point for row in counted if row.point is not None])
+            state.advice.set("")
+        except DecodeError as error:
+            state.advice.set(str(error) if state.rows.value else "")
+
+    # Report ----------------------------------------------------------------------------------------
+
+    def write_report(self, target: Path) -> None:
+        """Write the series as an HTML page."""
+        state = self.state
+        counted, test, kind = state.counted, state.test.value, state.kind.value
+        if state.advice.value or not counted or state.busy.value:
+            self._notifier.tell(
+                "info", state.advice.value or "Add results first, and wait until they are read."
+            )
+            return
+        names = [row.name for row in counted]
+        targets = [row.target for row in counted if row.target is not None]
+        points = [row.point for row in counted if row.point is not None]
+        reference = "" if self._reference is None else self._reference.name
+
+        def work(progress: Progress) -> Path:
+            from dsl_core.evaluation.report.series_page import stage_page, sweep_page
+            from dsl_core.workflows.series import write_page
+
+            progress.report("write the report", 0, 1)
+            if kind is Kind.STAGE and test is not None:
+                return write_page(lambda: stage_page(names, targets, test), target, overwrite=True)
+            return write_page(lambda: sweep_page(points, reference), target, overwrite=True)
+
+        def failed(error: Exception) -> None:
+            self._notifier.tell("error", str(error))
+
+        def done(path: Path) -> None:
+            self._notifier.tell("info", f"The report lies in {path}.")
+
+        self._runner.submit(Job("Write the report", work, done, failed))
+
+    def command_line(self) -> str:
+        """The command that does the same; empty while nothing can be said."""
+        state = self.state
+        counted = state.counted
+        if state.advice.value or not counted:
+            return ""
+        paths = " ".join(shlex.quote(str(row.path)) for row in counted)
+        if state.kind.value is Kind.SWEEP:
+            against = state.against.value
+            return f"dsl-scan sweep {paths}" + (f" --against {shlex.quote(str(against))}" if against else "")
+        positions = ",".join(f"{row.position_mm:.10g}" for row in counted)
+        region = state.region.value
+        part = "" if region is None else f" --region {','.join(map(str, region))}"
+        return f"dsl-scan depth-test {paths} --positions {positions}{part}"
+
+
+def results_in(path: Path) -> list[Path]:
+    """A result, or all results in a folder."""
+    if (path / RESULT_NAME).is_file():
+        return [path]
+    return sorted(each.parent for each in path.glob(f"*/{RESULT_NAME}")) if path.is_dir() else []
+
+
+def read_plane(row: Row, region: Region | None, progress: Progress) -> Row:
+    """The row with its flat target, or with the reason why there is none."""
+    from dsl_core.workflows.series import read_target
+
+    progress.report("find the plane", 0, 1)
+    try:
+        target, position = read_target(row.path, region)
+    except DslError as error:
+        return _without(row, Kind.STAGE, str(error))
+    return replace(row, target=target, position_mm=position)
+
+
+def _without(row: Row, kind: Kind, why: str) -> Row:
+    """The row without what is asked for, and the reason."""
+    if kind is Kind.STAGE:
+        return replace(row, target=None, target_trouble=why)
+    return replace(row, point=None, point_trouble=why)

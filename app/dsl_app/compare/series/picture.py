@@ -1,0 +1,119 @@
+"""How far the pixels of the selected result lie off their plane, and the region that counts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from dsl_app.compare.series.commands import SeriesCommands
+from dsl_app.compare.series.state import SeriesState
+from dsl_app.compare.view import DIFFERENCE
+from dsl_app.shared.colour_scales import colour_map, spread_of
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.region_box import RegionBox
+
+
+class SeriesPicture(QWidget):
+    """Follows a `SeriesState`; the rectangle asks for another region."""
+
+    def __init__(self, state: SeriesState, commands: SeriesCommands) -> None:
+        super().__init__()
+        self._state, self._commands, self._theme = state, commands, DARK
+        self.title = label("", "heading")
+        self.part = QPushButton("Re&gion")
+        self.part.setCheckable(True)
+        self.part.setToolTip("Count only what lies in a rectangle, which can be dragged on the picture")
+        self.canvas = pg.GraphicsLayoutWidget()
+        self.canvas.setAccessibleName("Residuals of the plane")
+        self.canvas.setToolTip(
+            "How far each pixel lies behind (red) or before (blue) the plane of the target; empty where it is"
+            " not counted."
+        )
+        self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
+        self.image = pg.ImageItem(axisOrder="row-major")
+        self.bar = pg.ColorBarItem(interactive=False, width=14, colorMap=colour_map(DIFFERENCE))
+        self.rectangle = RegionBox(1)
+        self.rectangle.hide()
+        self._lay_out()
+        self.part.clicked.connect(self._switch)
+        self.rectangle.sigRegionChangeFinished.connect(self._dragged)
+        self.stops = [
+            value.changed.connect(lambda _: self.show_row())
+            for value in (state.rows, state.selected, state.region)
+        ]
+        self.show_row()
+
+    def _lay_out(self) -> None:
+        self.canvas.addItem(self.box, 0, 0)
+        self.canvas.addItem(self.bar, 0, 1)
+        self.box.addItem(self.image)
+        self.box.addItem(self.rectangle, ignoreBounds=True)
+        head = QHBoxLayout()
+        head.addWidget(self.title, 1)
+        head.addWidget(self.part)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(2)
+        column.addLayout(head)
+        column.addWidget(self.canvas, 1)
+
+    @property
+    def _shape(self) -> tuple[int, int] | None:
+        row = self._state.selected_row
+        return None if row is None or row.target is None else row.target.shape
+
+    def show_row(self) -> None:
+        """Show the row that is selected."""
+        row, region = self._state.selected_row, self._state.region.value
+        target = None if row is None else row.target
+        self.part.setChecked(region is not None)
+        self.part.setEnabled(target is not None or region is not None)
+        self.rectangle.setVisible(region is not None)
+        self.bar.setVisible(target is not None)
+        if row is None or target is None:
+            self.image.clear()
+            self.title.setText("Select a row to see its plane." if row is None else f"{row.name}: no plane")
+            return
+        self.title.setText(f"{row.name}: off its plane (mm)")
+        reach = max(spread_of(np.abs(target.residual_mm), 0, 99)[1], 1e-6)
+        self.bar.setLevels((-reach, reach))
+        table = colour_map(DIFFERENCE).getLookupTable(nPts=256)
+        self.image.setImage(target.residual_mm, levels=(-reach, reach), lut=table, autoLevels=False)
+        height, width = target.shape
+        self.image.setRect(0, 0, width, height)
+        if region is not None:
+            self._place(region)
+
+    def _place(self, region: tuple[int, int, int, int]) -> None:
+        self.rectangle.blockSignals(True)
+        self.rectangle.setPos(region[0], region[1])
+        self.rectangle.setSize((region[2], region[3]))
+        self.rectangle.blockSignals(False)
+
+    def _switch(self, wanted: bool) -> None:
+        shape = self._shape
+        if wanted and shape is not None:
+            self.rectangle.blockSignals(True)
+            self.rectangle.put_in_middle(shape[1], shape[0])
+            self.rectangle.blockSignals(False)
+            self._commands.set_region(self.rectangle.region(shape[1], shape[0]))
+        else:
+            self._commands.set_region(None)
+
+    def _dragged(self, _: Any) -> None:
+        shape = self._shape
+        if shape is not None and self.rectangle.isVisible():
+            self._commands.set_region(self.rectangle.region(shape[1], shape[0]))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.canvas.setBackground(theme.base)
+        self.rectangle.apply_theme(theme)
+        for side in ("left", "right"):
+            self.bar.getAxis(side).setTextPen(theme.text)
+            self.bar.getAxis(side).setPen(theme.line)

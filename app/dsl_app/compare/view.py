@@ -1,0 +1,181 @@
+"""A, B and their difference as three pictures with one cursor and one zoom."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from dsl_app.compare.pair.state import CompareState, Pair, Shown
+from dsl_app.shared.colour_scales import DEPTH, GREY, colour_map, spread_of
+from dsl_app.shared.spectrum import Pixel
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.arrow_keys import arrow_step, moved_within
+from dsl_app.shared.widgets.turns import take_turn
+
+#: Differences: white is none, blue below, red above; lightness changes evenly.
+DIFFERENCE = "CET-D1A"
+
+
+class CompareView(QWidget):
+    """Paints the pair of a state; ``pointed`` tells the pixel under the mouse or moved to by arrow keys."""
+
+    pointed = Signal(object)
+
+    def __init__(self, state: CompareState) -> None:
+        super().__init__()
+        self._state, self._theme = state, DARK
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.canvas = pg.GraphicsLayoutWidget()
+        self.canvas.setAccessibleName("A, B and their difference")
+        self.canvas.setToolTip("A, B and A minus B. Drag to pan, wheel to zoom; arrow keys move the cursor.")
+        self.canvas.setFocusProxy(self)
+        self.titles = [pg.LabelItem(text, justify="left") for text in ("A", "B", "A − B")]
+        self.boxes = [pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False) for _ in range(3)]
+        self.images = [pg.ImageItem(axisOrder="row-major") for _ in range(3)]
+        self.crosses = [pg.TargetItem(size=13, movable=False) for _ in range(3)]
+        #: The scale of both pictures and that of their difference, once there is a pair: slow to make.
+        self.bars: tuple[Any, ...] = ()
+        self._lay_out()
+        self._mouse = pg.SignalProxy(self.canvas.scene().sigMouseMoved, rateLimit=60, slot=self._hover)
+        self.stops = [
+            state.pair.follow(self._new_pair),
+            state.shown.changed.connect(lambda _: self.paint()),
+            state.band.changed.connect(lambda _: self.paint()),
+            state.cursor.follow(self._show_cursor),
+        ]
+
+    def _lay_out(self) -> None:
+        # Columns: A, B, the scale of both, their difference, its scale.
+        for i, place in enumerate((0, 1, 3)):
+            self.canvas.addItem(self.titles[i], 0, place)
+            self.canvas.addItem(self.boxes[i], 1, place)
+            self.boxes[i].addItem(self.images[i])
+            self.boxes[i].addItem(self.crosses[i], ignoreBounds=True)
+            self.crosses[i].hide()
+            if i:
+                self.boxes[i].setXLink(self.boxes[0])
+                self.boxes[i].setYLink(self.boxes[0])
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.canvas)
+
+    # Mouse and keys --------------------------------------------------------------------------------
+
+    def _hover(self, event: tuple[Any]) -> None:
+        for box in self.boxes:
+            if box.sceneBoundingRect().contains(event[0]):
+                at = box.mapSceneToView(event[0])
+                self.pointed.emit((round(at.x()), round(at.y())))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrow keys move the cursor, with Shift by ten."""
+        step, pair = arrow_step(event), self._state.pair.value
+        if step is None or pair is None:
+            super().keyPressEvent(event)
+            return
+        height, width = pair.first.arrays.shape
+        at = self._state.cursor.value or (width // 2, height // 2)
+        self.pointed.emit(moved_within(at, step, (width, height)))
+
+    # Paint -----------------------------------------------------------------------------------------
+
+    def _new_pair(self, pair: Pair | None) -> None:
+        for item in self.images:
+            item.clear()
+        if pair is not None and not self.bars:
+            take_turn(self, self._make_bars)
+        for bar in self.bars:
+            bar.setVisible(pair is not None)
+        self._title(pair)
+        if pair is not None:
+            self._paint_whole()
+
+    def _paint_whole(self) -> None:
+        self.paint()
+        self.boxes[0].autoRange(padding=0.01, items=[self.images[0]])
+
+    def _make_bars(self) -> None:
+        if self.bars or self._state.pair.value is None:
+            return
+        self.bars = tuple(
+            pg.ColorBarItem(interactive=False, width=12, colorMap=colour_map(name))
+            for name in (DEPTH, DIFFERENCE)
+        )
+        for bar, place in zip(self.bars, (2, 4), strict=True):
+            self.canvas.addItem(bar, 1, place)
+        self._theme_bars()
+        self._paint_whole()
+
+    def _title(self, pair: Pair | None) -> None:
+        names = ("", "", "") if pair is None else (f"A  {pair.first.name}", f"B  {pair.second.name}", "A − B")
+        for title, name in zip(self.titles, names, strict=True):
+            title.setText(name, color=self._theme.text)
+
+    def paint(self) -> None:
+        """Paint what the state shows."""
+        state = self._state
+        pair = state.pair.value
+        images = None if pair is None else pair.images(state.shown.value, state.band.value)
+        if images is None:
+            return
+        first, second = images
+        levels = common_levels(first, second, state.shown.value)
+        colours = DEPTH if state.shown.value is Shown.DEPTH else GREY
+        gap = first - second
+        reach = max(spread_of(np.abs(gap), 0, 99)[1], 1e-6)
+        table = colour_map(colours).getLookupTable(nPts=256)
+        self._paint(0, first, levels, table)
+        self._paint(1, second, levels, table)
+        self._paint(2, gap, (-reach, reach), colour_map(DIFFERENCE).getLookupTable(nPts=256))
+        if self.bars:
+            self._show_scales(levels, reach, colours)
+
+    def _show_scales(self, levels: tuple[float, float], reach: float, colours: str) -> None:
+        scale, difference = self.bars
+        scale.setColorMap(colour_map(colours))
+        scale.setLevels(levels)
+        difference.setLevels((-reach, reach))
+        depth = self._state.shown.value is Shown.DEPTH
+        words = ("Depth (mm)", "Difference (mm)") if depth else ("Reflectance", "Difference of reflectance")
+        for bar, text in zip(self.bars, words, strict=True):
+            bar.setLabel("left", text, color=self._theme.muted)
+
+    def _paint(self, i: int, image: Any, levels: tuple[float, float], table: Any) -> None:
+        self.images[i].setImage(image, levels=levels, lut=table, autoLevels=False)
+        height, width = image.shape
+        self.images[i].setRect(-0.5, -0.5, width, height)
+
+    def _show_cursor(self, pixel: Pixel | None) -> None:
+        for cross in self.crosses:
+            cross.setVisible(pixel is not None)
+            if pixel is not None:
+                cross.setPos(*pixel)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.canvas.setBackground(theme.base)
+        for cross in self.crosses:
+            cross.setPen(pg.mkPen(theme.accent, width=2))
+        self._theme_bars()
+        self._title(self._state.pair.value)
+        self.paint()
+
+    def _theme_bars(self) -> None:
+        theme = self._theme
+        for bar in self.bars:
+            for side in ("left", "right"):
+                bar.getAxis(side).setTextPen(theme.text)
+                bar.getAxis(side).setPen(theme.line)
+
+
+def common_levels(first: Any, second: Any, shown: Shown) -> tuple[float, float]:
+    """One scale for both pictures; reflectance begins at zero."""
+    spreads = [spread_of(image) for image in (first, second)]
+    low = min(spread[0] for spread in spreads) if shown is Shown.DEPTH else 0.0
+    return low, max(spread[1] for spread in spreads)

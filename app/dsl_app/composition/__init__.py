@@ -1,0 +1,1 @@
+"""Which page gets which controller and state; the only place that knows all slices."""

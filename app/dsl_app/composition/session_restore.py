@@ -1,0 +1,146 @@
+"""Keeps what is open while the window lives, and offers it again after a crash."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QObject, QTimer
+
+from dsl_app.session.keeper import SessionKeeper
+from dsl_app.session.records import Session
+from dsl_app.shell.main_window import MainWindow
+
+if TYPE_CHECKING:
+    from dsl_app.compare.pair.controller import CompareController
+    from dsl_app.compare.series.controller import SeriesController
+    from dsl_app.results.controller import ResultsController
+    from dsl_app.scan.controller import ScanController
+
+#: How long changes are gathered before they are written, ms.
+SAVE_MS = 1000
+
+
+class SessionDesk(QObject):
+    """Knows the controllers of the pages that were made so far."""
+
+    def __init__(self, window: MainWindow) -> None:
+        super().__init__(window)
+        self._window = window
+        self._results: ResultsController | None = None
+        self._scans: ScanController | None = None
+        self._compare: CompareController | None = None
+        self._series: SeriesController | None = None
+        self.keeper = SessionKeeper(window.parts.settings_path.parent / "sessions", self.collect)
+        self._timer = QTimer(self)
+        self._timer.setInterval(SAVE_MS)
+        self._timer.timeout.connect(self.save)
+
+    # Pages -----------------------------------------------------------------------------------------
+
+    def serve_results(self, control: ResultsController) -> None:
+        """Keep what the Results page shows."""
+        self._results, state = control, control.state
+        self.keeper.watch(
+            state.result,
+            state.view,
+            state.cloud_by,
+            state.quality,
+            state.band,
+            state.light,
+            state.adapted,
+            state.cursor,
+            state.depth_limits,
+        )
+
+    def serve_scan(self, control: ScanController) -> None:
+        """Keep what the Scan page plans."""
+        self._scans, state = control, control.state
+        self.keeper.watch(
+            state.plan,
+            state.target,
+            state.phase,
+            state.interrupted,
+            state.then_reconstruct,
+            state.calibration,
+        )
+
+    def serve_comparison(self, control: CompareController, series: SeriesController) -> None:
+        """Keep what the Compare page compares, two results and several."""
+        self._compare, self._series = control, series
+        several = series.state
+        self.keeper.watch(control.state.first, control.state.second)
+        self.keeper.watch(several.rows, several.kind, several.figure, several.against, several.region)
+
+    # Keep ------------------------------------------------------------------------------------------
+
+    def collect(self) -> Session:
+        """What is open now."""
+        from dsl_app.session.parts import compare_part, results_part, scan_part, series_part
+
+        return Session(
+            page=self._window.page,
+            results=None if self._results is None else results_part(self._results.state),
+            scan=None if self._scans is None else scan_part(self._scans.state),
+            compare=None if self._compare is None else compare_part(self._compare.state),
+            series=None if self._series is None else series_part(self._series.state),
+        )
+
+    def save(self) -> None:
+        """Write what changed."""
+        trouble = self.keeper.save()
+        if trouble:
+            self._window.toasts.tell("warning", trouble)
+
+    def start(self) -> None:
+        """Offer what a crash left behind, once; keep what is open from now on, until the window closes."""
+        session, trouble = self.keeper.left_behind()
+        if trouble:
+            self._window.toasts.tell("warning", trouble)
+        if session is not None:
+            self._window.toasts.offer(
+                f"The program did not end well last time. This was open: {', '.join(session.names)}.",
+                {"Open again": lambda: self.come_back(session)},
+            )
+        self._timer.start()
+        self._window.closed.connect(self._end)
+
+    def _end(self) -> None:
+        self._timer.stop()
+        self.keeper.end()
+
+    # Come back -------------------------------------------------------------------------------------
+
+    def come_back(self, session: Session) -> None:
+        """Open again what a session holds; what is gone is told."""
+        from dsl_app.compare.page import ComparePage
+        from dsl_app.session.parts import (
+            come_back_to_comparison,
+            come_back_to_result,
+            come_back_to_scan,
+            come_back_to_series,
+        )
+
+        window = self._window
+        if session.results is not None:
+            window.page_of("results")
+            assert self._results is not None
+            if not session.results.path.exists():
+                window.open_path(session.results.path)
+            else:
+                come_back_to_result(session.results, self._results)
+        if session.scan is not None:
+            window.page_of("scan")
+            assert self._scans is not None
+            come_back_to_scan(session.scan, self._scans)
+        if session.compare is not None:
+            window.page_of("compare")
+            assert self._compare is not None
+            come_back_to_comparison(session.compare, self._compare)
+        if session.series is not None:
+            page = window.page_of("compare")
+            assert self._series is not None
+            come_back_to_series(session.series, self._series)
+            if session.compare is None:
+                assert isinstance(page, ComparePage)
+                page.show_series()
+        window.open_page(session.page)

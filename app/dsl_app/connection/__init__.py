@@ -1,0 +1,1 @@
+"""The connected rig, for every slice that measures with it."""

@@ -1,0 +1,93 @@
+"""The rig as the window knows it: which one, whether it is there, what it sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from dsl_app.shared.evented import Value
+
+if TYPE_CHECKING:
+    # The window comes up before numpy.
+    from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
+    from dsl_core.model.frames import Frame
+
+
+class Link(Enum):
+    """Whether the devices answer."""
+
+    CLOSED = "not connected"
+    OPENING = "connecting"
+    OPEN = "connected"
+    LOST = "lost"
+
+
+@dataclass(frozen=True)
+class RigChoice:
+    """A rig by name with its options, as the command line takes them."""
+
+    name: str
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def command(self) -> str:
+        """How the command line names it."""
+        parts = [f"--rig {self.name}", *(f"--option {key}={value}" for key, value in self.options)]
+        return " ".join(parts)
+
+    @property
+    def words(self) -> str:
+        """How people read it, such as ``twin, scene plane``."""
+        return ", ".join((self.name, *(f"{key} {value}" for key, value in self.options)))
+
+
+@dataclass(frozen=True)
+class FrameCounts:
+    """Live frames so far: shown, lost on the way from the camera, and skipped because the window was busy."""
+
+    shown: int = 0
+    lost: int = 0
+    skipped: int = 0
+
+
+class RigState:
+    """Values that the rig's controller sets and pages follow.
+
+    ``frame`` is the latest live frame; ``trouble`` a sentence on why the rig is not there (empty: nothing).
+    ``is_exposing`` says that an exposure is being looked for. ``used_by`` names the work that has the rig for
+    itself and would be spoilt by another picture (empty: none).
+    """
+
+    def __init__(self, choice: RigChoice) -> None:
+        self.choice = Value(choice)
+        self.link = Value(Link.CLOSED)
+        self.devices: Value[DeviceRig | None] = Value(None)
+        self.trouble = Value("")
+        self.live = Value(False)
+        self.frame: Value[Frame | None] = Value(None)
+        self.exposure_ms = Value(1000.0 / 6.0)
+        self.counts = Value(FrameCounts())
+        self.is_exposing = Value(False)
+        self.used_by = Value("")
+
+    @property
+    def camera(self) -> CameraInfo | None:
+        """What the camera is; None while there is none."""
+        devices = self.devices.value
+        return None if devices is None else devices.camera.info
+
+    @property
+    def projector(self) -> ProjectorInfo | None:
+        """What the projector is; None while there is none."""
+        devices = self.devices.value
+        return None if devices is None else devices.projector.info
+
+    @property
+    def cycle_ms(self) -> float | None:
+        """The projector's colour cycle, as the self-test found it, else as its driver says; None without."""
+        devices = self.devices.value
+        if devices is None:
+            return None
+        known = devices.calibration
+        return devices.projector.info.frame_period_ms if known is None else known.frame_period_ms

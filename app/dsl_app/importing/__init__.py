@@ -1,0 +1,1 @@
+"""Import of folders that other programs wrote."""

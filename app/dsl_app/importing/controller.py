@@ -1,0 +1,166 @@
+"""Imports folders of other programs: says what is missing or misnamed, then takes them in. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dsl_app.importing.state import PUBLISHED, Found, TakeInOrder, TakeInState
+from dsl_app.importing.words import (
+    SUFFIXES,
+    command_of,
+    rows_of,
+    summary_of,
+    target_for,
+    trouble_of,
+)
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.sentences import sentence_of
+from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+#: What decides whether a folder can be imported; a change of them needs another look.
+_LOOKED_AT = {"folder", "base", "camera_px"}
+
+
+class TakeInController:
+    """Looks at a folder, keeps the order for it, and carries it out."""
+
+    def __init__(
+        self,
+        state: TakeInState,
+        runner: JobRunner,
+        notifier: Notifier,
+        library: CalibrationLibrary | None = None,
+    ) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+        self._library = library or CalibrationLibrary()
+        self._looks = 0
+
+    def look(self, folder: Path, home: Path) -> None:
+        """Look at a folder; what is imported of it is proposed to lie in ``home``."""
+        self.state.library.set(self._library.names())
+        before = self.state.order.value
+        # Folders of one rig come one after the other.
+        order = TakeInOrder(folder, home, PUBLISHED if before is None else before.base)
+
+        def done(found: Found) -> None:
+            self.state.order.set(replace(order, target=target_for(folder, found.kind, home)))
+            self._take(found)
+            self.state.ready.emit(found)
+
+        self._look(order, done)
+
+    def change(self, **what: Any) -> None:
+        """Change fields of the order; looks at the folder again where that matters."""
+        order, found = self.state.order.value, self.state.found.value
+        if order is None or found is None:
+            return
+        order = replace(order, **what)
+        self.state.order.set(order)
+        if _LOOKED_AT & set(what):
+            self._look(order, self._take)
+        else:
+            self.state.trouble.set(trouble_of(found, order))
+
+    def rename(self, name: str, home: Path) -> None:
+        """Store what is imported by a name in a folder."""
+        found = self.state.found.value
+        if found is not None:
+            suffix = SUFFIXES[found.kind]
+            plain = name.strip().removesuffix(suffix).replace("/", "-")
+            self.change(target=home.expanduser() / f"{plain}{suffix}")
+
+    def _look(self, order: TakeInOrder, done: Any) -> None:
+        self._looks += 1
+        number = self._looks
+        self.state.busy.set(f"Looking at {order.folder.name}")
+
+        def work(progress: Progress) -> Found:
+            progress.report("look at the files", 0, 0)
+            return look_at(order, self._library)
+
+        def looked(found: Found) -> None:
+            # A look that was overtaken by another says nothing any more.
+            if number == self._looks:
+                self.state.busy.set("")
+                done(found)
+
+        def failed(error: Exception) -> None:
+            self.state.busy.set("")
+            self.state.trouble.set(sentence_of(error))
+            self._tell(error)
+
+        ended = lambda: self.state.busy.set("")  # noqa: E731
+        self._runner.submit(Job(f"Look at {order.folder.name}", work, looked, failed, ended, is_minor=True))
+
+    def _take(self, found: Found) -> None:
+        assert self.state.order.value is not None
+        self.state.found.set(found)
+        self.state.trouble.set(trouble_of(found, self.state.order.value))
+
+    def command_line(self) -> str:
+        """The command that does the same."""
+        found, order = self.state.found.value, self.state.order.value
+        return "" if found is None or order is None else command_of(found, order)
+
+    def start(self) -> bool:
+        """Import in a job; False where that cannot be, and why is told."""
+        found, order = self.state.found.value, self.state.order.value
+        # Something of that name may have come meanwhile.
+        trouble = "Choose a folder first." if found is None or order is None else trouble_of(found, order)
+        self.state.trouble.set(trouble)
+        if found is None or order is None or trouble:
+            self._notifier.tell("warning", trouble)
+            return False
+        take = take_calibration if found.kind == "calibration" else take_scan
+        work = lambda progress: take(order, self._library, progress)  # noqa: E731
+        self._runner.submit(Job(f"Import {order.folder.name}", work, self.state.done.emit, self._tell))
+        return True
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+
+def look_at(order: TakeInOrder, library: CalibrationLibrary) -> Found:
+    """What the folder of an order holds; raises `StoreError`."""
+    from dsl_core.workflows import exchange
+
+    look = exchange.look_at(order.folder, base_of(order, library), _size(order))
+    return Found(
+        order.folder, look.kind, rows_of(look.table), summary_of(look.kind, look.table), look.obstacle
+    )
+
+
+def take_scan(order: TakeInOrder, library: CalibrationLibrary, progress: Progress) -> Path:
+    """Make a scan of a dataset, whole or not at all."""
+    from dsl_core.io.staging import staged
+    from dsl_core.workflows import exchange
+
+    with staged([order.target]) as (draft,):
+        exchange.import_scan(order.folder, draft, base_of(order, library), progress)
+    return order.target
+
+
+def take_calibration(order: TakeInOrder, library: CalibrationLibrary, progress: Progress) -> Path:
+    """Make a rig's file of a published calibration."""
+    from dsl_core.io.rig_file import save_rig
+    from dsl_core.workflows import exchange
+
+    progress.report("read the calibration", 0, 0)
+    rig = exchange.import_calibration(order.folder, base_of(order, library), _size(order))
+    return save_rig(rig, order.target)
+
+
+def base_of(order: TakeInOrder, library: CalibrationLibrary) -> Rig:
+    """The rig that gives film, sensor and scales; raises what `load_calibration` raises."""
+    from dsl_core.simulation.published_rig import published_rig
+
+    return published_rig() if order.base == PUBLISHED else load_calibration(order.base, library)
+
+
+def _size(order: TakeInOrder) -> tuple[int, int] | None:
+    return order.camera_px if all(order.camera_px) else None

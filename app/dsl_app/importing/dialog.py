@@ -1,0 +1,222 @@
+"""What was found in a folder of another program, and where what is imported of it is stored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Protocol
+
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QPushButton,
+    QWidget,
+)
+
+from dsl_app.importing.state import PUBLISHED, FileRow, Found, TakeInOrder, TakeInState
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
+from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.order_dialog import OrderCommands, OrderDialog
+from dsl_app.shared.widgets.read_table import ReadTable, cell
+
+_COLUMNS = ("Wanted", "Found", "Status", "What to do")
+_LARGEST_PX = 20000
+
+
+class TakeInCommands(OrderCommands, Protocol):
+    """What the dialog asks of its controller."""
+
+    def look(self, folder: Path, home: Path) -> None:
+        """Look at another folder."""
+
+    def change(self, **what: Any) -> None:
+        """Change fields of the order."""
+
+    def rename(self, name: str, home: Path) -> None:
+        """Store what is imported by a name in a folder."""
+
+
+class TakeInDialog(OrderDialog):
+    """Follows a `TakeInState` whose folder was looked at; the controller imports."""
+
+    def __init__(self, state: TakeInState, commands: TakeInCommands, parent: QWidget) -> None:
+        super().__init__(commands, parent)
+        order = state.order.value
+        assert order is not None
+        self._state, self._commands, self._theme = state, commands, DARK
+        #: The folder whose order is shown.
+        self._shown: Path | None = None
+        self.setWindowTitle("Import")
+        self.resize(880, 560)
+        add_help_key(self, "importing")
+        self._make_folder()
+        self._make_target(order)
+        self._lay_out()
+        self._connect()
+        self.stops = [
+            state.found.follow(self._show_found),
+            state.order.follow(self._show_order),
+            state.busy.follow(lambda _: self._judge()),
+            state.trouble.follow(lambda _: self._judge()),
+        ]
+        self.name.setFocus()
+
+    # Make ------------------------------------------------------------------------------------------
+
+    def _make_folder(self) -> None:
+        self._folder = label("", "muted")
+        self.other = push_button("&Another folder…", "Choose another folder to import")
+        self._summary = label("")
+        self.table = ReadTable(
+            "Files of the folder", "What the published layout wants, what is there, and what to do", _COLUMNS
+        )
+        self.table.wrap(len(_COLUMNS) - 1)
+        for column in (0, 1):
+            self.table.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
+        self.base = ChoiceBox(
+            "Film, sensor and scales of",
+            "The folder does not say how the film lies, how the sensor answers and how bright white is.\n"
+            "A scan needs the calibration of the rig that took it.",
+        )
+        self.base.addItem("The published rig", PUBLISHED)
+        for name in self._state.library.value:
+            self.base.addItem(name, name)
+        self.file = push_button("&File…", "Choose the file of a calibration (.json)")
+        self._size = QWidget()
+        self.width_px, self.height_px = (
+            WholeBox(f"{what} of the camera's images", 0, _LARGEST_PX, 0, "px",
+                     f"{what} in pixels; needed only where the calibration's file does not say it")
+            for what in ("Width", "Height")
+        )  # fmt: skip
+        for box in (self.width_px, self.height_px):
+            box.setSpecialValueText("as in the file")
+
+    def _make_target(self, order: TakeInOrder) -> None:
+        self.name = QLineEdit(order.target.stem)
+        self.name.setAccessibleName("Name")
+        self.name.setToolTip("Name of what is imported; its ending is added")
+        self.home = QLineEdit(str(order.target.parent))
+        self.home.setAccessibleName("Folder to store it in")
+        self.home.setToolTip("What is imported is stored here; the folder it comes from stays as it is")
+        self.browse = push_button("&Choose…", "Choose the folder to store it in")
+        self.name_buttons("Import", "Take it in; whole or not at all", "Import nothing (Escape)")
+
+    def _lay_out(self) -> None:
+        head = QHBoxLayout()
+        head.addWidget(self._folder, 1)
+        head.addWidget(self.other)
+        size = QHBoxLayout(self._size)
+        size.setContentsMargins(0, 0, 0, 0)
+        size.addWidget(self.width_px)
+        size.addWidget(label("×", "muted"))
+        size.addWidget(self.height_px)
+        size.addStretch(1)
+        self._form = QFormLayout()
+        self._form.addRow("Film, sensor, scales", _row(self.base, self.file))
+        self._form.addRow("Camera's images", self._size)
+        self._form.addRow("Name", self.name)
+        self._form.addRow("In folder", _row(self.home, self.browse))
+        self.column.addLayout(head)
+        self.column.addWidget(self._summary)
+        self.column.addWidget(self.table, 1)
+        self.column.addLayout(self._form)
+        self.close_column()
+
+    def _connect(self) -> None:
+        commands = self._commands
+        self.other.clicked.connect(self._choose_folder)
+        self.base.activated.connect(lambda index: commands.change(base=self.base.itemData(index)))
+        self.file.clicked.connect(self._choose_file)
+        self.browse.clicked.connect(self._choose_home)
+        for field in (self.name, self.home):
+            field.textEdited.connect(lambda _: self._rename())
+        for box in (self.width_px, self.height_px):
+            box.setKeyboardTracking(False)
+            box.valueChanged.connect(
+                lambda _: commands.change(camera_px=(self.width_px.value(), self.height_px.value()))
+            )
+
+    # Show ------------------------------------------------------------------------------------------
+
+    def _show_found(self, found: Found | None) -> None:
+        if found is None:
+            return
+        self._folder.setText(_breakable(str(found.folder)))
+        self._summary.setText(found.summary)
+        self._form.setRowVisible(self._size, found.kind == "calibration")
+        self.table.show_rows([self._items(row) for row in found.rows])
+
+    def _items(self, row: FileRow) -> tuple[Any, ...]:
+        theme = self._theme
+        harmless = row.status in ("misnamed", "extra", "optional")
+        colour = theme.good if not row.is_odd else theme.warn if harmless else theme.bad
+        return (
+            cell(_breakable(row.expected or "–")),
+            cell("as wanted" if row.found == row.expected else _breakable(row.found or "–"), theme.muted),
+            cell(row.status, colour),
+            cell(row.advice),
+        )
+
+    def _show_order(self, order: TakeInOrder | None) -> None:
+        if order is None:
+            return
+        if self.base.findData(order.base) < 0:
+            self.base.addItem(Path(order.base).name, order.base)
+        self.base.setCurrentIndex(self.base.findData(order.base))
+        # Who types is not corrected meanwhile.
+        is_other, self._shown = order.folder != self._shown, order.folder
+        for field, text in ((self.name, order.target.stem), (self.home, str(order.target.parent))):
+            if is_other or not field.hasFocus():
+                field.setText(text)
+        self._judge()
+
+    def _judge(self) -> None:
+        busy, trouble = self._state.busy.value, self._state.trouble.value
+        order, found = self._state.order.value, self._state.found.value
+        target = "" if order is None else f"Makes {order.target.name}."
+        if found is not None and found.kind == "calibration":
+            target += " It is taken into the library of calibrations."
+        self.judge("" if busy else trouble, f"{busy}…" if busy else target, bool(busy))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self._show_found(self._state.found.value)
+
+    # Do --------------------------------------------------------------------------------------------
+
+    def _rename(self) -> None:
+        self._commands.rename(self.name.text(), Path(self.home.text()))
+
+    def _choose_folder(self) -> None:
+        found = self._state.found.value
+        start = "" if found is None else str(found.folder.parent)
+        name = QFileDialog.getExistingDirectory(self, "Import a folder", start)
+        if name:
+            self._commands.look(Path(name), Path(self.home.text()))
+
+    def _choose_file(self) -> None:
+        name, _ = QFileDialog.getOpenFileName(self, "Choose a calibration", "", "Calibrations (*.json)")
+        if name:
+            self._commands.change(base=name)
+
+    def _choose_home(self) -> None:
+        name = QFileDialog.getExistingDirectory(self, "Store it in", self.home.text())
+        if name:
+            self.home.setText(name)
+            self._rename()
+
+
+def _breakable(path: str) -> str:
+    """A path whose lines may break at its slashes, by zero-width spaces."""
+    return path.replace("/", "/" + chr(0x200B))
+
+
+def _row(field: QWidget, button: QPushButton) -> QHBoxLayout:
+    row = QHBoxLayout()
+    row.addWidget(field, 1)
+    row.addWidget(button)
+    return row

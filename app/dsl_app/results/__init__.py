@@ -1,0 +1,1 @@
+"""The Results page: images, spectra and export of a result."""

@@ -1,0 +1,1 @@
+"""Reconstruction of a scan with other parameters."""

@@ -1,0 +1,1 @@
+"""The 3D view of a result, drawn in a thread of its own."""

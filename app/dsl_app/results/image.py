@@ -1,0 +1,274 @@
+"""The picture of a result: views 1 to 4, the cursor, marks, and outlines drawn with the mouse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from dsl_app.results.layers import Layer, Layers
+from dsl_app.results.outline_box import OutlineBox
+from dsl_app.results.state import Mark, ResultsState, Tool
+from dsl_app.shared.colour_scales import colour_map
+from dsl_app.shared.spectrum import Pixel
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.arrow_keys import arrow_step
+
+#: Moves of the mouse are looked at no more often than this, Hz.
+CURSOR_HZ = 60
+# pyqtgraph's own limit drops moves, so that the cursor would stay behind where the mouse comes to rest.
+pg.setConfigOption("mouseRateLimit", -1)
+
+
+class _Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """The graphics view, which hands keys to the picture around it."""
+
+    key = Signal(QKeyEvent)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrows, Enter, Escape and Delete are the picture's."""
+        event.ignore()
+        self.key.emit(event)
+        if not event.isAccepted():
+            super().keyPressEvent(event)
+
+
+class ResultImage(QWidget):
+    """Paints the result of a state; tells what the mouse and keys want."""
+
+    pointed = Signal(object)
+    pinned = Signal(object)
+    outlined = Signal(object)
+    moved = Signal(int, int)
+    deleted = Signal()
+
+    def __init__(self, state: ResultsState) -> None:
+        super().__init__()
+        self._state = state
+        self._layers: Layers | None = None
+        self._theme = DARK
+        self._mark_items: list[Any] = []
+        self._bar: tuple[Any, ...] = ()
+        self.canvas = _Canvas()
+        self.canvas.setAccessibleName("Picture of the result")
+        self.canvas.setToolTip(
+            "Click or press Enter to pin a spectrum; drag to pan, wheel to zoom; arrow keys move the cursor"
+        )
+        self.box = OutlineBox()
+        self.canvas.addItem(self.box, 0, 0)
+        self.image, self.overlay = (pg.ImageItem(axisOrder="row-major") for _ in range(2))
+        self.overlay.setZValue(5)
+        self._vertical, self._horizontal = (pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0))
+        self.pins = pg.ScatterPlotItem(size=11, pxMode=True)
+        for item in (self.image, self.overlay, self._vertical, self._horizontal, self.pins):
+            self.box.addItem(item, ignoreBounds=item is not self.image)
+        for line in (self._vertical, self._horizontal):
+            line.setZValue(20)
+            line.hide()
+        self.pins.setZValue(30)
+        self.bar = pg.ColorBarItem(interactive=False, width=14, colorMap=colour_map("viridis"))
+        self.canvas.addItem(self.bar, 0, 1)
+        self.legend = QLabel()
+        self.legend.setWordWrap(True)
+        self.legend.setTextFormat(Qt.TextFormat.RichText)
+        self.legend.setAccessibleName("Legend")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addWidget(self.canvas, 1)
+        column.addWidget(self.legend)
+        self._mouse = pg.SignalProxy(
+            self.canvas.scene().sigMouseMoved, rateLimit=CURSOR_HZ, slot=self._mouse_moved
+        )
+        self.box.clicked.connect(self._clicked)
+        self.box.drawn.connect(self.outlined)
+        self.canvas.key.connect(self._key)
+        self._follow()
+
+    def _follow(self) -> None:
+        state = self._state
+        state.result.follow(self._new_result)
+        for value in (
+            state.view,
+            state.cloud_by,
+            state.band,
+            state.quality,
+            state.picture,
+            state.depth_limits,
+        ):
+            value.changed.connect(lambda _: self.paint())
+        state.cursor.follow(self._show_cursor)
+        state.marks.follow(self._show_marks)
+        state.search.follow(lambda _: self._show_search())
+        state.tool.follow(self._take_tool)
+
+    # Mouse and keys --------------------------------------------------------------------------------
+
+    def _pixel(self, x: float, y: float) -> Pixel | None:
+        pixel = (round(x), round(y))
+        result = self._state.result.value
+        return pixel if result is not None and result.holds(pixel) else None
+
+    def _mouse_moved(self, event: tuple[Any]) -> None:
+        if self.box.sceneBoundingRect().contains(event[0]):
+            at = self.box.mapSceneToView(event[0])
+            pixel = self._pixel(at.x(), at.y())
+            if pixel is not None:
+                self.pointed.emit(pixel)
+
+    def _clicked(self, x: float, y: float) -> None:
+        pixel = self._pixel(x, y)
+        if pixel is not None:
+            self.pointed.emit(pixel)
+            self.pinned.emit(pixel)
+
+    def _take_tool(self, tool: Tool) -> None:
+        self.box.set_tool("" if tool is Tool.PIN else tool.value)
+        self.canvas.setCursor(Qt.CursorShape.ArrowCursor if tool is Tool.PIN else Qt.CursorShape.CrossCursor)
+
+    def _key(self, event: QKeyEvent) -> None:
+        key = Qt.Key(event.key())
+        step = arrow_step(event)
+        if step is not None:
+            self.moved.emit(*step)
+        elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_P):
+            if self.box.is_drawing:
+                self.box.close_outline()
+            elif self._state.cursor.value is not None:
+                self.pinned.emit(self._state.cursor.value)
+        elif key == Qt.Key.Key_Escape and self.box.is_drawing:
+            self.box.give_up()
+        elif key == Qt.Key.Key_Delete:
+            self.deleted.emit()
+        elif key == Qt.Key.Key_F:
+            self.fit()
+        else:
+            return
+        event.accept()
+
+    # Paint -----------------------------------------------------------------------------------------
+
+    def _new_result(self, result: Any) -> None:
+        self._layers = None if result is None else Layers(result)
+        self.paint()
+        if result is not None:
+            self.fit()
+
+    def fit(self) -> None:
+        """Show the whole image."""
+        self.box.autoRange(padding=0.01, items=[self.image])
+
+    def paint(self) -> None:
+        """Paint the view of the state."""
+        layer = None if self._layers is None else self._layers.layer(self._state)
+        if layer is None:
+            self.image.clear()
+            self.bar.hide()
+            self.legend.hide()
+            return
+        levels = layer.levels if layer.levels is not None else (0, 255)
+        table = layer.table
+        if layer.colours:
+            table = colour_map(layer.colours).getLookupTable(nPts=256)
+        self.image.setImage(layer.image, levels=levels, lut=table, autoLevels=False)
+        # Pixels have their centres at whole numbers.
+        height, width = layer.image.shape[:2]
+        self.image.setRect(-0.5, -0.5, width, height)
+        self._show_bar(layer)
+
+    def _show_bar(self, layer: Layer) -> None:
+        self.bar.setVisible(bool(layer.colours))
+        bar = (layer.colours, layer.levels, layer.label)
+        # Its axis takes as long to paint as the picture: it is left alone while a band slider is dragged.
+        if layer.colours and bar != self._bar:
+            self._bar = bar
+            self.bar.setColorMap(colour_map(layer.colours))
+            self.bar.setLevels(layer.levels)
+            self.bar.setLabel("left", layer.label)
+        self.legend.setVisible(bool(layer.keys))
+        if layer.keys:
+            self.legend.setText(
+                " &nbsp; ".join(
+                    f'<span style="color:{colour}">■</span>&nbsp;{name.replace(" ", "&nbsp;")}&nbsp;'
+                    f'<span style="color:{self._theme.muted}">{share:.1%}</span>'
+                    for colour, name, share in layer.keys
+                )
+            )
+
+    def _show_cursor(self, pixel: Pixel | None) -> None:
+        for line, value in ((self._vertical, 0), (self._horizontal, 1)):
+            line.setVisible(pixel is not None)
+            if pixel is not None:
+                line.setPos(pixel[value])
+
+    def _show_marks(self, marks: tuple[Mark, ...]) -> None:
+        for item in self._mark_items:
+            self.box.removeItem(item)
+        self._mark_items = []
+        spots = []
+        for mark in marks:
+            colour = self._theme.pins[mark.colour % len(self._theme.pins)]
+            if not mark.shown or mark.trouble:
+                continue
+            if mark.pixel is not None:
+                spots.append({"pos": mark.pixel, "brush": colour, "pen": pg.mkPen("#000000", width=1)})
+            elif mark.kind == "region":
+                self._mark_items.append(self._region_item(mark, colour))
+        self.pins.setData(spots)
+        for item in self._mark_items:
+            self.box.addItem(item, ignoreBounds=True)
+
+    def _region_item(self, mark: Mark, colour: str) -> Any:
+        if mark.outline_px:
+            x, y = zip(*mark.outline_px, mark.outline_px[0], strict=True)
+            item = pg.PlotCurveItem(list(x), list(y), pen=pg.mkPen(colour, width=2))
+            item.setZValue(10)
+            return item
+        result = self._state.result.value
+        assert result is not None
+        from dsl_core.evaluation.regions import mask_of_runs
+
+        return tinted(mask_of_runs(mark.runs, result.shape), colour, 110, 8)
+
+    def _show_search(self) -> None:
+        search = self._state.search.value
+        self.overlay.setVisible(search is not None)
+        if search is not None:
+            self.overlay.setImage(rgba_of(search.found, self._theme.accent, 190), autoLevels=False)
+            height, width = search.likeness.delta_e.shape
+            self.overlay.setRect(-0.5, -0.5, width, height)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.canvas.setBackground(theme.base)
+        self.box.set_colour(theme.accent)
+        for line in (self._vertical, self._horizontal):
+            line.setPen(pg.mkPen(theme.accent, width=1))
+        for side in ("left", "right"):
+            axis = self.bar.getAxis(side)
+            axis.setTextPen(theme.text)
+            axis.setPen(theme.line)
+            axis.labelStyle["color"] = theme.text
+        self._show_marks(self._state.marks.value)
+        self._show_search()
+        self.paint()
+
+
+def rgba_of(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int) -> Any:
+    """A mask (rows, columns) as RGBA bytes in a colour."""
+    rgba = np.zeros((*mask.shape, 4), np.uint8)
+    rgba[mask] = (*bytes.fromhex(colour[1:]), alpha)
+    return rgba
+
+
+def tinted(mask: np.ndarray[Any, np.dtype[np.bool_]], colour: str, alpha: int, z: float) -> Any:
+    """An image item that tints the pixels of a mask."""
+    item = pg.ImageItem(rgba_of(mask, colour, alpha), axisOrder="row-major")
+    item.setRect(-0.5, -0.5, mask.shape[1], mask.shape[0])
+    item.setZValue(z)
+    return item

@@ -1,0 +1,177 @@
+"""A window with the intensity graph of a pixel: three colours over the lines, against the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QDialog, QVBoxLayout, QWidget
+
+from dsl_app.results.state import ResultsState
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.workflows.inspection import IntensityGraph
+
+CHANNELS = ("R", "G", "B")
+#: Wavelengths that are labelled along the first orders, nm.
+LABELLED_NM = 50.0
+ORDER_NAMES = {1: "+1", -1: "−1"}
+
+
+class IntensityWindow(QDialog):
+    """Follows the graph of a state; stays open beside the picture."""
+
+    def __init__(self, state: ResultsState, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._theme, self._graph = DARK, state.graph.value
+        self.setWindowTitle("Intensity graph")
+        self.resize(860, 440)
+        add_help_key(self, "reading-an-intensity-graph")
+        self.plot = pg.PlotWidget(enableMenu=False)
+        self.plot.setAccessibleName("Intensity graph")
+        self.plot.setToolTip(
+            "Points are measured, lines are the model of the reconstructed spectrum. The dashed line is the"
+            " zero order; wavelengths of the first orders stand above."
+        )
+        self.item = self.plot.getPlotItem()
+        self.item.hideButtons()
+        self.item.setLabel("bottom", "Frame of the line set")
+        self.item.setLabel("left", "Signal (DN/ms)")
+        self.item.showAxis("top")
+        self.item.showGrid(x=True, y=True, alpha=0.18)
+        for side in ("bottom", "left", "top"):
+            self.item.getAxis(side).enableAutoSIPrefix(False)
+        self.item.addLegend(offset=(-10, 10))
+        self.zero = pg.InfiniteLine(angle=90, movable=False)
+        self.item.addItem(self.zero, ignoreBounds=True)
+        self.spans = {order: pg.LinearRegionItem(movable=False) for order in ORDER_NAMES}
+        for span in self.spans.values():
+            span.setZValue(-10)
+            self.item.addItem(span, ignoreBounds=True)
+        self.measured = [
+            self.item.plot(
+                pen=None,
+                symbol="o",
+                symbolSize=3,
+                symbolPen=None,
+                symbolBrush=colour,
+                name=f"{name} measured",
+            )
+            for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)
+        ]
+        self.model = [
+            self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model")
+            for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)
+        ]
+        self.faint = QCheckBox("Scale to the first orders")
+        self.faint.setToolTip(
+            "The zero order is far brighter and leaves the window; without this all is shown"
+        )
+        self.faint.setChecked(True)
+        self.faint.toggled.connect(lambda _: self._scale())
+        self.text = label("", "muted")
+        self.text.setWordWrap(True)
+        column = QVBoxLayout(self)
+        column.addWidget(self.plot, 1)
+        column.addWidget(self.faint)
+        column.addWidget(self.text)
+        state.graph.follow(self._show)
+
+    def _show(self, graph: IntensityGraph | None) -> None:
+        self._graph = graph
+        if graph is None:
+            return
+        self.setWindowTitle(f"Intensity graph of pixel {graph.pixel[0]}, {graph.pixel[1]}")
+        frames = np.arange(graph.measured.shape[1])
+        for c in range(3):
+            self.measured[c].setData(frames, graph.measured[c])
+            if graph.model is None:
+                self.model[c].setData([], [])
+            else:
+                self.model[c].setData(frames, graph.model[c])
+        self.zero.setVisible(graph.zero is not None)
+        if graph.zero is not None:
+            self.zero.setPos(graph.zero)
+        for order, span in self.spans.items():
+            reached = known(graph.orders.get(order))
+            span.setVisible(reached.size > 0)
+            if reached.size:
+                span.setRegion((float(reached.min()), float(reached.max())))
+        self.item.getAxis("top").setTicks([ticks(graph)])
+        self._scale()
+        self.text.setText(describe(graph))
+
+    def _scale(self) -> None:
+        graph = self._graph
+        if graph is None:
+            return
+        self.item.setXRange(0, graph.measured.shape[1] - 1, padding=0.02)
+        top = faint_top(graph) if self.faint.isChecked() else float(np.nanmax(graph.measured))
+        self.item.setYRange(
+            min(float(np.nanpercentile(graph.measured, 1)), 0.0), 1.1 * max(top, 1e-6), padding=0
+        )
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.plot.setBackground(theme.base)
+        for side in ("left", "bottom", "top"):
+            axis = self.item.getAxis(side)
+            axis.setPen(theme.line)
+            axis.setTextPen(theme.muted)
+            axis.labelStyle["color"] = theme.muted
+            axis.setLabel(axis.labelText)
+        self.item.legend.setLabelTextColor(theme.text)
+        self.zero.setPen(pg.mkPen(theme.text, width=1, style=Qt.PenStyle.DashLine))
+        for span in self.spans.values():
+            span.setBrush(pg.mkBrush(theme.accent + "22"))
+            for line in span.lines:
+                line.setPen(pg.mkPen(theme.line))
+
+
+def known(values: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    """The values that are numbers."""
+    return np.empty(0) if values is None else values[np.isfinite(values)]
+
+
+def faint_top(graph: IntensityGraph) -> float:
+    """The brightest signal of the first orders; of all frames where none reaches the pixel."""
+    spans = [known(frames) for frames in graph.orders.values()]
+    parts = [
+        graph.measured[:, max(int(span.min()), 0) : int(span.max()) + 2] for span in spans if span.size > 0
+    ]
+    return float(max(np.nanmax(part) for part in parts)) if parts else float(np.nanmax(graph.measured))
+
+
+def ticks(graph: IntensityGraph) -> list[tuple[float, str]]:
+    """Places and names of the second axis: round wavelengths of the first orders, and the zero order."""
+    found = []
+    for frames in graph.orders.values():
+        round_nm = np.isclose(graph.wavelengths_nm % LABELLED_NM, 0)
+        for nm, frame in zip(graph.wavelengths_nm[round_nm], frames[round_nm], strict=True):
+            if np.isfinite(frame):
+                found.append((float(frame), f"{nm:g}"))
+    if graph.zero is not None:
+        found.append((graph.zero, "zero order"))
+    return found
+
+
+def describe(graph: IntensityGraph) -> str:
+    """What the graph says in a sentence or two."""
+    reached = [name for order, name in ORDER_NAMES.items() if known(graph.orders.get(order)).size]
+    parts = []
+    if graph.zero is not None:
+        where = " and ".join(reached)
+        parts.append(
+            f"First order {where} reaches the pixel." if reached else "No first order reaches the pixel."
+        )
+        parts.append("The upper axis is in nm.")
+    if graph.model is None:
+        parts.append("The pixel has no spectrum, so there is no model to compare with.")
+    else:
+        miss = float(np.sqrt(np.nanmean((graph.measured - graph.model) ** 2)))
+        parts.append(f"Measured and model differ by {miss:.3g} DN/ms (RMS over all frames and colours).")
+    return " ".join(parts)

@@ -1,0 +1,144 @@
+"""What each view of a result paints: values, levels, colours and the words of its colour bar."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_app.results.state import Limits, Quality, ResultsState, View
+from dsl_app.shared.colour_scales import DEPTH, GREY, SHARE, colour_map, spread_of
+from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
+
+#: Which light measured a band: orders +1, -1, both, or only the zero order (with the prior).
+ORDER_NAMES = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}
+ORDER_COLOURS = {1: "#4477aa", 2: "#ee6677", 3: "#228833", 4: "#ccbb44"}
+NOTHING = "#8a8f98"
+
+
+@dataclass(frozen=True)
+class Layer:
+    """An image with levels and a lookup table; ``label`` names the colour bar, ``keys`` a legend instead."""
+
+    image: NDArray[Any]
+    levels: tuple[float, float] | None = None
+    colours: str = ""
+    table: NDArray[np.uint8] | None = None
+    label: str = ""
+    keys: tuple[tuple[str, str, float], ...] = ()
+
+
+def within(depth_mm: NDArray[Any], limits: Limits | None) -> NDArray[np.bool_]:
+    """Where there is a depth that is shown; without limits all that is known."""
+    shown: NDArray[np.bool_] = np.isfinite(depth_mm)
+    if limits is not None:
+        shown &= (depth_mm >= limits[0]) & (depth_mm <= limits[1])
+    return shown
+
+
+class Layers:
+    """Makes the layers of one result; what costs time is made once."""
+
+    def __init__(self, result: ResultArrays) -> None:
+        self.result = result
+        self._known: dict[str, Any] = {}
+
+    def layer(self, state: ResultsState) -> Layer | None:
+        """The layer of the view at hand; None where the result has nothing to show."""
+        view = state.view.value if state.view.value is not View.CLOUD else state.cloud_by.value
+        if view is View.BAND and self.result.has_spectra:
+            return self._band(state.band.value)
+        if view is View.DEPTH:
+            return self._depth(state.depth_limits.value)
+        if view is View.QUALITY:
+            return self._quality(state.quality.value, state.band.value)
+        picture = state.picture.value
+        return Layer(picture) if picture is not None else self._depth(state.depth_limits.value)
+
+    def _once(self, name: str, make: Any) -> Any:
+        if name not in self._known:
+            self._known[name] = make()
+        return self._known[name]
+
+    def _band(self, band: int) -> Layer:
+        cube = self.result["reflectance"]
+        top = self._once("reflectance", lambda: spread_of(cube[:: max(len(cube) // 6, 1)])[1])
+        return Layer(cube[band], (0.0, top), GREY, label="Reflectance")
+
+    def _map(self, name: str, colours: str, label: str) -> Layer:
+        values = self.result[name]
+        return Layer(values, self._once(name, lambda: spread_of(values)), colours, label=label)
+
+    def _depth(self, limits: Limits | None) -> Layer:
+        whole = self._map("depth_mm", DEPTH, "Depth, mm")
+        if limits is None:
+            return whole
+        shown = np.where(within(whole.image, limits), whole.image, np.float32(np.nan))
+        return Layer(shown, limits, DEPTH, label=whole.label)
+
+    def _quality(self, what: Quality, band: int) -> Layer | None:
+        names = {
+            Quality.SHARE: ("data_share", "Share decided by data"),
+            Quality.SPREAD: ("reflectance_std", "Standard deviation of reflectance"),
+        }
+        if what is Quality.DEPTH_SPREAD:
+            return self._map("depth_std_mm", DEPTH, "Standard deviation of depth, mm")
+        if what is Quality.FLAGS or not self.result.has_spectra:
+            layer: Layer = self._once("flags", self._flags)
+            return layer
+        if what is Quality.ORDERS:
+            return self._orders(band)
+        name, label = names[what]
+        cube = self.result[name]
+        high = (
+            1.0
+            if what is Quality.SHARE
+            else self._once(name, lambda: spread_of(cube[:: len(cube) // 6 or 1])[1])
+        )
+        return Layer(cube[band], (0.0, high), SHARE, label=label)
+
+    def _flags(self) -> Layer:
+        classes = gravest_flag(self.result["flags"])
+        colours = ["", *FLAG_COLOURS.values()]
+        names = ["nothing to remark", *FLAG_NAMES.values()]
+        return _classes(classes, names, [NOTHING, *colours[1:]])
+
+    def _orders(self, band: int) -> Layer:
+        reach = self.result["reach"][band]
+        names = ["no spectrum", *(ORDER_NAMES.get(i, "") for i in range(1, 5))]
+        colours = [NOTHING, *(ORDER_COLOURS.get(i, NOTHING) for i in range(1, 5))]
+        return _classes(np.minimum(reach, 4).astype(np.uint8), names, colours)
+
+
+#: How much of the colour of what is nothing to see is painted, of 255.
+FAINT = 40
+
+
+def _classes(classes: NDArray[np.uint8], names: list[str], colours: list[str]) -> Layer:
+    table = np.zeros((256, 4), np.uint8)
+    for i, colour in enumerate(colours):
+        table[i] = (*bytes.fromhex(colour[1:]), 255 if i else FAINT)
+    counts = np.bincount(classes.ravel(), minlength=len(colours)) / classes.size
+    faint = ",".join(str(level) for level in bytes.fromhex(colours[0][1:]))
+    shown = [f"rgba({faint},{FAINT / 255:.2f})", *colours[1:]]
+    keys = tuple(
+        (colour, name, float(share))
+        for colour, name, share in zip(shown, names, counts, strict=False)
+        if share > 0
+    )
+    return Layer(classes, (0, 255), table=table, keys=keys)
+
+
+def rgb_of(layer: Layer) -> NDArray[np.uint8]:
+    """The colours (rows, columns, 3) that a layer has on the screen, for the cloud."""
+    if layer.levels is None:
+        return np.ascontiguousarray(layer.image[..., :3])
+    low, high = layer.levels
+    table = layer.table
+    if table is None:
+        table = colour_map(layer.colours).getLookupTable(nPts=256)
+    index = np.nan_to_num((layer.image - low) * (255 / (high - low))).clip(0, 255).astype(np.uint8)
+    return np.ascontiguousarray(np.asarray(table, np.uint8)[index][..., :3])

@@ -1,0 +1,1 @@
+"""Pins, regions and references, and their spectra."""

@@ -1,0 +1,222 @@
+"""The list of pins, regions and references: show, name, select, remove; and the selected one in figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import QModelIndex, QSize, Qt
+from PySide6.QtGui import QColor, QGuiApplication, QIcon, QKeySequence, QPixmap, QShortcut
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QHeaderView,
+    QLabel,
+    QPushButton,
+    QScrollArea,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.results.commands import MarkCommands
+from dsl_app.results.marks.figures import figures_of
+from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.theme import DARK, Theme
+
+KEY = Qt.ItemDataRole.UserRole
+EMPTY = (
+    "Click the picture to pin a spectrum, draw a region with the tools above, or drop a file with a reference"
+    " spectrum here."
+)
+_FORMATS = "Spectra (*.csv *.txt *.tsv *.dat *.asc *.sli *.hdr);;All files (*)"
+
+
+class MarksPanel(QWidget):
+    """Follows the marks of a state and asks a controller."""
+
+    def __init__(self, state: ResultsState, commands: MarkCommands) -> None:
+        super().__init__()
+        self._state, self._commands, self._theme = state, commands, DARK
+        self._filling = False
+        self.tree = QTreeWidget()
+        self.tree.setColumnCount(3)
+        self.tree.setHeaderLabels(["Spectrum", "Where", "Pixels"])
+        self.tree.setRootIsDecorated(False)
+        self.tree.setUniformRowHeights(True)
+        self.tree.setIconSize(QSize(14, 14))
+        self.tree.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.tree.setEditTriggers(
+            QAbstractItemView.EditTrigger.EditKeyPressed | QAbstractItemView.EditTrigger.DoubleClicked
+        )
+        self.tree.setAccessibleName("Pins, regions and references")
+        self.tree.setToolTip(
+            "Tick to show; F2 or a double click names; Delete removes; the selection is compared"
+        )
+        header = self.tree.header()
+        header.setStretchLastSection(False)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        for column in (1, 2):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        self.hint = QLabel(EMPTY)
+        self.hint.setProperty("role", "muted")
+        self.hint.setWordWrap(True)
+        self.figures = QLabel()
+        self.figures.setAccessibleName("Comparison with references")
+        self.figures.setTextFormat(Qt.TextFormat.RichText)
+        self.figures.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.figures.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.below = QScrollArea()
+        self.below.setWidget(self.figures)
+        self.below.setWidgetResizable(True)
+        self.below.setFrameShape(QFrame.Shape.NoFrame)
+        self.tree.setMinimumHeight(88)
+        self.reference = QPushButton("Add reference…")
+        self.reference.setToolTip(
+            "Open a spectrum (text, nm and reflectance) or an ENVI library (.sli) to compare with"
+        )
+        self.remove = QPushButton("Remove")
+        self.remove.setToolTip("Take the selected pin, region or reference away (Delete)")
+        self.copy = QPushButton("Copy spectra")
+        self.copy.setToolTip(
+            "Copy the ticked spectra for a spreadsheet: nm, mean, deviation, n, uncertainty (Ctrl+C)"
+        )
+        self.export = QPushButton("Export spectra…")
+        self.export.setToolTip("Write the same table as CSV, with where the result comes from")
+        column_box = QVBoxLayout(self)
+        column_box.setContentsMargins(0, 0, 0, 0)
+        for widget in (self.hint, self.tree):
+            column_box.addWidget(widget, 1 if widget is self.tree else 0)
+        # Two rows of buttons, as the smallest window has no room for one.
+        for buttons in ((self.reference, self.remove), (self.copy, self.export)):
+            row = QHBoxLayout()
+            for button in buttons:
+                row.addWidget(button)
+            row.addStretch(1)
+            column_box.addLayout(row)
+        column_box.addWidget(self.below, 1)
+        self._connect()
+
+    def _connect(self) -> None:
+        self.tree.itemChanged.connect(self._item_changed)
+        self.tree.currentItemChanged.connect(self._selection_changed)
+        self.reference.clicked.connect(self.choose_reference)
+        self.remove.clicked.connect(self.remove_selected)
+        delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.tree, self.remove_selected)
+        copy = QShortcut(QKeySequence(QKeySequence.StandardKey.Copy), self.tree, self.copy_spectra)
+        for shortcut in (delete, copy):
+            shortcut.setContext(Qt.ShortcutContext.WidgetShortcut)
+        self.copy.clicked.connect(self.copy_spectra)
+        self.export.clicked.connect(self.export_spectra)
+        self._state.marks.follow(lambda _: self._fill())
+        self._state.selected.follow(lambda _: self._show_selection())
+
+    def choose_reference(self) -> None:
+        """Choose a file with a spectrum."""
+        name, _ = QFileDialog.getOpenFileName(self, "Add a reference spectrum", "", _FORMATS)
+        if name:
+            self._commands.add_reference(Path(name))
+
+    def remove_selected(self) -> None:
+        """Take the selected mark away."""
+        if self._state.selected.value:
+            self._commands.remove(self._state.selected.value)
+
+    def copy_spectra(self) -> None:
+        """Copy the spectra that are shown, as a table."""
+        self._commands.copy_spectra(QGuiApplication.clipboard().setText)
+
+    def export_spectra(self) -> None:
+        """Choose a file and write the spectra that are shown."""
+        result = self._state.result.value
+        if result is None or not self._commands.has_shown():
+            return
+        draft = str(result.path.with_name(f"{result.path.stem}_spectra.csv"))
+        name, _ = QFileDialog.getSaveFileName(self, "Export spectra", draft, "Spectra (*.csv)")
+        if name:
+            path = Path(name)
+            # The dialog asked about the name as it was typed, not about one with an ending added.
+            is_whole = path.suffix.lower() == ".csv"
+            self._commands.export_spectra(
+                path if is_whole else path.with_name(f"{path.name}.csv"), overwrite=is_whole
+            )
+
+    def _fill(self) -> None:
+        self._filling = True
+        self.tree.clear()
+        for mark in self._state.marks.value:
+            item = QTreeWidgetItem([mark.name, where(mark), count(mark)])
+            item.setData(0, KEY, mark.key)
+            item.setIcon(0, self._swatch(mark))
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
+            item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
+            if mark.trouble:
+                item.setForeground(1, QColor(self._theme.warn))
+                for i in range(3):
+                    item.setToolTip(i, mark.trouble)
+            item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+            self.tree.addTopLevelItem(item)
+        self._filling = False
+        self.hint.setVisible(not self._state.marks.value)
+        self._show_selection()
+
+    def _swatch(self, mark: Mark) -> QIcon:
+        picture = QPixmap(14, 14)
+        picture.fill(QColor(self._theme.pins[mark.colour % len(self._theme.pins)]))
+        return QIcon(picture)
+
+    def _item_changed(self, item: QTreeWidgetItem, column: int) -> None:
+        if self._filling or column != 0:
+            return
+        key = int(item.data(0, KEY))
+        shown = item.checkState(0) == Qt.CheckState.Checked
+        mark = next((mark for mark in self._state.marks.value if mark.key == key), None)
+        if mark is None:
+            return
+        if mark.shown != shown:
+            self._commands.show(key, shown)
+        elif item.text(0) != mark.name:
+            self._commands.rename(key, item.text(0))
+
+    def _selection_changed(self, item: QTreeWidgetItem | None, _before: object) -> None:
+        if not self._filling:
+            self._state.selected.set(0 if item is None else int(item.data(0, KEY)))
+
+    def _show_selection(self) -> None:
+        key = self._state.selected.value
+        self._filling = True
+        for i in range(self.tree.topLevelItemCount()):
+            item = self.tree.topLevelItem(i)
+            if item is not None and item.data(0, KEY) == key:
+                self.tree.setCurrentItem(item)
+                break
+        else:
+            self.tree.setCurrentIndex(QModelIndex())
+        self._filling = False
+        self.remove.setEnabled(self._state.selected_mark is not None)
+        text = figures_of(self._state, self._theme)
+        self.below.setVisible(bool(text))
+        self.figures.setText(text)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self._fill()
+
+
+def where(mark: Mark) -> str:
+    """Where a mark lies, in a few words, or that it has no spectrum now."""
+    if mark.trouble:
+        return "no spectrum"
+    if mark.pixel is not None:
+        return f"{mark.pixel[0]}, {mark.pixel[1]}"
+    if mark.file is not None:
+        return mark.file.name if len(mark.file.name) <= 18 else mark.file.name[:17] + "…"
+    return "lasso in 3D" if mark.runs else "outline"
+
+
+def count(mark: Mark) -> str:
+    """Pixels of a region, those without spectrum left out."""
+    return f"{mark.used}" if mark.kind == "region" and not mark.trouble else ""

@@ -1,0 +1,121 @@
+"""Spectra of the result: live under the cursor, of every pin and region, and references."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.colour_scales import spread_of
+from dsl_app.shared.spectrum import Pixel
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
+
+#: Higher values are wrong or gloss: they are there for who zooms out.
+TOP = 1.08
+
+
+class SpectrumPanel(QWidget):
+    """Follows the cursor and the marks of a state; dragging its band line changes the band."""
+
+    def __init__(self, state: ResultsState) -> None:
+        super().__init__()
+        self._state, self._theme = state, DARK
+        self.plot = pg.PlotWidget(enableMenu=False)
+        self.plot.setAccessibleName("Spectra")
+        self.plot.setToolTip(
+            "Reflectance with its 95 % band; dashed where the prior and not the data decides."
+            " Regions show the mean and one deviation of their pixels. Drag the line to change the band."
+        )
+        self.item = self.plot.getPlotItem()
+        self.item.hideButtons()
+        self.item.setLabel("bottom", "Wavelength (nm)")
+        self.item.setLabel("left", "Reflectance")
+        self.item.getAxis("bottom").enableAutoSIPrefix(False)
+        self.item.getAxis("left").enableAutoSIPrefix(False)
+        self.item.getAxis("left").setWidth(48)
+        self.item.showGrid(x=True, y=True, alpha=0.18)
+        self.item.setYRange(0, 1, padding=0.02)
+        self.band_line = pg.InfiniteLine(angle=90, movable=True)
+        self.item.addItem(self.band_line, ignoreBounds=True)
+        self.live = SpectrumCurve(self.item)
+        self._curves: dict[int, tuple[Mark, SpectrumCurve]] = {}
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.plot)
+        self.band_line.sigPositionChanged.connect(self._band_dragged)
+        state.result.follow(lambda _: self._new_result())
+        state.cursor.follow(self._show_cursor)
+        state.marks.follow(self._show_marks)
+        state.band.follow(lambda _: self._show_band())
+
+    def _new_result(self) -> None:
+        result = self._state.result.value
+        self.live.set_spectrum(None)
+        if result is None or not result.has_spectra:
+            return
+        nm = result.wavelengths_nm
+        self.item.setXRange(nm[0], nm[-1], padding=0.02)
+        top = 1.08 * spread_of(result["reflectance"][::6], 0.5, 99.8)[1]
+        self.item.setYRange(0, min(max(top, 0.1), TOP), padding=0)
+        self.item.getViewBox().setLimits(xMin=nm[0] - 20, xMax=nm[-1] + 20, yMin=-0.5, yMax=3)
+        self._show_band()
+
+    def _show_cursor(self, pixel: Pixel | None) -> None:
+        self.live.set_spectrum(None if pixel is None else self._state.spectrum_at(pixel))
+
+    def _show_band(self) -> None:
+        result = self._state.result.value
+        self.band_line.setVisible(result is not None and result.has_spectra)
+        if result is not None and result.has_spectra:
+            self.band_line.blockSignals(True)
+            self.band_line.setPos(result.wavelengths_nm[self._state.band.value])
+            self.band_line.blockSignals(False)
+
+    def _band_dragged(self) -> None:
+        result = self._state.result.value
+        if result is not None and result.has_spectra:
+            nm = result.wavelengths_nm
+            self._state.band.set(int(abs(nm - self.band_line.value()).argmin()))
+            self._show_band()
+
+    def _show_marks(self, marks: tuple[Mark, ...]) -> None:
+        wanted = {mark.key: mark for mark in marks}
+        for key, (mark, curve) in list(self._curves.items()):
+            if wanted.get(key) is not mark:
+                curve.remove()
+                del self._curves[key]
+        for key, mark in wanted.items():
+            if key not in self._curves and mark.shown and not mark.trouble:
+                curve = SpectrumCurve(self.item, with_band=mark.kind != "reference")
+                self._colour(curve, mark)
+                curve.set_spectrum(mark.spectrum)
+                self._curves[key] = (mark, curve)
+
+    def _colour(self, curve: SpectrumCurve, mark: Mark) -> None:
+        colour = self._theme.pins[mark.colour % len(self._theme.pins)]
+        curve.set_colour(colour, dashed=mark.kind == "reference")
+
+    @property
+    def named_curves(self) -> tuple[tuple[Any, str], ...]:
+        """The curves of what is shown, each with its name."""
+        return tuple((curve.solid, mark.name) for mark, curve in self._curves.values())
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.plot.setBackground(theme.base)
+        for side in ("left", "bottom"):
+            axis = self.item.getAxis(side)
+            axis.setPen(theme.line)
+            axis.setTextPen(theme.muted)
+            axis.labelStyle["color"] = theme.muted
+            axis.setLabel(axis.labelText)
+        self.band_line.setPen(pg.mkPen(theme.accent, width=1, style=Qt.PenStyle.DashLine))
+        self.band_line.setHoverPen(pg.mkPen(theme.accent, width=3))
+        self.live.set_colour(theme.text, width=2)
+        for mark, curve in self._curves.values():
+            self._colour(curve, mark)

@@ -1,0 +1,86 @@
+"""What a page shows while nothing is open: what to open, the demo, and what was opened last."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QListWidget, QListWidgetItem, QPushButton, QVBoxLayout, QWidget
+
+from dsl_app.shared.recent import RecentFiles
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.recent_menu import entry_text
+
+WIDTH_PX = 560
+HINT = (
+    "Open a result (a folder NAME.zarr) or a finished scan (NAME.dsl), or drop one on the window. The demo is"
+    " a scan of a Color Checker on the simulated rig; it is made once, in about a minute."
+)
+
+
+class Welcome(QWidget):
+    """Follows the recent files; ``open_path`` opens one, ``demo`` the demo. ``choose`` asks for a folder."""
+
+    def __init__(
+        self, recent: RecentFiles, open_path: Callable[[Path], object], demo: Callable[[], object]
+    ) -> None:
+        super().__init__()
+        self._recent, self._open_path = recent, open_path
+        self.choose = QPushButton("Open…")
+        self.choose.setProperty("role", "primary")
+        self.choose.setToolTip("Choose the folder of a result or of a finished scan")
+        self.demo = QPushButton("Show the demo")
+        self.demo.setToolTip("A finished scan of the simulated rig")
+        self.demo.clicked.connect(lambda: demo())
+        self.files = QListWidget()
+        self.files.setAccessibleName("Recent files")
+        self.files.setToolTip("Double click or press Enter to open")
+        self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.files.setTextElideMode(Qt.TextElideMode.ElideMiddle)
+        self.files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.files.itemActivated.connect(self._open)
+        self._title = label("Recent", "heading")
+        hint = label(HINT, "muted")
+        hint.setWordWrap(True)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.choose)
+        buttons.addWidget(self.demo)
+        buttons.addStretch(1)
+        column = QVBoxLayout(self)
+        column.addWidget(label("No result is open", "title"))
+        column.addWidget(hint)
+        column.addSpacing(6)
+        column.addLayout(buttons)
+        column.addSpacing(14)
+        column.addWidget(self._title)
+        column.addWidget(self.files)
+        self.setFixedWidth(WIDTH_PX)
+        self._stop = recent.paths.follow(lambda _: self._fill())
+
+    def _fill(self) -> None:
+        self.files.clear()
+        for path in self._recent.paths.value:
+            item = QListWidgetItem(entry_text(path))
+            item.setData(Qt.ItemDataRole.UserRole, str(path))
+            item.setToolTip(str(path))
+            if not path.exists():
+                item.setForeground(self.palette().placeholderText())
+            self.files.addItem(item)
+        rows = max(self.files.sizeHintForRow(0), 1) * self.files.count()
+        self.files.setFixedHeight(rows + 2 * self.files.frameWidth())
+        for widget in (self._title, self.files):
+            widget.setVisible(self.files.count() > 0)
+
+    def _open(self, item: QListWidgetItem) -> None:
+        self._open_path(Path(item.data(Qt.ItemDataRole.UserRole)))
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Files come and go while nobody looks."""
+        super().showEvent(event)
+        self._fill()
+
+    def release(self) -> None:
+        """Follow nothing more."""
+        self._stop()

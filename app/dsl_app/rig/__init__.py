@@ -1,0 +1,1 @@
+"""The Rig page: connection, live view and projector."""

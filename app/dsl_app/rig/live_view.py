@@ -1,0 +1,250 @@
+"""The live picture with histogram, saturation, focus and the raw value under the cursor."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from dsl_app.connection.state import FrameCounts
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.arrow_keys import arrow_step, moved_within
+from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.region_box import Region, RegionBox, cut
+from dsl_core.capture.preview import BINS, Statistics, quick_picture, statistics
+from dsl_core.devices.base import CameraInfo
+from dsl_core.model.frames import Frame
+
+#: How often figures change, s; the picture follows every frame.
+FIGURES_S = 0.25
+#: Share of saturated pixels that deserves a warning (as peers have it).
+MANY_SATURATED = 0.005
+NO_RIG = "No picture yet. Connect a rig and start the live view."
+NO_PICTURE = "No picture yet. Start the live view."
+#: A shown pixel is a cell of so many raw ones a side.
+CELL_PX = 2
+_CHANNELS = ("R", "G", "B")
+_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
+
+
+class LiveView(QWidget):
+    """Shows frames of a camera; what it shows never changes what is saved."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._camera: CameraInfo | None = None
+        self._frame: Frame | None = None
+        self._times: list[float] = []
+        self._figures_at = 0.0
+        self.view = pg.GraphicsLayoutWidget()
+        self.view.setAccessibleName("Live picture")
+        self.view.setToolTip(
+            "Wheel to zoom, drag to pan, F to see all; arrow keys move the pixel that is read, Shift by ten"
+        )
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.view.setFocusProxy(self)
+        self._box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False)
+        self._item = pg.ImageItem(axisOrder="row-major")
+        self._box.addItem(self._item)
+        self._read: tuple[int, int] | None = None
+        self.rectangle = RegionBox(CELL_PX)
+        self._box.addItem(self.rectangle, ignoreBounds=True)
+        self.rectangle.hide()
+        self.rectangle.sigRegionChangeFinished.connect(self._repaint)
+        self.view.scene().sigMouseMoved.connect(self._hover)
+        self.saturation = QCheckBox("Saturation")
+        self.saturation.setToolTip("Paint cells red that hold a raw pixel at full scale")
+        self.saturation.setChecked(True)
+        self.saturation.toggled.connect(self._repaint)
+        self.region_box = QCheckBox("Region")
+        self.region_box.setToolTip("Limit histogram, figures and automatic exposure to a rectangle; drag it")
+        self.region_box.toggled.connect(self._show_region)
+        self.fit = QPushButton("Fit")
+        self.fit.setToolTip("See the whole picture (F)")
+        self.fit.clicked.connect(self.show_all)
+        self.logarithmic = QCheckBox("Logarithmic")
+        self.logarithmic.setToolTip("Show the histogram's counts on a logarithmic scale")
+        self.logarithmic.toggled.connect(self._repaint)
+        self._histogram = pg.PlotWidget()
+        self._histogram.setFixedHeight(130)
+        self._histogram.setMouseEnabled(False, False)
+        self._histogram.hideButtons()
+        self._histogram.setMenuEnabled(False)
+        self._histogram.setAccessibleName("Histogram of raw counts")
+        self._histogram.setLabel("bottom", "raw counts, DN")
+        # Room for half of the outermost numbers of the axes.
+        self._histogram.getPlotItem().setContentsMargins(0, 8, 14, 0)
+        self._histogram.setXRange(0, 4096, padding=0)
+        self._curves = [self._histogram.plot(pen=pg.mkPen(colour, width=1)) for colour in _COLOURS]
+        self._rate = label("", "muted")
+        self._counts = label("", "muted")
+        self._saturated = label("")
+        self._saturated.setWordWrap(True)
+        self._focus = label("", "muted")
+        self._pixel = label("Move over the picture to read raw counts.", "muted")
+        self._empty = label(NO_RIG, "muted")
+        self._empty.setWordWrap(True)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        over = QVBoxLayout(self.view.viewport())
+        over.setContentsMargins(16, 12, 16, 12)
+        over.addWidget(self._empty, 0, Qt.AlignmentFlag.AlignTop)
+        figures = QHBoxLayout()
+        figures.setSpacing(16)
+        figures.addWidget(self._saturated, 1)
+        figures.addWidget(self._focus, 0, Qt.AlignmentFlag.AlignTop)
+        switches = QHBoxLayout()
+        for box in (self.saturation, self.logarithmic, self.region_box, self.fit):
+            switches.addWidget(box)
+        switches.addStretch(1)
+        switches.setSpacing(6)
+        for figure in (self._rate, self._counts):
+            switches.addWidget(figure)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.view, 1)
+        column.addWidget(self._pixel)
+        column.addLayout(figures)
+        column.addLayout(switches)
+        column.addWidget(self._histogram)
+
+    def set_camera(self, camera: CameraInfo | None) -> None:
+        """Show frames of this camera from now on."""
+        self._camera, self._frame, self._times = camera, None, []
+        self._item.clear()
+        self._read = None
+        self.region_box.setChecked(False)
+        self.region_box.setEnabled(camera is not None)
+        self._empty.setText(NO_RIG if camera is None else NO_PICTURE)
+        self._empty.setVisible(True)
+        for figure in (self._saturated, self._focus, self._rate, self._counts):
+            figure.clear()
+        if camera is not None:
+            self._histogram.setXRange(0, 2**camera.bit_depth, padding=0)
+
+    def show_frame(self, frame: Frame | None) -> None:
+        """Show a frame."""
+        if frame is None or self._camera is None:
+            return
+        first = self._frame is None
+        self._frame = frame
+        now = time.monotonic()
+        self._times = [*self._times[-29:], now]
+        self._paint()
+        if first:
+            self._empty.setVisible(False)
+            self.show_all()
+        if now - self._figures_at >= FIGURES_S:
+            self._figures_at = now
+            self._show_figures()
+
+    def show_counts(self, counts: FrameCounts) -> None:
+        """Show how many frames were lost and skipped."""
+        none = counts == FrameCounts()
+        self._counts.setText("" if none else f"{counts.lost} lost, {counts.skipped} skipped")
+        set_role(self._counts, "warn" if counts.lost else "muted")
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.rectangle.apply_theme(theme)
+        for widget in (self.view, self._histogram):
+            widget.setBackground(theme.base)
+        for side in ("left", "bottom"):
+            axis = self._histogram.getAxis(side)
+            axis.setPen(theme.line)
+            axis.setTextPen(theme.muted)
+
+    @property
+    def frames_per_second(self) -> float:
+        """Rate of the last frames shown."""
+        if len(self._times) < 2:
+            return 0.0
+        return (len(self._times) - 1) / max(self._times[-1] - self._times[0], 1e-9)
+
+    def _repaint(self) -> None:
+        if self._frame is not None:
+            self._paint()
+            self._show_figures()
+
+    def _paint(self) -> None:
+        assert self._camera is not None
+        assert self._frame is not None
+        full_scale = 2**self._camera.bit_depth - 1
+        picture = quick_picture(
+            self._frame.pixels, self._camera.bayer, full_scale, self.saturation.isChecked()
+        )
+        self._item.setImage(picture, autoLevels=False, levels=None)
+
+    def _show_figures(self) -> None:
+        assert self._camera is not None
+        assert self._frame is not None
+        pixels = cut(self._frame.pixels, self.region)
+        found = statistics(pixels, self._camera.bayer, 2**self._camera.bit_depth - 1)
+        self._show_histogram(found)
+        worst = max(found.saturated)
+        shares = "  ".join(
+            f"{name} {100 * share:.2f} %" for name, share in zip(_CHANNELS, found.saturated, strict=True)
+        )
+        self._saturated.setText(f"saturated  {shares}")
+        set_role(self._saturated, "bad" if worst > MANY_SATURATED else "muted")
+        self._focus.setText(f"focus score {found.focus:.3g}")
+        self._rate.setText(f"{self.frames_per_second:.0f} frames/s")
+        self._show_pixel()
+
+    def _show_histogram(self, found: Statistics) -> None:
+        assert self._camera is not None
+        positions = (np.arange(BINS) + 0.5) * 2**self._camera.bit_depth / BINS
+        for curve, counts in zip(self._curves, found.histogram, strict=True):
+            curve.setData(positions, np.log10(counts + 1) if self.logarithmic.isChecked() else counts)
+        self._histogram.setLabel("left", "log₁₀ pixels" if self.logarithmic.isChecked() else "pixels")
+
+    def _hover(self, position: QPointF) -> None:
+        if self._frame is None or self._camera is None:
+            return
+        at = self._box.mapSceneToView(position)
+        column, row = int(CELL_PX * at.x()), int(CELL_PX * at.y())
+        rows, columns = self._frame.pixels.shape
+        if 0 <= row < rows and 0 <= column < columns:
+            self._read = (column, row)
+            self._show_pixel()
+
+    def _show_pixel(self) -> None:
+        if self._read is not None and self._frame is not None:
+            column, row = self._read
+            self._pixel.setText(f"column {column} px, row {row} px: {self._frame.pixels[row, column]} DN")
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrow keys move the pixel that is read, F shows the whole picture."""
+        step = arrow_step(event)
+        if event.key() == Qt.Key.Key_F:
+            self.show_all()
+        elif step is not None and self._frame is not None:
+            rows, columns = self._frame.pixels.shape
+            self._read = moved_within(self._read or (columns // 2, rows // 2), step, (columns, rows))
+            self._show_pixel()
+        else:
+            super().keyPressEvent(event)
+
+    # Region ----------------------------------------------------------------------------------------
+
+    @property
+    def region(self) -> Region | None:
+        """The region that counts, in pixels of the camera; None for the whole picture."""
+        if self._camera is None or not self.region_box.isChecked():
+            return None
+        return self.rectangle.region(self._camera.width_px, self._camera.height_px)
+
+    def _show_region(self, on: bool) -> None:
+        if on and self._camera is not None:
+            self.rectangle.put_in_middle(self._camera.width_px, self._camera.height_px)
+        self.rectangle.setVisible(on and self._camera is not None)
+        self._repaint()
+
+    def show_all(self) -> None:
+        """See the whole picture."""
+        self._box.autoRange(padding=0.01, items=[self._item])

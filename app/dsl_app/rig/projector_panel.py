@@ -1,0 +1,157 @@
+"""What the projector shows by hand: fields, crosshair, checker, one line; and on which screen."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QGuiApplication, QScreen
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFormLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QPushButton,
+    QSlider,
+    QVBoxLayout,
+)
+
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_core.devices.base import ProjectorInfo
+from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
+
+#: How fast a looped line moves, ms a step.
+LOOP_MS = 120
+NO_SCREEN = "The rig's own"
+#: Stands for a screen that went away while it was used; choosing it changes nothing.
+LOST = "lost"
+
+
+class ProjectorPanel(QGroupBox):
+    """Asks for pictures by ``wanted(kind, level, column)`` and for screens by name ("" for none)."""
+
+    wanted = Signal(str, float, int)
+    screen_chosen = Signal(str)
+    identify = Signal()
+
+    def __init__(self) -> None:
+        super().__init__("Projector")
+        self._screen = ChoiceBox("Projector screen", "The screen that the projector is; never this one")
+        # Names of screens are longer than the box.
+        self._screen.view().setMinimumWidth(260)
+        self._identify = QPushButton("Identify screens")
+        self._identify.setToolTip("Show each screen's name on it for three seconds")
+        self._kind = ChoiceBox("Picture", "What the projector shows")
+        for kind in KINDS:
+            self._kind.addItem(kind.capitalize(), kind)
+        self._level = NumberBox("Intensity", 0, 1, 0.8, decimals=2, tip="Drive level of lit parts, 0 to 1")
+        self._level.setSingleStep(0.05)
+        self._column = WholeBox("Line column", 0, 639, 320, "px", "First column of the line")
+        self._slider = QSlider(Qt.Orientation.Horizontal)
+        self._slider.setAccessibleName("Line column")
+        self._slider.setToolTip("Move the line over the projector's columns")
+        self._loop = QCheckBox("Loop")
+        self._loop.setToolTip("Let the line wander over the frame")
+        self._timer = QTimer(self)
+        self._timer.setInterval(LOOP_MS)
+        self._note = label("", "muted")
+        self._note.setWordWrap(True)
+        self._info: ProjectorInfo | None = None
+        self._user = ""
+        self._lay_out()
+        self._connect()
+        self.refresh_screens("")
+        self._show_state()
+
+    def _lay_out(self) -> None:
+        line = QHBoxLayout()
+        line.addWidget(self._slider, 1)
+        line.addWidget(self._loop)
+        form = QFormLayout()
+        form.addRow("Screen", self._screen)
+        form.addRow("", self._identify)
+        form.addRow("Picture", self._kind)
+        form.addRow("Intensity", self._level)
+        form.addRow("Line column", self._column)
+        form.addRow("", line)
+        column = QVBoxLayout(self)
+        column.addLayout(form)
+        column.addWidget(self._note)
+
+    def _connect(self) -> None:
+        self._kind.currentIndexChanged.connect(self._ask)
+        self._level.valueChanged.connect(self._ask)
+        self._column.valueChanged.connect(self._slider.setValue)
+        self._slider.valueChanged.connect(self._column.setValue)
+        self._column.valueChanged.connect(self._line_moved)
+        self._loop.toggled.connect(self._switch_loop)
+        self._timer.timeout.connect(self._step)
+        self._identify.clicked.connect(self.identify)
+        self._screen.currentIndexChanged.connect(
+            lambda _index: self.screen_chosen.emit(str(self._screen.currentData()))
+        )
+
+    def set_projector(self, info: ProjectorInfo | None) -> None:
+        """Offer what this projector can show."""
+        self._info = info
+        if info is not None:
+            last = info.width_px - LINE_PX
+            self._column.setMaximum(last)
+            self._slider.setRange(0, last)
+        self._show_state()
+
+    def set_user(self, title: str) -> None:
+        """Leave the projector to work of this title, whose frames a picture would spoil; empty for none."""
+        self._user = title
+        self._show_state()
+
+    def _show_state(self) -> None:
+        info, is_free = self._info, not self._user
+        can_show = info is not None and is_free
+        if not can_show:
+            self._loop.setChecked(False)
+        for shown in (self._kind, self._level, self._column, self._slider, self._loop):
+            shown.setEnabled(can_show)
+        self._screen.setEnabled(is_free)
+        self._identify.setEnabled(is_free)
+        if not is_free:
+            self._note.setText(f"{self._user} has the projector. Pictures can be shown when it has ended.")
+        elif info is None:
+            self._note.setText("No projector is connected. Connect a rig to show pictures.")
+        else:
+            self._note.setText(f"{info.model}, {info.width_px} × {info.height_px} logical pixels")
+
+    def refresh_screens(self, chosen: str, lost: str = "") -> None:
+        """List the screens that there are now, and mark the chosen one, or the one that is ``lost``."""
+        self._screen.blockSignals(True)
+        self._screen.clear()
+        self._screen.addItem(NO_SCREEN, "")
+        for screen in QGuiApplication.screens():
+            self._screen.addItem(_describe(screen), screen.name())
+        if lost:
+            self._screen.addItem(f"{lost} was lost", LOST)
+        index = self._screen.findData(LOST if lost else chosen)
+        self._screen.setCurrentIndex(max(index, 0))
+        self._screen.blockSignals(False)
+
+    def _ask(self) -> None:
+        kind: PictureKind = self._kind.currentData()
+        self.wanted.emit(kind, self._level.value(), self._column.value())
+
+    def _line_moved(self) -> None:
+        if self._kind.currentData() == "line":
+            self._ask()
+
+    def _switch_loop(self, on: bool) -> None:
+        if on:
+            self._kind.setCurrentIndex(self._kind.findData("line"))
+            self._timer.start()
+        else:
+            self._timer.stop()
+
+    def _step(self) -> None:
+        following = self._column.value() + LINE_PX
+        self._column.setValue(following if following <= self._column.maximum() else 0)
+
+
+def _describe(screen: QScreen) -> str:
+    size, ratio = screen.geometry(), screen.devicePixelRatio()
+    return f"{screen.name()}, {round(size.width() * ratio)} × {round(size.height() * ratio)}"

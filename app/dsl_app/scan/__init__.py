@@ -1,0 +1,1 @@
+"""The Scan page: a plan, its capture and its reconstruction."""

@@ -1,0 +1,342 @@
+"""What the Scan page decides: start, pause, resume, cancel, reconstruct. No Qt."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+
+from dsl_app.connection.controller import RIG, RigController
+from dsl_app.connection.state import Link
+from dsl_app.scan.job import Order, ScanJob
+from dsl_app.scan.plan import ScanPlanController
+from dsl_app.scan.rescue import Rescuer
+from dsl_app.scan.state import Interrupted, Phase, Rescue, ScanState
+from dsl_app.scan.words import fresh_target, rig_words, scan_command
+from dsl_app.shared.jobs.base import Job, JobRunner, JobState
+from dsl_app.shared.known_files import Kind, kind_of
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.undo import UndoStack
+from dsl_core.capture.status import State, Status
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError, DriftError, DslError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.scan.origin import rig_notes
+from dsl_core.progress import Progress
+
+_PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
+_BUSY = "A scan is running. Wait for its end, or cancel it first; frames taken so far are kept."
+
+
+class ScanController:
+    """Plans and runs one scan at a time; `take_news` brings what happened in the job to the state.
+
+    ``hidden`` is a folder of the program itself, such as the demo's: no scan goes there unless it is told to.
+    """
+
+    def __init__(
+        self,
+        state: ScanState,
+        rig: RigController,
+        runner: JobRunner,
+        notifier: Notifier,
+        undo: UndoStack,
+        library: CalibrationLibrary | None = None,
+        clock: Callable[[], datetime] = datetime.now,
+        hidden: Path | None = None,
+    ) -> None:
+        self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._clock, self._hidden = clock, hidden
+        #: Where the scans of a person go.
+        self._folder = state.target.value.parent
+        self._stop_following = state.target.changed.connect(self._keep_folder)
+        self.plans = ScanPlanController(
+            state, rig.state, runner, notifier, undo, library or CalibrationLibrary()
+        )
+        self._rescuer = Rescuer(state, rig, notifier, self.start)
+        self._scan: ScanJob | None = None
+        self._job: Job[Status] | None = None
+
+    # Run -------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Start the planned scan, or go on with the interrupted one."""
+        state, devices = self.state, self._rig.state.devices.value
+        if state.phase.value.is_busy:
+            self._notifier.tell("info", _BUSY)
+            return
+        self.plans.refresh()
+        facts = state.facts.value
+        if devices is None or facts is None or facts.obstacles:
+            self._notifier.tell("warning", facts.obstacles[0] if facts is not None else "")
+            return
+        self._run(devices, state.interrupted.value)
+
+    def _run(self, devices: DeviceRig, session: Interrupted | None) -> None:
+        state, choice = self.state, self._rig.state.choice.value
+        order = Order(
+            devices,
+            state.plan.value,
+            state.target.value if session is None else session.folder,
+            rig_notes(choice.name, dict(choice.options)),
+            self.plans.calibration,
+            state.override.value,
+            is_resumed=session is not None,
+            check_drift=state.check_drift.value,
+        )
+        self._scan = scan = ScanJob(order)
+        self._rescuer.forget()
+        for text in (state.trouble, state.note):
+            text.set("")
+        state.phase.set(Phase.STARTING)
+        self._job = Job(
+            f"Scan {order.folder.stem}",
+            scan.work,
+            self._finished,
+            self._failed,
+            self._cancelled,
+            exclusive=RIG,
+        )
+        scan.token = self._job.token
+        if not self._rig.run(self._job):
+            self._ended(Phase.PLANNING)
+
+    def resume(self) -> None:
+        """Go on with the interrupted scan; a rig that was lost is connected before."""
+        if self.state.rescue.value is Rescue.NONE or self._rig.state.link.value is Link.OPEN:
+            self.start()
+        else:
+            self._rescuer.try_now()
+
+    def stop_reconnecting(self) -> None:
+        """Leave a rig that was lost to the person at the window."""
+        self._rescuer.stop()
+
+    def pause(self) -> None:
+        """Wait before the next frame."""
+        if self._is_under_way() and self._scan is not None:
+            self._scan.pause()
+
+    def go_on(self) -> None:
+        """Go on after `pause`."""
+        if self._is_under_way() and self._scan is not None:
+            self._scan.go_on()
+
+    def cancel(self) -> None:
+        """End before the next frame, or no longer wait for a lost rig; what is stored stays stored."""
+        if self.state.rescue.value.is_trying:
+            self._rescuer.stop()
+        elif self._is_under_way() and self._job is not None:
+            self.state.phase.set(Phase.STOPPING)
+            self._job.cancel()
+
+    def _is_under_way(self) -> bool:
+        """Whether a scan can be paused or stopped; says so where there is none."""
+        is_busy = self.state.phase.value.is_busy
+        if not is_busy:
+            self._notifier.tell("info", "No scan is under way.")
+        return is_busy
+
+    def take_news(self) -> None:
+        """Hand what the job told since last time to who follows; called by the window's clock."""
+        self._rescuer.take_news()
+        scan = self._scan
+        if scan is None:
+            return
+        if self._was_refused():
+            self._ended(Phase.PLANNING)
+        status, picture = scan.take_news()
+        if status is not None:
+            self.state.status.set(status)
+            if self.state.phase.value.is_busy and self.state.phase.value is not Phase.STOPPING:
+                self.state.phase.set(_PHASES.get(status.state, self.state.phase.value))
+        if picture is not None:
+            self.state.picture.set(picture)
+            self._draw_graph()
+
+    def _was_refused(self) -> bool:
+        """Whether the scan waited for the live view and then found the rig taken."""
+        job = self._job
+        if job is None or job.state is not JobState.WAITING or self._rig.state.live.value:
+            return False
+        return job not in self._runner.active
+
+    def point_at(self, pixel: tuple[int, int] | None) -> None:
+        """Show the intensity graph of a pixel ``(x, y)``."""
+        self.state.cursor.set(pixel)
+        self._draw_graph()
+
+    def _draw_graph(self) -> None:
+        pixel = self.state.cursor.value
+        if self._scan is not None and pixel is not None:
+            self.state.graph.set(self._scan.graph(pixel))
+
+    # End -------------------------------------------------------------------------------------------
+
+    def _finished(self, status: Status) -> None:
+        folder = self._end(Phase.DONE)
+        self.state.interrupted.set(None)
+        self.state.finished.set(folder)
+        self.state.check_drift.set(True)
+        self.state.note.set(f"All {status.total} frames are stored in {folder}.")
+        self._aim_anew()
+        self.plans.refresh()
+        if self.state.then_reconstruct.value:
+            self.reconstruct(folder)
+
+    def _failed(self, error: Exception) -> None:
+        folder = self._end(Phase.LOST)
+        self._offer_again(folder)
+        session = self.state.interrupted.value
+        safe = f" {session.done} of {session.total} frames are safe in {folder}." if session else ""
+        story = f"The scan stopped: {sentence_of(error)}{safe}"
+        self.state.trouble.set(story)
+        self._notifier.tell("error", f"The scan {folder.name} was interrupted. The Scan page says why.")
+        if isinstance(error, DeviceError) and not isinstance(error, DriftError):
+            self._rig.lose(sentence_of(error))
+            self._rescuer.begin(story)
+
+    def _cancelled(self) -> None:
+        self._offer_again(self._end(Phase.STOPPED))
+
+    def _offer_again(self, folder: Path) -> None:
+        """Offer to go on, as far as the session can be read."""
+        try:
+            self._remember(folder)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+        self.plans.refresh()
+
+    def _end(self, phase: Phase) -> Path:
+        assert self._scan is not None
+        self.take_news()
+        folder = self._scan.order.folder
+        self._ended(phase)
+        return folder
+
+    def _ended(self, phase: Phase) -> None:
+        self._job = None
+        self.state.phase.set(phase)
+
+    def _keep_folder(self, target: Path) -> None:
+        if target.parent != self._hidden:
+            self._folder = target.parent
+
+    def _aim_anew(self) -> None:
+        """Store the next scan beside those that a person took."""
+        self.state.target.set(fresh_target(self._folder, self._clock()))
+
+    def reconstruct(self, session: Path) -> None:
+        """Make the result of a complete scan, save it beside the scan and tell of it."""
+        target, before = session.with_suffix(".zarr"), self.state.note.value
+        waiting = f"{before} Reconstructing…".strip()
+
+        def work(progress: Progress) -> Path:
+            from dsl_core.io.result.result_file import save_result
+            from dsl_core.workflows.sessions import reconstruct_session
+
+            save_result(reconstruct_session(session, progress=progress), target)
+            return target
+
+        def done(path: Path) -> None:
+            self.state.note.set(f"The result lies in {path}.")
+            self.state.result.emit(path)
+
+        def ended(how: str) -> None:
+            # Another scan may have something of its own to say meanwhile.
+            if self.state.note.value == waiting:
+                again = f"Open {session.name} on the Results page to reconstruct it."
+                self.state.note.set(f"{before} The reconstruction {how}. {again}".strip())
+
+        def failed(error: Exception) -> None:
+            ended("failed")
+            self._tell(error)
+
+        self.state.note.set(waiting)
+        self._runner.submit(
+            Job(f"Reconstruct {session.stem}", work, done, failed, lambda: ended("was cancelled"))
+        )
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+    # Sessions --------------------------------------------------------------------------------------
+
+    def open(self, path: Path) -> bool:
+        """Plan what a file says, or offer to go on with an interrupted scan; False for anything else."""
+        from dsl_core.io.file_names import MANIFEST_NAME
+
+        if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
+            self.plans.open_plan(path)
+            return True
+        if not (path / MANIFEST_NAME).is_file():
+            return False
+        if self.state.phase.value.is_busy:
+            self._notifier.tell("info", _BUSY)
+            return True
+        try:
+            is_taken = self._remember(path)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+            return True
+        if is_taken:
+            # What was said of another scan does not count for this one.
+            self._rescuer.forget()
+            self.state.trouble.set("")
+        return is_taken
+
+    def _remember(self, folder: Path) -> bool:
+        """Offer to go on with a session that lacks frames; False when there is nothing to go on with."""
+        from dsl_core.io.file_names import MANIFEST_NAME
+        from dsl_core.io.scan.session import SessionReader
+
+        if not (folder / MANIFEST_NAME).is_file():
+            return False
+        reader = SessionReader(folder)
+        missing, total = len(reader.missing()), reader.plan.shot_count
+        if not missing:
+            return False
+        self.plans.take_plan(reader.plan)
+        self.state.target.set(folder)
+        self.state.interrupted.set(
+            Interrupted(folder, total - missing, total, rig_words(reader.manifest.notes))
+        )
+        self.plans.refresh()
+        return True
+
+    def leave_session(self) -> None:
+        """Plan a new scan; the interrupted one stays on disk."""
+        if self.state.phase.value.is_busy:
+            return
+        self._rescuer.forget()
+        self.state.interrupted.set(None)
+        self.state.check_drift.set(True)
+        self.state.phase.set(Phase.PLANNING)
+        self.state.trouble.set("")
+        self.state.note.set("")
+        self._aim_anew()
+        self.plans.take_rig()
+
+    def command_line(self) -> str:
+        """The command that takes this scan, or goes on with it."""
+        state = self.state
+        if state.interrupted.value is not None:
+            skip = "" if state.check_drift.value else " --no-drift-check"
+            return f"dsl-scan resume {shlex.quote(str(state.interrupted.value.folder))}{skip}"
+        rig = self._rig.state.choice.value.command
+        return scan_command(
+            state.target.value,
+            rig,
+            state.plan.value,
+            state.calibration.value.key,
+            state.override.value,
+            state.plan_file.value,
+        )
+
+    def close(self) -> None:
+        """Follow the rig no more."""
+        self._stop_following()
+        self._rescuer.close()
+        self.plans.close()

@@ -1,0 +1,1 @@
+"""The effects of light that the twin renders."""

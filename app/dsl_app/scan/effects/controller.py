@@ -1,0 +1,147 @@
+"""Which effects the simulated rig renders: looked at for the scene at hand, then put in force. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from dsl_app.connection.controller import RigController
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.scan.effects.state import EffectRow, EffectsState, EffectsView, Wanted
+from dsl_app.scan.state import ScanState
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.sentences import sentence_of
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.plan import CapturePlan
+from dsl_core.progress import Progress
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
+
+if TYPE_CHECKING:
+    from dsl_core.simulation.effects.planner import EffectPlan
+    from dsl_core.simulation.world import World
+
+EFFECTS, TOLERANCE = "effects", "tolerance"
+
+
+class EffectsController:
+    """Weighs the effects of the scene at hand; `apply` connects the twin anew with a choice."""
+
+    def __init__(
+        self,
+        state: EffectsState,
+        scan: ScanState,
+        rig: RigController,
+        runner: JobRunner,
+        notifier: Notifier,
+    ) -> None:
+        self.state, self._scan, self._rig, self._runner, self._notifier = state, scan, rig, runner, notifier
+        self._asked = (Wanted.USUAL.value, ONE_DN)
+        self._turn = 0
+        self._stops = [rig.state.devices.follow(self._take_rig), rig.state.link.follow(self._take_link)]
+
+    def _take_rig(self, devices: DeviceRig | None) -> None:
+        options = dict(self._rig.state.choice.value.options)
+        state = self.state
+        state.view.set(None)
+        if devices is None and self._rig.state.link.value is Link.OPENING:
+            return  # what comes may be simulated again
+        world = _world_of(devices)
+        state.offered.set(world is not None)
+        state.in_use.set(options.get(EFFECTS, Wanted.USUAL.value))
+        state.tolerance.set(ONE_DN if world is None else world.tolerance)
+        self._asked = (state.in_use.value, state.tolerance.value)
+
+    def _take_link(self, link: Link) -> None:
+        # A rig that was asked for may not have come.
+        if link is Link.CLOSED and self._rig.state.devices.value is None:
+            self.state.offered.set(False)
+
+    def look(self, choice: str, tolerance: Tolerance) -> None:
+        """Show what a choice renders, and what the rest would change and cost."""
+        self._asked = choice, tolerance
+        world, plan = _world_of(self._rig.state.devices.value), self._scan.plan.value
+        if world is None:
+            return
+        self._turn += 1
+        turn = self._turn
+
+        def work(progress: Progress) -> EffectsView:
+            progress.report("weigh effects", 0, 0)
+            return view_of(world, choice, tolerance, plan)
+
+        def done(view: EffectsView) -> None:
+            # Whoever clicks quickly wants the last choice.
+            if turn == self._turn:
+                self.state.busy.set(False)
+                self.state.view.set(view)
+
+        def failed(error: Exception) -> None:
+            self.state.busy.set(False)
+            self._notifier.tell("error", sentence_of(error))
+
+        self.state.busy.set(True)
+        ended = lambda: self.state.busy.set(False)  # noqa: E731
+        self._runner.submit(Job("Weigh the effects", work, done, failed, ended, is_minor=True))
+
+    def look_again(self) -> None:
+        """Show the choice looked at last, for the plan at hand."""
+        self.look(*self._asked)
+
+    def apply(self, choice: str, tolerance: Tolerance) -> None:
+        """Let the twin render a choice from now on."""
+        if self._scan.phase.value.is_busy:
+            self._notifier.tell("info", "A scan is running. Wait for its end, then change the effects.")
+            return
+        now = self._rig.state.choice.value
+        options = {key: value for key, value in now.options if key not in (EFFECTS, TOLERANCE)}
+        if choice != Wanted.USUAL.value:
+            options[EFFECTS] = choice
+        if choice == Wanted.AUTO.value and tolerance != ONE_DN:
+            # Options of a rig are separated by spaces.
+            options[TOLERANCE] = str(tolerance).replace(" ", "")
+        self._rig.connect(RigChoice(now.name, tuple(options.items())))
+
+    def close(self) -> None:
+        """Follow the rig no more."""
+        for stop in self._stops:
+            stop()
+
+
+def _world_of(devices: DeviceRig | None) -> World | None:
+    """The simulated world of a rig; None for real devices."""
+    from dsl_core.simulation.sim_devices import SimCamera
+
+    if devices is None or not isinstance(devices.camera, SimCamera):
+        return None
+    return devices.camera.world
+
+
+def view_of(world: World, choice: str, tolerance: Tolerance, plan: CapturePlan) -> EffectsView:
+    """What a world would render by a choice; the world itself stays as it is."""
+    from dsl_core.simulation.effects.catalogue import Choice
+
+    other = replace(world, effects=Choice.of(choice), tolerance=tolerance, settings=plan.settings, _path=None)
+    made = other.effect_plan()
+    frame_s, all_s = made.seconds
+    return EffectsView(_rows(made), _left_out(made), frame_s, all_s, plan.shot_count)
+
+
+def _rows(made: EffectPlan) -> tuple[EffectRow, ...]:
+    return tuple(
+        EffectRow(
+            d.effect.name,
+            d.effect.summary,
+            d.bound.dn,
+            d.bound.sigmas,
+            d.cost_s,
+            d.on,
+            d.effect.needed,
+            d.why,
+        )
+        for d in made.decisions
+    )
+
+
+def _left_out(made: EffectPlan) -> str:
+    return f"{made.left_out_bound:.3g} {made.tolerance.unit}"

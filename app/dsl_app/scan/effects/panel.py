@@ -1,0 +1,241 @@
+"""The effects of light that the simulated rig renders: what each changes, costs, and why it is on or off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QPushButton,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.scan.effects.state import EffectRow, EffectsState, EffectsView, Wanted
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
+from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
+
+_COLUMNS = ("Effect", "At most", "In σ", "A frame", "Why")
+_CHOICES = (
+    (Wanted.USUAL, "As usual", "what the plain renderer has"),
+    (Wanted.AUTO, "What the scene calls for", "the rest changes no pixel by the tolerance"),
+    (Wanted.ALL, "Everything", "the expensive ones too"),
+    (Wanted.NONE, "Nothing", "only what cannot be left out"),
+    (Wanted.CHOSEN, "Chosen below", "those that are ticked"),
+)
+#: Signs and names of the units of a tolerance.
+_UNITS = (("DN", "DN"), ("σ", "sigma"))
+
+
+class EffectsCommands(Protocol):
+    """What the panel asks of its controller."""
+
+    def look(self, choice: str, tolerance: Tolerance) -> None:
+        """Show what a choice renders."""
+
+    def look_again(self) -> None:
+        """Show the choice looked at last."""
+
+    def apply(self, choice: str, tolerance: Tolerance) -> None:
+        """Put a choice in force."""
+
+    def close(self) -> None:
+        """Follow nothing more."""
+
+
+class EffectsPanel(QWidget):
+    """Follows an `EffectsState` and asks a controller."""
+
+    def __init__(self, state: EffectsState, commands: EffectsCommands) -> None:
+        super().__init__()
+        self._state, self._commands, self._theme = state, commands, DARK
+        self.choice = ChoiceBox("Effects", "Which effects of light the simulated rig renders")
+        for wanted, title, what in _CHOICES:
+            self.choice.addItem(title, wanted.value)
+            self.choice.setItemData(self.choice.count() - 1, f"{title}: {what}", Qt.ItemDataRole.ToolTipRole)
+        self.tolerance = NumberBox(
+            "Tolerance",
+            0.001,
+            1000,
+            ONE_DN.value,
+            decimals=3,
+            tip="What is left out changes no pixel of any picture by more",
+        )
+        self.unit = ChoiceBox("Unit of the tolerance", "Counts, or standard deviations of a dark pixel")
+        for sign, name in _UNITS:
+            self.unit.addItem(sign, name)
+        self._within = label("within", "muted")
+        self.apply = QPushButton("Apply")
+        self.apply.setToolTip(
+            "Connect the simulated rig anew with these effects; its scans say which they were"
+        )
+        self.table = _table()
+        self._summary, self._saved = label(""), label("", "muted")
+        for text in (self._summary, self._saved):
+            text.setWordWrap(True)
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout()
+        for widget in (self.choice, self._within, self.tolerance, self.unit):
+            row.addWidget(widget)
+        row.addStretch(1)
+        row.addWidget(self.apply)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 6, 0, 0)
+        column.addLayout(row)
+        column.addWidget(self.table, 1)
+        column.addWidget(self._summary)
+        column.addWidget(self._saved)
+
+    def _connect(self) -> None:
+        state = self._state
+        self.choice.currentIndexChanged.connect(lambda _: self._look())
+        self.tolerance.valueChanged.connect(lambda _: self._look())
+        self.unit.currentIndexChanged.connect(lambda _: self._look())
+        self.table.itemChanged.connect(self._ticked)
+        self.apply.clicked.connect(lambda: self._commands.apply(self._wanted(), self._chosen_tolerance()))
+        self.stops: list[Callable[[], None]] = [
+            state.in_use.follow(lambda _: self._show_in_use()),
+            state.tolerance.follow(lambda _: self._show_in_use()),
+            state.view.follow(self._show),
+            state.busy.follow(lambda _: self._show_state()),
+        ]
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Weigh the effects when somebody looks."""
+        super().showEvent(event)
+        self._commands.look_again()
+
+    # Ask -------------------------------------------------------------------------------------------
+
+    def _wanted(self) -> str:
+        """The choice as the command line has it."""
+        kind = str(self.choice.currentData())
+        if kind != Wanted.CHOSEN.value:
+            return kind
+        names = (row.name for row, item in self._items() if item.checkState() is Qt.CheckState.Checked)
+        return ",".join(names)
+
+    def _items(self) -> list[tuple[EffectRow, QTableWidgetItem]]:
+        view = self._state.view.value
+        rows = () if view is None else view.rows
+        items = [self.table.item(i, 0) for i in range(self.table.rowCount())]
+        return [(row, item) for row, item in zip(rows, items, strict=False) if item is not None]
+
+    def _chosen_tolerance(self) -> Tolerance:
+        return Tolerance(self.tolerance.value(), str(self.unit.currentData()))
+
+    def _look(self) -> None:
+        if self.isVisible():
+            self._commands.look(self._wanted(), self._chosen_tolerance())
+        self._show_state()
+
+    def _ticked(self, item: QTableWidgetItem) -> None:
+        """Take effects by name as soon as one is ticked."""
+        if item.column() == 0:
+            index = self.choice.findData(Wanted.CHOSEN.value)
+            if self.choice.currentIndex() == index:
+                self._look()
+            else:
+                self.choice.setCurrentIndex(index)
+
+    # Show ------------------------------------------------------------------------------------------
+
+    def _show_in_use(self) -> None:
+        """Bring the controls to what the rig renders now."""
+        named = [wanted.value for wanted in Wanted]
+        kind = self._state.in_use.value if self._state.in_use.value in named else Wanted.CHOSEN.value
+        tolerance = self._state.tolerance.value
+        for box in (self.choice, self.tolerance, self.unit):
+            box.blockSignals(True)
+        self.choice.setCurrentIndex(self.choice.findData(kind))
+        self.tolerance.setValue(tolerance.value)
+        self.unit.setCurrentIndex(self.unit.findData(tolerance.unit))
+        for box in (self.choice, self.tolerance, self.unit):
+            box.blockSignals(False)
+        if self.isVisible():
+            self._commands.look_again()
+        self._show_state()
+
+    def _show(self, view: EffectsView | None) -> None:
+        rows = () if view is None else view.rows
+        self.table.blockSignals(True)
+        self.table.show_rows([self._cells(row) for row in rows])
+        self.table.blockSignals(False)
+        self._show_state()
+
+    def _cells(self, row: EffectRow) -> tuple[QTableWidgetItem, ...]:
+        theme = self._theme
+        colour = theme.text if row.on else theme.muted
+        first = cell(row.name, colour)
+        first.setToolTip(row.what)
+        flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
+        first.setFlags(flags if row.needed else flags | Qt.ItemFlag.ItemIsUserCheckable)
+        first.setCheckState(Qt.CheckState.Checked if row.on else Qt.CheckState.Unchecked)
+        cost = f"{1e3 * row.cost_s:.1f} ms" if row.cost_s else "–"
+        numbers = tuple(
+            cell(text, colour, RIGHT)
+            for text in (f"{number(row.bound_dn)} DN", f"{number(row.bound_sigmas)} σ", cost)
+        )
+        return (first, *numbers, cell(row.why, colour))
+
+    def _show_state(self) -> None:
+        state, view = self._state, self._state.view.value
+        is_auto = self.choice.currentData() == Wanted.AUTO.value
+        for widget in (self._within, self.tolerance, self.unit):
+            widget.setVisible(is_auto)
+        self.apply.setEnabled(
+            view is not None
+            and not state.busy.value
+            and (
+                self._wanted() != state.in_use.value
+                or (is_auto and self._chosen_tolerance() != state.tolerance.value)
+            )
+        )
+        if view is None:
+            self._summary.setText("Weighing …" if state.busy.value else "")
+            self._saved.setText("")
+            return
+        self._summary.setText(
+            f"{len(view.on)} of {len(view.rows)} effects are rendered. What is off changes no pixel of any"
+            f" picture by more than {view.left_out}."
+        )
+        saved_s = view.frames * (view.all_s - view.frame_s)
+        self._saved.setText(
+            f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with"
+            f" everything: {100 * view.saved_share:.0f} %, or {saved_s:.0f} s of {view.frames} frames, are"
+            " saved."
+        )
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self._show(self._state.view.value)
+
+    def release(self) -> None:
+        """Follow nothing more."""
+        for stop in self.stops:
+            stop()
+
+
+def number(value: float) -> str:
+    """Three digits, without an exponent where it is large.
+
+    >>> number(0.6667), number(94731.2)
+    ('0.667', '94731')
+    """
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def _table() -> ReadTable:
+    table = ReadTable("Effects of the simulated rig", "Tick effects to choose them by name", _COLUMNS)
+    table.wrap(len(_COLUMNS) - 1)
+    return table

@@ -1,0 +1,245 @@
+"""What accuracy costs in time on the rig at hand: predicted, wished for, and measured after a scan. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from dsl_app.connection.state import RigState
+from dsl_app.scan.forecast.job import ForecastJob, Rigging, usual_candidates
+from dsl_app.scan.forecast.measured import measure
+from dsl_app.scan.forecast.state import ForecastState, Foreseen, Measured, identity
+from dsl_app.scan.plan import KEEPS_ITS_PLAN, ScanPlanController
+from dsl_app.scan.state import Phase, ScanState
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.sentences import sentence_of
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+NO_CALIBRATION = (
+    "Without a calibration nothing can be predicted for this rig. Calibrate it, or choose a calibration of"
+    " the library at the right."
+)
+
+
+class ForecastController:
+    """Predicts presets, candidates and the plan at hand in one job that starts anew where it was stopped.
+
+    ``folder`` keeps what was predicted. Where it is not ``automatic``, only `begin` starts it.
+    """
+
+    def __init__(
+        self,
+        state: ForecastState,
+        scan: ScanState,
+        rig: RigState,
+        plans: ScanPlanController,
+        runner: JobRunner,
+        notifier: Notifier,
+        folder: Path,
+        automatic: bool = False,
+        candidates: Callable[[Rig], Iterable[CapturePlan]] = usual_candidates,
+    ) -> None:
+        self.state, self._scan, self._rig, self._plans = state, scan, rig, plans
+        self._runner, self._notifier, self._folder = runner, notifier, folder
+        self._automatic, self._candidates = automatic, candidates
+        self._known: dict[int, Foreseen] = {}
+        self._refused: dict[int, str] = {}
+        self._work: ForecastJob | None = None
+        self._job: Job[None] | None = None
+        self._of: Rigging | None = None
+        #: Whether nothing is left to predict but plans of one's own, as all is done or a person said stop.
+        self._is_complete = False
+        self._stops = [
+            rig.devices.follow(lambda _: self._renew()),
+            scan.calibration.changed.connect(lambda _: self._renew()),
+            scan.plan.changed.connect(lambda _: self._plan_changed()),
+            scan.phase.changed.connect(self._phase_changed),
+            scan.result.connect(self._measure),
+        ]
+
+    # Predict ---------------------------------------------------------------------------------------
+
+    def _rigging(self) -> Rigging | None:
+        known = self._plans.calibration
+        if known is None:
+            return None
+        scan = self._scan
+        return Rigging(known, scan.latency_ms.value, scan.period_ms.value, self.state.look.value)
+
+    def look(self, result: Path | None) -> None:
+        """Predict for the scene that a result shows, or for a Color Checker."""
+        self.state.look.set(result)
+        self._renew()
+
+    def _renew(self) -> None:
+        """Forget what was predicted for another rig or calibration."""
+        now, is_there = self._rigging(), self._rig.devices.value is not None
+        self.state.trouble.set(NO_CALIBRATION if now is None and is_there else "")
+        if now == self._of:
+            return
+        self._stop()
+        self._of, self._known, self._refused, self._is_complete = now, {}, {}, False
+        self.state.points.set(())
+        self._show_current()
+        self.state.answer.set("")
+        if self._automatic:
+            self.begin()
+
+    def begin(self) -> None:
+        """Predict what is not known yet, unless a scan uses the machine."""
+        if self._of is None or self._job is not None or self._scan.phase.value.is_busy:
+            return
+        plan = self._scan.plan.value
+        if self._is_complete and (identity(plan) in self._known or identity(plan) in self._refused):
+            return
+        candidates = None if self._is_complete else self._candidates
+        self._work = work = ForecastJob(self._of, self._folder, candidates, self._must_wait)
+        work.want(plan)
+        self._job = job = Job(
+            "Predict accuracy against time",
+            work.work,
+            lambda _: self._ended(work, complete=True),
+            lambda error: self._failed(work, error),
+            lambda: self._ended(work, complete=False),
+            is_minor=True,
+        )
+        # How many there are is not known yet, but that something is under way is.
+        self.state.progress.set((0, 1))
+        self._runner.submit(job)
+
+    def _must_wait(self) -> bool:
+        return any(not job.is_minor for job in self._runner.active)
+
+    def _stop(self) -> None:
+        if self._job is not None:
+            self._job.cancel()
+        self._job = self._work = None
+        self.state.progress.set((0, 0))
+
+    def _ended(self, work: ForecastJob, complete: bool) -> None:
+        if work is not self._work:
+            return  # what it found was for another rig
+        self.take_news()
+        self._is_complete = True
+        self._stop()
+        if complete and self._automatic:
+            # The plan may have changed when the job was about to end.
+            self.begin()
+
+    def _failed(self, work: ForecastJob, error: Exception) -> None:
+        if work is self._work:
+            self._stop()
+            self._is_complete = True
+            self.state.trouble.set(f"Nothing can be predicted: {sentence_of(error)}")
+
+    def take_news(self) -> None:
+        """Show what was predicted since last time; called by the window's clock."""
+        if self._work is None or self._job is None:
+            return
+        news = self._work.take_news()
+        for each in news:
+            if isinstance(each, Foreseen):
+                self._known[each.key] = each
+            else:
+                self._refused[identity(each.plan)] = each.reason
+        if news:
+            self.state.points.set(tuple(self._known.values()))
+            self._show_current()
+        self.state.progress.set((self._job.progress.done, max(self._job.progress.total, 1)))
+
+    def _plan_changed(self) -> None:
+        self.state.answer.set("")
+        self._show_current()
+        if self.state.current.value is not None or self.state.refusal.value:
+            return
+        if self._work is not None:
+            self._work.want(self._scan.plan.value)
+        elif self._automatic:
+            self.begin()
+
+    def _show_current(self) -> None:
+        this = identity(self._scan.plan.value)
+        self.state.current.set(self._known.get(this))
+        self.state.refusal.set(self._refused.get(this, ""))
+
+    # Choose ----------------------------------------------------------------------------------------
+
+    def choose(self, wanted: Foreseen) -> None:
+        """Plan this."""
+        self._plans.change_plan(wanted.plan)
+
+    def answer(self, budget_s: float | None = None, error: float | None = None) -> None:
+        """Plan the most accurate within a time, or the quickest that reaches an error of single pixels."""
+        from dsl_core.planning.choice import Weighed, choose
+
+        points = self.state.points.value
+        if not points:
+            self.state.answer.set("Nothing is predicted yet. Wait a moment, then ask again.")
+            return
+        done, total = self.state.progress.value
+        so_far = f" Of {done} of {total} plans predicted so far." if done < total else ""
+        try:
+            found = choose([Weighed(each.plan, each.expected) for each in points], budget_s, error)
+        except PlanError as none:
+            self.state.answer.set(f"{none}{so_far}")
+            return
+        best = self._known[identity(found.plan)]
+        self.choose(best)
+        words = (
+            f"{best.title}, {best.expected.seconds:.0f} s, error of a pixel {best.expected.pixel_rmse:.4f}."
+        )
+        if identity(self._scan.plan.value) == best.key:
+            self.state.answer.set(f"Chosen: {words}{so_far}")
+        else:
+            self.state.answer.set(f"Best would be {words}{so_far} {KEEPS_ITS_PLAN}")
+
+    # After a scan ----------------------------------------------------------------------------------
+
+    def _phase_changed(self, phase: Phase) -> None:
+        if phase.is_busy:
+            self._stop()
+        elif self._automatic:
+            self.begin()
+        if phase is Phase.DONE:
+            self._note_scan()
+
+    def _note_scan(self) -> None:
+        status, plan = self._scan.status.value, self._scan.plan.value
+        seconds = None if self._waits_for_nothing else status.elapsed_s
+        name = self._scan.target.value.stem
+        self.state.measured.set(Measured(name, plan, status.total, seconds, plan.raw_bytes))
+
+    @property
+    def _waits_for_nothing(self) -> bool:
+        """Whether a simulated rig takes exposures quicker than real ones could be."""
+        from dsl_core.simulation.sim_devices import SimCamera
+
+        devices = self._rig.devices.value
+        is_simulated = devices is not None and isinstance(devices.camera, SimCamera)
+        return is_simulated and dict(self._rig.choice.value.options).get("realtime") != "on"
+
+    def _measure(self, result: Path) -> None:
+        """Compare a new result with its truth, if any is known; its scene may be planned for."""
+        self.state.last_look.set(result)
+        scan = self.state.measured.value
+        if scan is None or scan.name != result.stem:
+            return
+
+        def work(progress: Progress) -> Measured:
+            progress.report("compare with the truth", 0, 0)
+            return measure(scan, result)
+
+        def failed(error: Exception) -> None:
+            self._notifier.tell("warning", f"{result.name} could not be judged: {sentence_of(error)}")
+
+        self._runner.submit(Job(f"Judge {result.stem}", work, self.state.measured.set, failed, is_minor=True))
+
+    def close(self) -> None:
+        """Follow nothing more."""
+        for stop in self._stops:
+            stop()
+        self._stop()

@@ -1,0 +1,182 @@
+"""Predicting plans in a job's thread, the one that is wanted first. No Qt."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_app.scan.forecast.state import Foreseen, identity
+from dsl_app.scan.forecast.store import ForecastStore
+from dsl_core.errors import DslError
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import PRESETS, on_cycles
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    from dsl_core.planning.prediction import Prediction
+    from dsl_core.planning.views import View
+
+#: How often is looked whether other work is over, s.
+LOOK_S = 0.1
+
+
+def usual_candidates(rig: Rig) -> Iterable[CapturePlan]:
+    """Every plan that the planner weighs."""
+    from dsl_core.planning.candidates import candidate_plans
+
+    return candidate_plans(rig)
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A plan of which nothing can be predicted, and why."""
+
+    plan: CapturePlan
+    reason: str
+
+
+@dataclass(frozen=True)
+class Rigging:
+    """For what is predicted: a calibration, the projector's latency and frame period, and a scene.
+
+    ``look`` is a result that shows the scene; None for a Color Checker.
+    """
+
+    rig: Rig
+    latency_ms: float
+    period_ms: float
+    look: Path | None = None
+
+    @property
+    def scene(self) -> str:
+        """What tells scenes apart, results of the same name among them."""
+        if self.look is None:
+            return ""
+        try:
+            return f"{self.look} {self.look.stat().st_mtime_ns}"
+        except OSError:  # whoever reads it will say so
+            return str(self.look)
+
+
+class ForecastJob:
+    """Predicts presets, then candidates; `work` belongs to the job's thread, all else to the window's.
+
+    Without candidates only what is wanted is predicted. ``must_wait`` says whether other work should have the
+    machine for itself.
+    """
+
+    def __init__(
+        self,
+        rigging: Rigging,
+        folder: Path,
+        candidates: Callable[[Rig], Iterable[CapturePlan]] | None,
+        must_wait: Callable[[], bool],
+    ) -> None:
+        self.rigging = rigging
+        self._folder, self._candidates, self._must_wait = folder, candidates, must_wait
+        self._lock = threading.Lock()
+        self._wanted: CapturePlan | None = None
+        self._news: list[Foreseen | Refused] = []
+        self._view: View | None = None
+
+    # In the window's thread ------------------------------------------------------------------------
+
+    def want(self, plan: CapturePlan) -> None:
+        """Predict this plan next."""
+        with self._lock:
+            self._wanted = plan
+
+    def take_news(self) -> list[Foreseen | Refused]:
+        """What was predicted since last time."""
+        with self._lock:
+            news, self._news = self._news, []
+        return news
+
+    # In the job's thread ---------------------------------------------------------------------------
+
+    def work(self, progress: Progress) -> None:
+        """Predict all that is not remembered; raises `DslError` where nothing can be predicted at all."""
+        from dsl_core.planning import choice as _choice  # noqa: F401 - the window will want it at once
+
+        rig = self.rigging.rig
+        store = ForecastStore(self._folder, rig, self.rigging.latency_ms, self.rigging.scene)
+        presets = {identity(p): key for key, p in self._presets()}
+        seen: dict[int, CapturePlan] = {}
+        if self._candidates is not None:
+            for plan in (*(p for _, p in self._presets()), *self._candidates(rig)):
+                seen.setdefault(identity(plan), plan)
+        todo = deque(seen.values())
+        try:
+            while (turn := self._next(todo)) is not None:
+                plan, is_wanted = turn
+                progress.report("predict plans", len(seen) - len(todo), len(seen))
+                if not is_wanted:
+                    self._wait(progress)
+                self._post(self._of(plan, store, presets.get(identity(plan), "")))
+        finally:
+            store.save()
+
+    def _presets(self) -> list[tuple[str, CapturePlan]]:
+        return [(each.key, on_cycles(each.plan, self.rigging.period_ms)) for each in PRESETS]
+
+    def _next(self, todo: deque[CapturePlan]) -> tuple[CapturePlan, bool] | None:
+        """The plan whose turn it is, and whether somebody waits for it."""
+        with self._lock:
+            wanted, self._wanted = self._wanted, None
+        if wanted is not None:
+            return wanted, True
+        return (todo.popleft(), False) if todo else None
+
+    def _wait(self, progress: Progress) -> None:
+        """Let work that a person asked for go first."""
+        while self._must_wait():
+            progress.report("wait for other work", 0, 0)
+            time.sleep(LOOK_S)
+
+    def _post(self, news: Foreseen | Refused) -> None:
+        with self._lock:
+            self._news.append(news)
+
+    def _of(self, plan: CapturePlan, store: ForecastStore, preset: str) -> Foreseen | Refused:
+        rig = self.rigging.rig
+        size = {
+            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
+            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
+        }
+        sized = plan.model_copy(update=size)
+        known = store.find(sized)
+        if known is not None:
+            return Foreseen(plan, known, preset)
+        view = self._look()
+        try:
+            found = self._predict(sized, view)
+        except DslError as error:
+            return Refused(plan, str(error))
+        store.keep(sized, found)
+        return Foreseen(plan, found, preset)
+
+    def _look(self) -> View:
+        """Sample pixels of the scene; raises `DslError` where there are none."""
+        from dsl_core.planning.views import plane_view, scene_view
+
+        if self._view is not None:
+            return self._view
+        rig, look = self.rigging.rig, self.rigging.look
+        if look is None:
+            self._view = plane_view(rig)
+        else:
+            from dsl_core.io.result.result_file import load_result
+
+            self._view = scene_view(rig, load_result(look))
+        return self._view
+
+    def _predict(self, plan: CapturePlan, view: View) -> Prediction:
+        from dsl_core.planning.prediction import predict
+
+        return predict(self.rigging.rig, plan, view, latency_ms=self.rigging.latency_ms)

@@ -1,0 +1,273 @@
+"""What accuracy costs in time: plans as points, the one at hand to be dragged along the best of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from dsl_app.scan.forecast.state import Foreseen
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.curve_marks import ticks, time_ticks
+from dsl_app.shared.widgets.forms import ChoiceBox
+from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+
+#: Presets that are always named; other points only while they are chosen or pointed at.
+NAMED = ("preview", "balanced", "reference")
+#: Names closer than this, in decades of time, would overlap.
+NEAR = 0.3
+#: Room around the points, in decades.
+ROOM = 0.09
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of `Prediction`: how it is called, and the value that it should have."""
+
+    field: str
+    title: str
+    axis: str
+    wanted: float = 0.0
+
+
+FIGURES = (
+    Figure("pixel_rmse", "Reflectance of single pixels", "RMSE"),
+    Figure("rmse", "Reflectance of patches", "RMSE"),
+    Figure("pixel_angle_rad", "Spectral angle of single pixels", "angle (rad)"),
+    Figure("delta_e", "Colour of patches", "ΔE₀₀"),
+    Figure("fwhm_nm", "Width of 10 nm filters", "FWHM (nm)", 10.0),
+    Figure("depth_std_mm", "Depth of single pixels", "error (mm)"),
+)
+
+
+class OperatingCurve(QWidget):
+    """Emits ``chosen`` with the plan clicked, dropped on, or reached by arrow keys; ``pointed`` meanwhile."""
+
+    chosen = Signal(object)
+    pointed = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._points: tuple[Foreseen, ...] = ()
+        self._current: Foreseen | None = None
+        self._theme = DARK
+        self._labels: dict[int, Any] = {}
+        self._is_fixed = False
+        self.figure = ChoiceBox("Figure of accuracy", "The figure that the curve shows")
+        for figure in FIGURES:
+            self.figure.addItem(figure.title)
+        self.plot = calm_plot(
+            "Accuracy against time",
+            "Expected error over the time on the rig; below and left is better. Click a point, drag the"
+            " marker along the curve, or press the arrow keys. The star is the published plan.",
+            "RMSE", "Time on the rig",
+        )  # fmt: skip
+        self.plot.setMouseEnabled(False, False)
+        self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._front = self.plot.plot([], [])
+        self.points = pg.ScatterPlotItem(hoverable=True, hoverSize=12, tip=None)
+        self.marker = pg.TargetItem(size=18, movable=True)
+        self._wanted = pg.InfiniteLine(angle=0, movable=False)
+        for item in (self._wanted, self.points, self.marker):
+            self.plot.addItem(item, ignoreBounds=True)
+        self.marker.hide()
+        self._lay_out()
+        self.figure.currentIndexChanged.connect(lambda _: self._draw())
+        self.points.sigClicked.connect(lambda _item, spots, _event: self._choose(spots[0].data()))
+        self.points.sigHovered.connect(self._hovered)
+        self.marker.sigPositionChanged.connect(lambda: self.pointed.emit(self._nearest()))
+        self.marker.sigPositionChangeFinished.connect(self._dropped)
+
+    def _lay_out(self) -> None:
+        self.head = head = QHBoxLayout()
+        head.addWidget(self.figure)
+        head.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addLayout(head)
+        column.addWidget(self.plot, 1)
+
+    # Show ------------------------------------------------------------------------------------------
+
+    def show_points(self, points: Sequence[Foreseen], current: Foreseen | None) -> None:
+        """Show what is expected of plans, and which one is at hand."""
+        self._points, self._current = tuple(points), current
+        self._draw()
+
+    def fix(self, fixed: bool) -> None:
+        """Let nothing be chosen while a scan is under way."""
+        self._is_fixed = fixed
+        self.marker.movable = not fixed
+
+    @property
+    def _figure(self) -> Figure:
+        return FIGURES[self.figure.currentIndex()]
+
+    def spot(self, point: Foreseen) -> tuple[float, float] | None:
+        """Where a point lies on the axes, which count decades; None where it has no such figure."""
+        value = getattr(point.expected, self._figure.field)
+        return None if not value else (math.log10(point.expected.seconds), math.log10(value))
+
+    def _seen(self) -> list[tuple[Foreseen, tuple[float, float]]]:
+        return [(each, at) for each in self._points if (at := self.spot(each)) is not None]
+
+    def front(self) -> list[Foreseen]:
+        """The plans that no quicker one beats, from quick to slow."""
+        wanted = self._figure.wanted
+        best, found = float("inf"), []
+        for point, at in sorted(self._seen(), key=lambda each: each[1]):
+            off = abs(10 ** at[1] - wanted)
+            if off < best:
+                best = off
+                found.append(point)
+        return found
+
+    def _draw(self) -> None:
+        figure, seen, theme = self._figure, self._seen(), self._theme
+        for text in self._labels.values():
+            self.plot.removeItem(text)
+        self._labels = {}
+        self.plot.setLabel("left", figure.axis)
+        self._wanted.setVisible(figure.wanted > 0 and bool(seen))
+        self.marker.setVisible(False)
+        line = [at for point in self.front() if (at := self.spot(point)) is not None]
+        self._front.setData([x for x, _ in line], [y for _, y in line])
+        self.points.setData([self._spot_of(point, at, theme) for point, at in seen])
+        if not seen:
+            for side in ("bottom", "left"):
+                self.plot.getPlotItem().getAxis(side).setTicks([[]])
+            return
+        if figure.wanted:
+            self._wanted.setPos(math.log10(figure.wanted))
+        self._set_ranges([at for _, at in seen])
+        for point in self._named():
+            self._name(point)
+        at = None if self._current is None else self.spot(self._current)
+        self.marker.setVisible(at is not None)
+        if at is not None:
+            self._place_marker(at)
+
+    @staticmethod
+    def _spot_of(point: Foreseen, at: tuple[float, float], theme: Theme) -> dict[str, Any]:
+        if point.is_published:
+            return {
+                "pos": at,
+                "data": point,
+                "symbol": "star",
+                "size": 16,
+                "brush": theme.warn,
+                "pen": theme.base,
+            }
+        if point.preset:
+            return {
+                "pos": at,
+                "data": point,
+                "symbol": "o",
+                "size": 10,
+                "brush": theme.accent,
+                "pen": theme.base,
+            }
+        return {"pos": at, "data": point, "symbol": "o", "size": 6, "brush": theme.muted, "pen": theme.base}
+
+    def _named(self) -> list[Foreseen]:
+        """Points with names; the one at hand pushes out those beside it."""
+        at = None if self._current is None else self.spot(self._current)
+        named = [] if at is None or self._current is None else [self._current]
+        for point, place in self._seen():
+            if point.preset in NAMED and (at is None or abs(place[0] - at[0]) > NEAR):
+                named.append(point)
+        return named
+
+    def _set_ranges(self, places: list[tuple[float, float]]) -> None:
+        wanted = self._figure.wanted
+        low, high = min(y for _, y in places), max(y for _, y in places)
+        if wanted:
+            low, high = min(low, math.log10(wanted)), max(high, math.log10(wanted))
+        left, right = min(x for x, _ in places), max(x for x, _ in places)
+        # Names stand above their points.
+        top = high + max(0.2 * (high - low), ROOM)
+        self.plot.setXRange(left - ROOM, right + ROOM, padding=0)
+        self.plot.setYRange(low - ROOM / 2, top, padding=0)
+        item = self.plot.getPlotItem()
+        item.getAxis("bottom").setTicks([time_ticks(10 ** (left - ROOM), 10 ** (right + ROOM))])
+        item.getAxis("left").setTicks([ticks(10 ** (low - ROOM / 2), 10**top)])
+
+    def _name(self, point: Foreseen) -> None:
+        at = self.spot(point)
+        if at is None or point.key in self._labels:
+            return
+        is_current = self._current is not None and point.key == self._current.key
+        (left, right), _ = self.plot.getViewBox().viewRange()
+        # A name near an edge must not leave the plot.
+        share = (at[0] - left) / (right - left)
+        text = pg.TextItem(
+            point.title, color=self._theme.text if is_current else self._theme.muted, anchor=(share, 1.25)
+        )
+        text.setPos(*at)
+        self.plot.addItem(text, ignoreBounds=True)
+        self._labels[point.key] = text
+
+    def _place_marker(self, at: tuple[float, float]) -> None:
+        self.marker.blockSignals(True)
+        self.marker.setPos(*at)
+        self.marker.blockSignals(False)
+
+    # Choose ----------------------------------------------------------------------------------------
+
+    def _nearest(self) -> Foreseen | None:
+        """The point of the curve, or the preset, nearest to the marker on the screen."""
+        (width, height), at = self.plot.getViewBox().viewPixelSize(), self.marker.pos()
+        worth = {point.key for point in self.front()}
+        near = [each for each in self._seen() if each[0].preset or each[0].key in worth]
+        if not near:
+            return None
+        return min(
+            near, key=lambda each: math.hypot((each[1][0] - at.x()) / width, (each[1][1] - at.y()) / height)
+        )[0]
+
+    def _dropped(self) -> None:
+        nearest = self._nearest()
+        self.pointed.emit(None)
+        if nearest is None or nearest == self._current:
+            self._draw()
+        else:
+            self._choose(nearest)
+
+    def _choose(self, point: Foreseen) -> None:
+        if not self._is_fixed:
+            self.chosen.emit(point)
+
+    def _hovered(self, _item: object, spots: Any, _event: object) -> None:
+        point = spots[0].data() if len(spots) else None
+        if point is not None:
+            self._name(point)
+        self.pointed.emit(point)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Left and right lead to quicker and slower plans of the curve; the plot leaves them to it."""
+        step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
+        line = self.front()
+        if not step or not line:
+            event.ignore()
+            return
+        now = -1.0 if self._current is None else self._current.expected.seconds
+        later = [point for point in line if (point.expected.seconds - now) * step > 0]
+        if later:
+            self._choose(later[0] if step > 0 else later[-1])
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        theme_plots((self.plot,), theme)
+        self._front.setPen(pg.mkPen(theme.accent, width=1.5))
+        self._wanted.setPen(pg.mkPen(theme.muted, width=1, style=Qt.PenStyle.DashLine))
+        self.marker.setPen(pg.mkPen(theme.text, width=2))
+        self.marker.setHoverPen(pg.mkPen(theme.warn, width=2))
+        self._draw()

@@ -1,0 +1,274 @@
+"""The operating point: what accuracy costs in time, what a plan is expected to reach, what a scan was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFrame,
+    QHBoxLayout,
+    QHeaderView,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.scan.forecast.operating_curve import OperatingCurve
+from dsl_app.scan.forecast.state import ForecastState, Foreseen, identity
+from dsl_app.scan.forecast.words import FIGURES
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.late import Late
+from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
+
+#: How often news of the predictions is fetched, ms.
+FETCH_MS = 200
+BUDGET, ERROR = "budget", "error"
+#: Height of a row of the table.
+ROW_PX = 19
+NOTHING_YET = "Nothing is predicted yet. It takes a connected rig with a calibration, and no scan under way."
+_HEADS = ("Expected of", "This plan", "Published", "Last scan")
+CHART = "a Color Checker at 700 mm"
+
+
+class ForecastCommands(Protocol):
+    """What the panel asks of its controller."""
+
+    def take_news(self) -> None:
+        """Hand over what was predicted meanwhile."""
+
+    def choose(self, wanted: Foreseen) -> None:
+        """Plan this."""
+
+    def answer(self, budget_s: float | None = None, error: float | None = None) -> None:
+        """Plan what answers a wish."""
+
+    def look(self, result: Path | None) -> None:
+        """Predict for the scene of a result."""
+
+    def close(self) -> None:
+        """Follow nothing more."""
+
+
+class ForecastPanel(QWidget):
+    """Follows a `ForecastState` and asks a controller."""
+
+    def __init__(self, state: ForecastState, commands: ForecastCommands) -> None:
+        super().__init__()
+        self._state, self._commands = state, commands
+        self._pointed: Foreseen | None = None
+        self._is_fixed = False
+        self.curve = Late(self._make_curve)
+        self.scene = ChoiceBox("Scene", "For what is predicted: a chart, or the scene of the last result")
+        self.scene.addItems(("for a chart", "for the last scan"))
+        self.scene.setEnabled(False)
+        self.scene.be_narrow(100)
+        self.table = _table()
+        self.wish = ChoiceBox("Wish", "What is given: the time at hand, or the error that is good enough")
+        self.wish.addItem("Time at most", BUDGET)
+        self.wish.addItem("Error at most", ERROR)
+        self.budget = NumberBox("Most time", 1, 36000, 60, "s", 0, "Time for the capture")
+        self.error = NumberBox(
+            "Largest error", 0.001, 1, 0.02, "", 4, "Reflectance error (RMSE) of a single pixel"
+        )
+        self.ask = QPushButton("Find plan")
+        self.ask.setToolTip("Choose the most accurate plan in that time, or the quickest that is good enough")
+        self._answer = label("")
+        self._note = label("", "muted")
+        for text in (self._answer, self._note):
+            text.setWordWrap(True)
+        self._timer = QTimer(self)
+        self._timer.setInterval(FETCH_MS)
+        self._timer.timeout.connect(commands.take_news)
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        wish = QHBoxLayout()
+        for widget in (self.wish, self.budget, self.error, self.ask):
+            wish.addWidget(widget)
+        wish.addStretch(1)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 6, 0, 0)
+        column.setSpacing(5)
+        column.addWidget(self.curve, 1)
+        column.addWidget(self._note)
+        column.addLayout(wish)
+        column.addWidget(self._answer)
+        column.addWidget(self.table)
+
+    def _connect(self) -> None:
+        state = self._state
+        self.scene.activated.connect(self._look)
+        self.wish.currentIndexChanged.connect(lambda _: self._show_wish())
+        self.ask.clicked.connect(self._ask)
+        for box in (self.budget, self.error):
+            box.lineEdit().returnPressed.connect(self._ask)
+        self._show_wish()
+        self.stops: list[Callable[[], None]] = [
+            state.points.follow(lambda _: self._show_points()),
+            state.current.follow(lambda _: self._show_points()),
+            state.measured.follow(lambda _: self._show_figures()),
+            state.progress.follow(lambda _: self._show_note()),
+            state.trouble.follow(lambda _: self._show_note()),
+            state.refusal.follow(lambda _: self._show_note()),
+            state.answer.follow(self._show_answer),
+            state.look.follow(lambda _: self._show_scene()),
+            state.last_look.follow(lambda _: self._show_scene()),
+        ]
+
+    def _show_wish(self) -> None:
+        wants_time = self.wish.currentData() == BUDGET
+        self.budget.setVisible(wants_time)
+        self.error.setVisible(not wants_time)
+
+    def _ask(self) -> None:
+        if self.wish.currentData() == BUDGET:
+            self._commands.answer(budget_s=self.budget.value())
+        else:
+            self._commands.answer(error=self.error.value())
+
+    def _look(self, index: int) -> None:
+        self._commands.look(self._state.last_look.value if index else None)
+
+    def _show_scene(self) -> None:
+        look, latest = self._state.look.value, self._state.last_look.value
+        self.scene.setCurrentIndex(0 if look is None else 1)
+        self.scene.setEnabled(latest is not None)
+        self._show_note()
+
+    def _show_answer(self, text: str) -> None:
+        self._answer.setText(text)
+        self._answer.setVisible(bool(text))
+
+    def _make_curve(self) -> OperatingCurve:
+        made = OperatingCurve()
+        made.figure.be_narrow(100)
+        made.head.addWidget(self.scene)
+        made.chosen.connect(self._commands.choose)
+        made.pointed.connect(self._point)
+        made.fix(self._is_fixed)
+        self._draw(made)
+        return made
+
+    def _draw(self, curve: OperatingCurve) -> None:
+        curve.show_points(self._state.points.value, self._state.current.value)
+
+    def _point(self, point: Foreseen | None) -> None:
+        self._pointed = point
+        self._show_figures()
+
+    def _show_points(self) -> None:
+        if self.curve.made is not None:
+            self._draw(self.curve.made)
+        self._show_figures()
+        self._show_note()
+
+    def _show_figures(self) -> None:
+        state = self._state
+        shown = self._pointed or state.current.value
+        scan, published = state.measured.value, state.published
+        title = _HEADS[1] if self._pointed is None else "Pointed at"
+        self.table.setHorizontalHeaderLabels((_HEADS[0], title, *_HEADS[2:]))
+        self._tell_scan(shown)
+        expected = None if shown is None else shown.expected
+        best = None if published is None else published.expected
+        for row, figure in enumerate(FIGURES):
+            for column, text in enumerate(
+                (figure.expected(expected), figure.expected(best), figure.found(scan)), 1
+            ):
+                item = self.table.item(row, column)
+                assert item is not None
+                item.setText(text)
+
+    def _tell_scan(self, shown: Foreseen | None) -> None:
+        """Say of which plan and scan the columns are."""
+        scan = self._state.measured.value
+        same = scan is not None and shown is not None and identity(scan.plan) == shown.key
+        told = {
+            1: "Predicted" if shown is None else f"Predicted for {shown.title}",
+            2: "Predicted for the published plan, on this rig",
+            3: "No scan was taken yet"
+            if scan is None
+            else f"What {scan.name} really was" + ("" if same else ", which had another plan"),
+        }
+        for column, text in told.items():
+            heading = self.table.horizontalHeaderItem(column)
+            if heading is not None:
+                heading.setToolTip(text)
+
+    def _show_note(self) -> None:
+        state = self._state
+        done, total = state.progress.value
+        if total:
+            self._timer.start()
+        else:
+            self._timer.stop()
+        if state.trouble.value:
+            text = state.trouble.value
+        elif state.refusal.value:
+            text = state.refusal.value
+        elif not state.points.value:
+            text = "Predicting …" if total else NOTHING_YET
+        else:
+            scene = CHART if state.look.value is None else f"the scene of {state.look.value.stem}"
+            origin = f"Expected from the calibration, for {scene}: F1 says how."
+            text = f"{done} of {total} plans predicted. {origin}" if total > 1 else origin
+        self._note.setText(text)
+        self._allow_to_ask()
+
+    def fix(self, fixed: bool) -> None:
+        """Let nothing be chosen while a scan is under way."""
+        self._is_fixed = fixed
+        if self.curve.made is not None:
+            self.curve.made.fix(fixed)
+        self._allow_to_ask()
+
+    def _allow_to_ask(self) -> None:
+        for box in (self.wish, self.budget, self.error):
+            box.setEnabled(not self._is_fixed)
+        self.ask.setEnabled(not self._is_fixed and bool(self._state.points.value))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.curve.apply_theme(theme)
+
+    def release(self) -> None:
+        """Follow nothing more."""
+        self._timer.stop()
+        for stop in self.stops:
+            stop()
+        self._commands.close()
+
+
+def _table() -> ReadTable:
+    table = ReadTable(
+        "Expected figures",
+        "What is expected of the plan and of the published one, and what the last scan really was",
+        _HEADS,
+        rows=len(FIGURES),
+    )
+    table.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+    table.setFrameShape(QFrame.Shape.NoFrame)
+    table.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    table.verticalHeader().setDefaultSectionSize(ROW_PX)
+    table.verticalHeader().setMinimumSectionSize(ROW_PX)
+    header = table.horizontalHeader()
+    header.setDefaultAlignment(RIGHT)
+    for column in range(1, len(_HEADS)):
+        header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
+    header.setHighlightSections(False)
+    for row, figure in enumerate(FIGURES):
+        for column in range(len(_HEADS)):
+            item = cell(figure.title if column == 0 else "", side=RIGHT if column else LEFT)
+            item.setToolTip(figure.tip)
+            table.setItem(row, column, item)
+    first = table.horizontalHeaderItem(0)
+    if first is not None:
+        first.setTextAlignment(LEFT)
+    table.setFixedHeight(header.sizeHint().height() + len(FIGURES) * ROW_PX + 4)
+    return table

@@ -1,0 +1,112 @@
+"""What accuracy is expected to cost in time on the rig at hand, and what the last scan really was."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_app.shared.evented import Value
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import PRESETS
+
+if TYPE_CHECKING:
+    # Importing it imports torch, which only jobs may wait for.
+    from dsl_core.planning.prediction import Prediction
+
+#: The preset whose plan is the published one.
+PUBLISHED = "reference"
+_TITLES = {preset.key: preset.title for preset in PRESETS}
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """A plan and what is expected of it; ``preset`` is its key, empty for any other plan."""
+
+    plan: CapturePlan
+    expected: Prediction
+    preset: str = ""
+
+    @cached_property
+    def key(self) -> int:
+        """The `identity` of its plan."""
+        return identity(self.plan)
+
+    @property
+    def title(self) -> str:
+        """Its name for people."""
+        return _TITLES.get(self.preset) or plan_title(self.plan)
+
+    @property
+    def is_published(self) -> bool:
+        """Whether this is the published operating point."""
+        return self.preset == PUBLISHED
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a scan really was; errors are None where no truth is known, times where nobody waited.
+
+    ``rmse``, ``angle_rad`` and ``delta_e`` are means over patches, ``pixel_*`` those of single pixels.
+    """
+
+    name: str
+    plan: CapturePlan
+    frames: int
+    seconds: float | None
+    raw_bytes: int
+    computing_s: float | None = None
+    rmse: float | None = None
+    pixel_rmse: float | None = None
+    angle_rad: float | None = None
+    pixel_angle_rad: float | None = None
+    delta_e: float | None = None
+    fwhm_nm: float | None = None
+    depth_rmse_mm: float | None = None
+    coverage: float | None = None
+
+
+class ForecastState:
+    """Values that the forecast's controller sets and its panel follows.
+
+    ``points`` are the plans predicted so far, ``current`` is the plan at hand (None while not known, the
+    reason being ``trouble`` or, for this plan alone, ``refusal``). ``progress`` is how many plans are done of
+    how many (0 of 0: nothing is computed). ``answer`` says what became of a wish for time or accuracy.
+    ``look`` is the result whose scene is planned for (None: a Color Checker), ``last_look`` the latest one.
+    """
+
+    def __init__(self) -> None:
+        self.points: Value[tuple[Foreseen, ...]] = Value(())
+        self.current: Value[Foreseen | None] = Value(None)
+        self.trouble = Value("")
+        self.refusal = Value("")
+        self.progress = Value((0, 0))
+        self.answer = Value("")
+        self.look: Value[Path | None] = Value(None)
+        self.last_look: Value[Path | None] = Value(None)
+        self.measured: Value[Measured | None] = Value(None)
+
+    @property
+    def published(self) -> Foreseen | None:
+        """The published operating point on this rig."""
+        return next((each for each in self.points.value if each.is_published), None)
+
+
+def identity(plan: CapturePlan) -> int:
+    """What makes two plans the same but for name, image sizes and the rounding of whole cycles.
+
+    A number, as patterns of one's own are too long to be compared while a marker is dragged.
+    """
+    settings = tuple((round(setting.exposure_ms, 6), setting.level) for setting in plan.settings)
+    return hash((plan.code, plan.spectral, settings, plan.code_settings))
+
+
+def plan_title(plan: CapturePlan) -> str:
+    """The name of a plan with typographic signs.
+
+    >>> plan_title(CapturePlan(name="comb 5x2x64, 10@0.2 cycles"))
+    'comb 5×2×64, 10@0.2 cycles'
+    """
+    return re.sub(r"(?<=\d)x(?=\d)", "×", plan.name)

@@ -1,0 +1,93 @@
+"""The figures of a forecast: their names, how they read, and where they stand in predictions and results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dsl_app.scan.forecast.state import Measured
+
+if TYPE_CHECKING:
+    from dsl_core.planning.prediction import Prediction
+
+NOTHING = "–"
+
+
+@dataclass(frozen=True)
+class ForecastFigure:
+    """A figure: its field in `Prediction`, how it reads, and its field in `Measured` if that is another."""
+
+    field: str
+    title: str
+    tip: str
+    read: Callable[[float], str]
+    measured: str = ""
+
+    def expected(self, prediction: Prediction | None) -> str:
+        """The predicted value as it reads."""
+        return _words(self, None if prediction is None else getattr(prediction, self.field))
+
+    def found(self, scan: Measured | None) -> str:
+        """The measured value as it reads."""
+        return _words(self, None if scan is None else getattr(scan, self.measured or self.field))
+
+
+def _words(figure: ForecastFigure, value: float | None) -> str:
+    return NOTHING if value is None else figure.read(value)
+
+
+def minutes(seconds: float) -> str:
+    """A time as it reads.
+
+    >>> minutes(45.0), minutes(204.0)
+    ('45 s', '3.4 min')
+    """
+    return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.1f} min"
+
+
+def volume(count: float) -> str:
+    """Bytes as they read.
+
+    >>> volume(46_096_080)
+    '46 MB'
+    """
+    return f"{count / 1e9:.1f} GB" if count >= 1e9 else f"{count / 1e6:.0f} MB"
+
+
+FIGURES: tuple[ForecastFigure, ...] = (
+    ForecastFigure(
+        "rmse", "Reflectance, patch", "RMSE over the bands of the mean spectrum of a patch", "{:.4f}".format
+    ),
+    ForecastFigure(
+        "pixel_rmse", "Reflectance, pixel", "RMSE over the bands of single pixels", "{:.4f}".format
+    ),
+    ForecastFigure(
+        "pixel_angle_rad", "Angle, pixel", "Angle between measured and true spectrum of single pixels",
+        "{:.3f} rad".format,
+    ),
+    ForecastFigure("delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means", "{:.2f}".format),
+    ForecastFigure(
+        "fwhm_nm", "Width of 10 nm", "How wide a filter of 10 nm looks (FWHM)", "{:.1f} nm".format
+    ),
+    ForecastFigure(
+        "depth_std_mm", "Depth, pixel", "Error of depth of single pixels, without that of the calibration",
+        "{:.2f} mm".format, "depth_rmse_mm",
+    ),
+    ForecastFigure(
+        "coverage", "Coverage",
+        "Expected: share of the picture that gets a depth. Measured: share of what is lit",
+        lambda value: f"{100 * value:.0f} %",
+    ),
+    ForecastFigure("frames", "Frames", "All exposures, code and black among them", "{:.0f}".format),
+    ForecastFigure(
+        "seconds", "Capture",
+        "Exposures and the projector's latency. A simulated rig does not wait, so that its time is not shown",
+        minutes,
+    ),
+    ForecastFigure(
+        "computing_s", "Computing", "Reconstruction; expected on a machine like the one that was measured",
+        minutes,
+    ),
+    ForecastFigure("raw_bytes", "Raw data", "Frames before compression", volume),
+)  # fmt: skip

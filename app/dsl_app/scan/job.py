@@ -1,0 +1,142 @@
+"""A scan at work in a job's thread, and what the window may ask of it meanwhile."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dsl_app.scan.state import LivePicture
+from dsl_core.capture.growth import IntensityGraph, IntensityGraphs
+from dsl_core.capture.preview import quick_picture
+from dsl_core.capture.runner import Runner
+from dsl_core.capture.status import Status
+from dsl_core.devices.base import CameraInfo, DeviceRig
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.rig import Rig
+from dsl_core.progress import CancelToken, Progress
+
+#: Pictures wider than this are thinned before they are painted, cells.
+PICTURE_CELLS = 800
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to scan: with which devices, plan and calibration, and into which folder."""
+
+    devices: DeviceRig
+    plan: CapturePlan
+    folder: Path
+    notes: dict[str, str]
+    calibration: Rig | None
+    override: bool
+    is_resumed: bool
+    check_drift: bool = True
+
+
+class ScanJob:
+    """Runs an order once; `work` belongs to the job's thread, everything else to the window's."""
+
+    def __init__(self, order: Order) -> None:
+        self.order = order
+        self.token = CancelToken()
+        self._lock = threading.Lock()
+        self._runner: Runner | None = None
+        #: Of its own, as the runner tells news, for which the other is taken, under a lock too.
+        self._pausing = threading.Lock()
+        self._is_paused = False
+        self._graphs: IntensityGraphs | None = None
+        self._status: Status | None = None
+        self._picture: LivePicture | None = None
+
+    # In the job's thread ---------------------------------------------------------------------------
+
+    def work(self, progress: Progress) -> Status:
+        """Take every missing frame; raises what the engine raises."""
+        from dsl_core import pipeline
+
+        order = self.order
+        # A copy, so that the rig of the window keeps its own calibration.
+        devices = replace(order.devices)
+        if order.is_resumed:
+            progress.report("compare with before", 0, 0)
+            plan, notes = pipeline.prepare_resume(devices, order.folder, order.check_drift), {}
+        else:
+            plan, notes = order.plan, {**order.notes, **self._calibrate(devices)}
+        graphs = IntensityGraphs(plan, devices.camera.info.bayer)
+        if order.is_resumed:
+            self._read_before(graphs, progress)
+        self._graphs = graphs
+        info = devices.camera.info
+        with pipeline.open_scan(
+            devices, plan, order.folder, progress, notes, self.token,
+            lambda shot, frame: self._watch(shot, frame, info),
+        ) as runner:  # fmt: skip
+            runner.listen(self._listen)
+            with self._pausing:
+                self._runner = runner
+                if self._is_paused:
+                    runner.pause()
+            return runner.run()
+
+    def _calibrate(self, devices: DeviceRig) -> dict[str, str]:
+        from dsl_core.devices.conditions import use_calibration
+
+        if self.order.calibration is None:
+            devices.calibration = None
+            return {}
+        overridden = use_calibration(devices, self.order.calibration, self.order.override)
+        return {"calibration_overridden": "; ".join(overridden)} if overridden else {}
+
+    def _read_before(self, graphs: IntensityGraphs, progress: Progress) -> None:
+        """Take the frames of earlier runs into the graphs."""
+        from dsl_core.io.scan.session import SessionReader
+
+        reader = SessionReader(self.order.folder)
+        sound = reader.sound()
+        there = [s for s in reader.plan.shots() if s.role == "spectral" and s.index in sound]
+        for done, shot in enumerate(there):
+            progress.report("read what is there", done, len(there))
+            graphs.add(shot, reader.read(shot))
+
+    def _watch(self, shot: Shot, frame: Frame, camera: CameraInfo) -> None:
+        assert self._graphs is not None
+        self._graphs.add(shot, frame.pixels)
+        if self._picture is not None:
+            return
+        picture = quick_picture(frame.pixels, camera.bayer, 2**camera.bit_depth - 1)
+        thin = -(-picture.shape[1] // PICTURE_CELLS)
+        with self._lock:
+            self._picture = LivePicture(shot, picture[::thin, ::thin], 2 * thin)
+
+    def _listen(self, status: Status) -> None:
+        with self._lock:
+            self._status = status
+
+    # In the window's thread ------------------------------------------------------------------------
+
+    def take_news(self) -> tuple[Status | None, LivePicture | None]:
+        """The latest status and picture since last time."""
+        with self._lock:
+            news = self._status, self._picture
+            self._status = self._picture = None
+        return news
+
+    def graph(self, pixel: tuple[int, int]) -> IntensityGraph | None:
+        """The intensity graph of a pixel as far as it is there."""
+        return None if self._graphs is None else self._graphs.graph(pixel)
+
+    def pause(self) -> None:
+        """Wait before the next frame; one that is still being prepared waits before its first."""
+        self._pause(True)
+
+    def go_on(self) -> None:
+        """Go on after `pause`."""
+        self._pause(False)
+
+    def _pause(self, on: bool) -> None:
+        with self._pausing:
+            self._is_paused = on
+            if self._runner is not None:
+                (self._runner.pause if on else self._runner.resume)()

@@ -1,0 +1,265 @@
+"""What is scanned before it is: presets, plan, target, calibration, and what they take. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from dsl_app.connection.state import RigState
+from dsl_app.scan.facts import find_facts
+from dsl_app.scan.plan_files import read_plan
+from dsl_app.scan.state import OWN_CALIBRATION, CalibrationChoice, Interrupted, Phase, ScanState, same_plan
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.known_files import Kind, kind_of
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.undo import Change, UndoStack
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DslError
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.plan_file import save_plan
+from dsl_core.io.scan.session import SUFFIX
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import PRESETS, on_cycles
+from dsl_core.model.rig import Rig
+from dsl_core.progress import Progress
+
+KEEPS_ITS_PLAN = (
+    "The scan at hand keeps its plan. It can be changed, undone and redone once that scan is complete, or"
+    " left by 'Plan a new scan'."
+)
+
+
+class ScanPlanController:
+    """Keeps plan, target and calibration of the next scan, and says what they take."""
+
+    def __init__(
+        self,
+        state: ScanState,
+        rig: RigState,
+        runner: JobRunner,
+        notifier: Notifier,
+        undo: UndoStack,
+        library: CalibrationLibrary,
+    ) -> None:
+        self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
+        self._undo, self._library = undo, library
+        self._chosen: Rig | None = None
+        #: Counts choices of a calibration: of several that are read at once the last one counts.
+        self._turn = 0
+        #: What was chosen while a scan ran, which keeps its own.
+        self._next: CalibrationChoice | None = None
+        self._stops = [
+            rig.devices.follow(lambda _: self.take_rig()),
+            state.phase.changed.connect(self._phase_changed),
+        ]
+
+    # Plan ------------------------------------------------------------------------------------------
+
+    def choose_preset(self, key: str) -> None:
+        """Take the plan of a preset."""
+        plan = next(preset.plan for preset in PRESETS if preset.key == key)
+        self.change_plan(on_cycles(plan, self.state.period_ms.value))
+
+    def change_plan(self, plan: CapturePlan) -> None:
+        """Take a plan of any kind, with the sizes of the rig; can be undone."""
+        old, new, period_ms = self.state.plan.value, self._fitted(plan), self.state.period_ms.value
+        if new != old and not self._is_locked():
+            self._undo.push(
+                Change(
+                    "change of plan",
+                    lambda: self._set_plan(new, period_ms),
+                    lambda: self._set_plan(old, period_ms),
+                    lambda: KEEPS_ITS_PLAN if self._is_locked() else "",
+                )
+            )
+
+    def _set_plan(self, plan: CapturePlan, period_ms: float) -> None:
+        """Take a plan that was made for an LED cycle; another rig may be connected since."""
+        now_ms = self.state.period_ms.value
+        fitted = self._fitted(plan)
+        self.take_plan(fitted if period_ms == now_ms else on_cycles(fitted, now_ms))
+        self.refresh()
+
+    def take_plan(self, plan: CapturePlan) -> None:
+        """Let this be the plan at hand as it is; a file of another one holds it no more."""
+        if not same_plan(plan, self.state.plan.value):
+            self.state.plan_file.set(None)
+        self.state.plan.set(plan)
+
+    def open_plan(self, path: Path) -> None:
+        """Plan what a file says, a plan or a pattern set; undo brings back what was planned."""
+        if self._is_locked():
+            self._notifier.tell("info", f"The scan at hand keeps its plan. Open {path.name} when it is over.")
+            return
+        now = self.state.plan.value
+
+        def done(plan: CapturePlan) -> None:
+            self.change_plan(plan)
+            # A file is as good as the plan where it is one, and nothing had to be fitted to the rig.
+            is_same = kind_of(path) is Kind.PLAN and self.state.plan.value == plan
+            self.state.plan_file.set(path if is_same else None)
+
+        def work(progress: Progress) -> CapturePlan:
+            return read_plan(path, now)
+
+        self._runner.submit(Job(f"Open {path.name}", work, done, self._tell, is_minor=True))
+
+    def save_plan(self, path: Path) -> None:
+        """Write the plan into a file; who chose its name was asked about one that exists."""
+        target = path if path.suffix else path.with_suffix(".json")
+        plan = self.state.plan.value
+
+        def done(written: Path) -> None:
+            if self.state.plan.value == plan:
+                self.state.plan_file.set(written)
+            self._notifier.tell("info", f"The plan lies in {written}.")
+
+        def work(progress: Progress) -> Path:
+            return save_plan(plan, target, overwrite=True)
+
+        self._runner.submit(Job(f"Save {target.name}", work, done, self._tell, is_minor=True))
+
+    def _is_locked(self) -> bool:
+        """A plan that was begun stays as it is."""
+        return self.state.phase.value.is_busy or self.state.interrupted.value is not None
+
+    def set_target(self, target: Path) -> None:
+        """Store the scan there."""
+        if not self._is_locked():
+            self.state.target.set(
+                target if target.suffix == SUFFIX else target.with_name(target.name + SUFFIX)
+            )
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Say anew what the plan takes and what keeps it from starting."""
+        state = self.state
+        session = state.interrupted.value
+        facts = find_facts(
+            self._devices, state.plan.value, state.target.value, self.calibration, state.override.value
+        )
+        if session is not None:
+            facts = replace(facts, obstacles=() if self._devices else (connect_first(session),), remarks=())
+        state.facts.set(facts)
+
+    def _fitted(self, plan: CapturePlan) -> CapturePlan:
+        from dsl_core.pipeline import fit_plan
+
+        return plan if self._devices is None else fit_plan(plan, self._devices)
+
+    @property
+    def _devices(self) -> DeviceRig | None:
+        return self._rig.devices.value
+
+    def take_rig(self) -> None:
+        """Fit plan and calibration to the rig at hand."""
+        state, devices = self.state, self._devices
+        if devices is not None:
+            info = devices.projector.info
+            state.period_ms.set(info.frame_period_ms)
+            state.latency_ms.set(info.latency_ms)
+            if not self._is_locked():
+                self.take_plan(on_cycles(self._fitted(state.plan.value), info.frame_period_ms))
+        own = None if devices is None else devices.calibration
+        choice = OWN_CALIBRATION if own is None else CalibrationChoice("", own.name, own.provenance.created)
+        rest = tuple(each for each in state.calibrations.value if each.key)
+        state.calibrations.set((choice, *rest))
+        if not state.calibration.value.key:
+            state.calibration.set(choice)
+        self.refresh()
+
+    # Calibration -----------------------------------------------------------------------------------
+
+    @property
+    def calibration(self) -> Rig | None:
+        """The calibration to scan with; None while there is none."""
+        if self.state.calibration.value.key:
+            return self._chosen
+        return None if self._devices is None else self._devices.calibration
+
+    def load_library(self) -> None:
+        """List what the library has."""
+
+        def work(progress: Progress) -> tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]:
+            found: list[CalibrationChoice] = []
+            troubles: list[str] = []
+            for name in self._library.names():
+                progress.report("read the library", len(found), 0)
+                try:
+                    found.append(CalibrationChoice(name, name, self._library.find(name).stored))
+                except DslError as error:
+                    troubles.append(str(error))
+            return tuple(found), tuple(troubles)
+
+        def done(read: tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]) -> None:
+            chosen = self.state.calibration.value
+            # An older version in use is no name of the library, but stays in the list.
+            older = (chosen,) if "@" in chosen.key else ()
+            self.state.calibrations.set((self.state.calibrations.value[0], *read[0], *older))
+            for trouble in read[1]:
+                self._notifier.tell("warning", trouble)
+
+        self._runner.submit(Job("Read the calibrations", work, done, self._tell, is_minor=True))
+
+    def choose_calibration(self, choice: CalibrationChoice) -> None:
+        """Scan with another calibration; a scan under way keeps its own."""
+        if self.state.phase.value.is_busy:
+            self._choose_later(choice)
+            return
+        self._turn += 1
+        turn = self._turn
+        if not choice.key:
+            self._chosen = None
+            self.state.calibration.set(choice)
+            self.refresh()
+            return
+
+        def done(rig: Rig) -> None:
+            if turn != self._turn:
+                return
+            if self.state.phase.value.is_busy:
+                self._choose_later(choice)
+                return
+            self._chosen = rig
+            known = self.state.calibrations.value
+            if choice.key not in [each.key for each in known]:
+                self.state.calibrations.set((*known, choice))
+            self.state.calibration.set(choice)
+            self.refresh()
+
+        work = lambda progress: self._library.find(choice.key).rig  # noqa: E731
+        title = f"Open the calibration {choice.key}"
+        self._runner.submit(Job(title, work, done, self._tell, is_minor=True))
+
+    def _choose_later(self, choice: CalibrationChoice) -> None:
+        is_news = choice != self._next and choice.key != self.state.calibration.value.key
+        self._next = choice
+        if is_news:
+            self._notifier.tell(
+                "info", f"The scan under way keeps its calibration. Scans after it use {choice.name}."
+            )
+
+    def _phase_changed(self, phase: Phase) -> None:
+        if not phase.is_busy and self._next is not None:
+            choice, self._next = self._next, None
+            self.choose_calibration(choice)
+
+    def set_override(self, on: bool) -> None:
+        """Use the calibration although settings differ from it."""
+        self.state.override.set(on)
+        self.refresh()
+
+    def _tell(self, error: Exception) -> None:
+        self._notifier.tell("error", sentence_of(error))
+
+    def close(self) -> None:
+        """Follow the rig no more."""
+        for stop in self._stops:
+            stop()
+
+
+def connect_first(session: Interrupted) -> str:
+    """Which rig an interrupted session waits for."""
+    which = f" It was taken with {session.rig}." if session.rig else ""
+    return f"Connect the rig of this scan on the Rig page.{which}"

@@ -1,0 +1,171 @@
+"""The scan as the window knows it: its plan, what it will take, how far it is, what it sees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_app.shared.evented import Event, Value
+from dsl_core.capture.growth import IntensityGraph
+from dsl_core.capture.status import State, Status
+from dsl_core.model.plan import CapturePlan, Setting, Shot
+from dsl_core.model.presets import PRESETS, Preset, on_cycles
+
+
+class Phase(Enum):
+    """Where the page stands; the words are shown."""
+
+    PLANNING = "ready"
+    STARTING = "starting"
+    RUNNING = "scanning"
+    PAUSED = "paused"
+    STOPPING = "stopping"
+    DONE = "complete"
+    STOPPED = "stopped"
+    LOST = "interrupted"
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a scan uses the rig now."""
+        return self in (Phase.STARTING, Phase.RUNNING, Phase.PAUSED, Phase.STOPPING)
+
+
+class Rescue(Enum):
+    """What becomes of a rig that was lost during a scan; the scan waits for a person unless `RESUMING`."""
+
+    NONE = "nothing was lost"
+    TRYING = "connecting again"
+    RESUMING = "connecting again to go on with the scan"
+    GIVEN_UP = "not there"
+    BACK = "connected again"
+
+    @property
+    def is_trying(self) -> bool:
+        """Whether the rig is being connected again."""
+        return self in (Rescue.TRYING, Rescue.RESUMING)
+
+    @property
+    def is_away(self) -> bool:
+        """Whether the rig must be connected before the scan goes on."""
+        return self.is_trying or self is Rescue.GIVEN_UP
+
+
+@dataclass(frozen=True)
+class CalibrationChoice:
+    """A calibration to scan with: ``key`` is its name in the library, empty for the rig's own."""
+
+    key: str
+    name: str
+    date: str = ""
+
+    @property
+    def text(self) -> str:
+        """Name and date as people read them."""
+        where = self.name if self.key or self == OWN_CALIBRATION else f"{self.name} (the rig's own)"
+        return f"{where}, {self.date[:10]}" if self.date else where
+
+
+OWN_CALIBRATION = CalibrationChoice("", "none")
+
+
+@dataclass(frozen=True)
+class Interrupted:
+    """A session that lacks frames; ``rig`` is the command line's words for the rig it was taken with."""
+
+    folder: Path
+    done: int
+    total: int
+    rig: str = ""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What the plan takes, ``obstacles`` that keep it from starting, and ``remarks`` that do not."""
+
+    frames: int
+    seconds: float
+    needed_bytes: int
+    free_bytes: int
+    obstacles: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    settings_differ: bool = False
+
+
+@dataclass(frozen=True)
+class LivePicture:
+    """The last frame as people look at it: RGB, one pixel for ``cell_px`` of the camera."""
+
+    shot: Shot
+    picture: NDArray[np.uint8]
+    cell_px: int
+
+
+class ScanState:
+    """Values that the scan's controller sets and the page follows.
+
+    ``trouble`` is a sentence on what interrupted the scan (empty: nothing), ``note`` one on what became of
+    it. ``rescue`` is what becomes of the rig where a lost device was it. ``plan_file`` holds the plan at
+    hand, where it was saved or opened and is still the same.
+    ``check_drift`` compares two old frames before an interrupted scan goes on. ``period_ms`` is the LED cycle
+    of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
+    result.
+    """
+
+    def __init__(self, plan: CapturePlan, target: Path) -> None:
+        self.plan = Value(plan)
+        self.plan_file: Value[Path | None] = Value(None)
+        self.target = Value(target)
+        self.calibrations: Value[tuple[CalibrationChoice, ...]] = Value((OWN_CALIBRATION,))
+        self.calibration = Value(OWN_CALIBRATION)
+        self.override = Value(False)
+        self.check_drift = Value(True)
+        self.then_reconstruct = Value(True)
+        self.interrupted: Value[Interrupted | None] = Value(None)
+        self.finished: Value[Path | None] = Value(None)
+        self.facts: Value[Facts | None] = Value(None)
+        self.period_ms = Value(1000.0 / 60.0)
+        self.latency_ms = Value(0.0)
+        self.phase = Value(Phase.PLANNING)
+        self.status = Value(Status(State.IDLE))
+        self.trouble = Value("")
+        self.rescue = Value(Rescue.NONE)
+        self.note = Value("")
+        self.picture: Value[LivePicture | None] = Value(None)
+        self.cursor: Value[tuple[int, int] | None] = Value(None)
+        self.graph: Value[IntensityGraph | None] = Value(None)
+        self.result: Event[Path] = Event()
+
+    @property
+    def preset(self) -> Preset | None:
+        """The preset whose patterns and settings the plan has; None for a plan of one's own."""
+        return preset_of(self.plan.value, self.period_ms.value)
+
+
+def preset_of(plan: CapturePlan, period_ms: float) -> Preset | None:
+    """The preset that a plan is, on a projector of this frame period."""
+    for preset in PRESETS:
+        wanted = on_cycles(preset.plan, period_ms)
+        same_patterns = (plan.code, plan.spectral) == (wanted.code, wanted.spectral)
+        if same_patterns and same_settings(plan.settings, wanted.settings):
+            return preset
+    return None
+
+
+def same_settings(first: Sequence[Setting], second: Sequence[Setting]) -> bool:
+    """Whether settings are the same but for the rounding of whole cycles."""
+    return len(first) == len(second) and all(
+        a.level == b.level and math.isclose(a.exposure_ms, b.exposure_ms, rel_tol=1e-9)
+        for a, b in zip(first, second, strict=True)
+    )
+
+
+def same_plan(first: CapturePlan, second: CapturePlan) -> bool:
+    """Whether plans are the same but for the rounding of whole cycles."""
+    alike = first.model_copy(update={"settings": second.settings}) == second
+    return alike and same_settings(first.settings, second.settings)

@@ -1,0 +1,209 @@
+"""What the scan sees: its last frame, and the intensity graph of a pixel as it builds up."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+
+from dsl_app.scan.commands import ScanCommands
+from dsl_app.scan.state import LivePicture, ScanState
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.arrow_keys import arrow_step
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_core.capture.growth import IntensityGraph
+from dsl_core.model.plan import CapturePlan, Shot
+
+#: Red, green and blue of the camera: they are data and the same in every theme.
+CHANNEL_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
+HINT = "No frame yet. Start a scan and move over its picture to follow the intensity of a pixel."
+#: Columns of the published projector: an axis before there is anything to draw.
+PUBLISHED_COLUMNS = 640
+_ROLES = {"code": "code", "spectral": "pattern", "white": "white", "black": "black"}
+
+
+class FramePicture(QWidget):
+    """The last frame; emits ``pointed`` with a camera pixel under the mouse or moved to by arrow keys."""
+
+    pointed = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._shown: LivePicture | None = None
+        self._cursor: tuple[int, int] | None = None
+        self.view = pg.GraphicsLayoutWidget()
+        self.view.setAccessibleName("Last frame of the scan")
+        self.view.setToolTip("The last frame. Move over it, or use the arrow keys, to follow a pixel.")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.view.setFocusProxy(self)
+        self.box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        self._mark = pg.TargetItem(size=13, movable=False)
+        self.box.addItem(self._image)
+        self.box.addItem(self._mark, ignoreBounds=True)
+        self._mark.hide()
+        self._text = label(HINT, "muted")
+        self._text.setWordWrap(True)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addWidget(self.view, 1)
+        column.addWidget(self._text)
+        self._mouse = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=30, slot=self._hover)
+
+    def show_picture(self, shown: LivePicture | None, plan: CapturePlan) -> None:
+        """Show a frame of a plan."""
+        before, self._shown = self._shown, shown
+        if shown is None:
+            self._image.clear()
+            self._text.setText(HINT)
+            return
+        self._image.setImage(shown.picture, autoLevels=False, levels=None)
+        self._image.setRect(0, 0, *covered_px(shown))
+        self._text.setText(f"Frame {shown.shot.index + 1} of {plan.shot_count}: {words_of(shown.shot, plan)}")
+        if before is None or covered_px(before) != covered_px(shown):
+            self.box.autoRange(padding=0.01)
+
+    def show_cursor(self, pixel: tuple[int, int] | None) -> None:
+        """Mark a pixel of the camera."""
+        self._cursor = pixel
+        self._mark.setVisible(pixel is not None)
+        if pixel is not None:
+            self._mark.setPos(*pixel)
+
+    def _hover(self, event: tuple[Any]) -> None:
+        if self._shown is not None:
+            at = self.box.mapSceneToView(event[0])
+            self._point(int(at.x()), int(at.y()))
+
+    def _point(self, x: int, y: int) -> None:
+        assert self._shown is not None
+        width, height = covered_px(self._shown)
+        if 0 <= x < width and 0 <= y < height:
+            self.pointed.emit((x, y))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrow keys move the pixel, with Shift by ten times as much."""
+        step = arrow_step(event)
+        if step is None or self._shown is None:
+            super().keyPressEvent(event)
+            return
+        width, height = covered_px(self._shown)
+        cell = self._shown.cell_px
+        x, y = self._cursor or (width // 2, height // 2)
+        # The pixel may be one of an earlier scan with a larger picture.
+        x, y = min(x, width - 1), min(y, height - 1)
+        self._point(x + 2 * cell * step[0], y + 2 * cell * step[1])
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.view.setBackground(theme.base)
+        self._mark.setPen(pg.mkPen("#ffffff", width=2))
+
+
+class ScanView(QSplitter):
+    """The last frame above the graph of a pixel; follows a `ScanState`."""
+
+    def __init__(self, state: ScanState, commands: ScanCommands) -> None:
+        super().__init__(Qt.Orientation.Vertical)
+        self.picture, self.graph = FramePicture(), GraphPlot()
+        set_help(self.picture, "scanning#while-it-runs")
+        set_help(self.graph, "reading-an-intensity-graph")
+        self.setChildrenCollapsible(False)
+        for widget, stretch in ((self.picture, 5), (self.graph, 4)):
+            widget.setMinimumHeight(120)
+            self.addWidget(widget)
+            self.setStretchFactor(self.count() - 1, stretch)
+        self.picture.pointed.connect(commands.point_at)
+        self._stops = [
+            state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
+            state.cursor.follow(self.picture.show_cursor),
+            state.graph.follow(self.graph.show_graph),
+        ]
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.picture.apply_theme(theme)
+        self.graph.apply_theme(theme)
+
+    def release(self) -> None:
+        """Follow nothing more."""
+        for stop in self._stops:
+            stop()
+
+
+class GraphPlot(QWidget):
+    """R, G and B of a pixel over the projector's columns; earlier settings are dotted."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plot = calm_plot(
+            "Intensity graph",
+            "Raw counts of the pixel while the lines move over the projector: the zero order is the high"
+            " peak, first orders lie to its sides.",
+            "Raw counts (DN)", "First column of the line (px)",
+        )  # fmt: skip
+        self._title = label("Intensity graph", "heading")
+        self._curves: list[Any] = []
+        self.plot.setXRange(0, PUBLISHED_COLUMNS, padding=0.02)
+        self.plot.setYRange(0, 1000, padding=0.02)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(4)
+        column.addWidget(self._title)
+        column.addWidget(self.plot, 1)
+
+    def show_graph(self, graph: IntensityGraph | None) -> None:
+        """Draw a graph, as far as it is there."""
+        if graph is None:
+            self._title.setText("Intensity graph")
+            for curve in self._curves:
+                curve.setData([], [])
+            return
+        x, y = graph.pixel
+        self._title.setText(f"Intensity graph at {x}, {y} px, mean of {graph.block_px} × {graph.block_px}")
+        settings = len(graph.mean_dn)
+        self._make_curves(settings)
+        begun = [i for i in range(settings) if np.isfinite(graph.mean_dn[i]).any()]
+        for i in range(settings):
+            for channel in range(3):
+                curve = self._curves[3 * i + channel]
+                curve.setVisible(i in begun)
+                # The setting that grows now is solid.
+                old = bool(begun) and i != begun[-1]
+                style = Qt.PenStyle.DotLine if old else Qt.PenStyle.SolidLine
+                curve.setPen(pg.mkPen(CHANNEL_COLOURS[channel], width=1, style=style))
+                curve.setData(graph.position_px, graph.mean_dn[i, :, channel], connect="finite")
+        self.plot.enableAutoRange(axis="y")
+        if len(graph.position_px):
+            self.plot.setXRange(0, graph.position_px[-1] or 1, padding=0.02)
+
+    def _make_curves(self, settings: int) -> None:
+        while len(self._curves) < 3 * settings:
+            self._curves.append(self.plot.plot([], []))
+        for curve in self._curves[3 * settings :]:
+            curve.setVisible(False)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        theme_plots((self.plot,), theme)
+
+
+def covered_px(shown: LivePicture) -> tuple[int, int]:
+    """Width and height of what a picture shows, in pixels of the camera."""
+    height, width = shown.picture.shape[:2]
+    return width * shown.cell_px, height * shown.cell_px
+
+
+def words_of(shot: Shot, plan: CapturePlan) -> str:
+    """What a shot shows and how it is exposed, as people say it."""
+    counts = {"code": plan.code_count, "spectral": plan.spectral_count}
+    which = f" {shot.pattern + 1} of {counts[shot.role]}" if shot.role in counts else ""
+    setting = f"setting {shot.setting + 1} of {len(plan.settings)}"
+    return f"{_ROLES[shot.role]}{which}, {setting} ({shot.exposure_ms:.1f} ms at level {shot.level:g})"

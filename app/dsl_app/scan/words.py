@@ -1,0 +1,66 @@
+"""Names and words of scans: the command line that does the same, the next name, the rig of a session."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+
+from dsl_app.connection.state import RigChoice
+from dsl_core.io.scan.origin import rig_of_notes
+from dsl_core.io.scan.session import SUFFIX
+from dsl_core.model.code_choices import name_of
+from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
+
+
+def plan_words(plan: CapturePlan) -> list[str]:
+    """Options of ``dsl-scan scan`` that make a plan."""
+    code = name_of(plan.code)
+    words = [] if code is None else [f"--code {code}"]
+    match plan.spectral:
+        case ScanLines(width_px=width, step_px=step):
+            words.append(f"--lines {width}x{step}")
+        case LineComb(width_px=width, step_px=step, period_px=period):
+            words.append(f"--comb {width}x{step}x{period}")
+    # Enough digits that an exposure stays a whole number of LED cycles.
+    words += [f"--setting {setting.exposure_ms:.12g}@{setting.level:g}" for setting in plan.settings]
+    return words
+
+
+def needs_file(plan: CapturePlan) -> bool:
+    """Whether the options of the command line cannot say a plan."""
+    is_line_set = isinstance(plan.spectral, ScanLines) and not plan.spectral.sparse
+    is_comb = isinstance(plan.spectral, LineComb) and not any(plan.spectral.shifts_px)
+    return not (is_line_set or is_comb) or plan.code_settings != tuple(range(len(plan.settings)))
+
+
+def scan_command(
+    target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool, file: Path | None = None
+) -> str:
+    """The command that takes this scan; ``rig`` as `RigChoice.command` says it, ``file`` holds the plan."""
+    words, first = ["dsl-scan scan", shlex.quote(str(target)), rig], ""
+    if file is None and needs_file(plan):
+        file, first = Path("plan.json"), "# First save the plan as plan.json, by 'Save plan' on this page.\n"
+    words += plan_words(plan) if file is None else [f"--plan {shlex.quote(str(file))}"]
+    if calibration:
+        words.append(f"--calibration {shlex.quote(calibration)}")
+    if override:
+        words.append("--override-calibration")
+    return first + " ".join(words)
+
+
+def rig_words(notes: Mapping[str, object]) -> str:
+    """The rig a session was taken with, as the command line says it; empty when it does not say."""
+    origin = rig_of_notes(notes)
+    return "" if origin is None else RigChoice(origin[0], tuple(sorted(origin[1].items()))).command
+
+
+def fresh_target(folder: Path, now: datetime) -> Path:
+    """A session folder named by the minute that does not exist yet."""
+    stem = f"scan-{now:%Y%m%d-%H%M}"
+    target, count = folder / f"{stem}{SUFFIX}", 1
+    while target.exists():
+        count += 1
+        target = folder / f"{stem}-{count}{SUFFIX}"
+    return target

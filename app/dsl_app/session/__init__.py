@@ -1,0 +1,1 @@
+"""Session restore: what was open is kept, and offered again after a crash."""

@@ -1,0 +1,115 @@
+"""Keeps the session on disk while the program runs, and finds the one that a crash left behind. No Qt.
+
+Each running program has a file of its own, named by its process. A program that ends well removes it, so that
+a file whose process is gone was left by a crash.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from dsl_app.session.records import Session
+from dsl_app.shared.evented import Value
+from dsl_core.errors import StoreError
+from dsl_core.io.atomic import set_aside, write_atomic
+
+_log = logging.getLogger(__name__)
+_PREFIX = "session-"
+
+
+class SessionKeeper:
+    """Writes what ``collect`` gives, some time after one of the watched values changed."""
+
+    def __init__(self, folder: Path, collect: Callable[[], Session], process: int | None = None) -> None:
+        """``process`` is this program's number; its own by default."""
+        self._folder, self._collect = folder, collect
+        self._process = os.getpid() if process is None else process
+        self._path = folder / f"{_PREFIX}{self._process}.json"
+        self._written: Session | None = None
+        self._is_changed = False
+        self._has_complained = False
+
+    def watch(self, *values: Value[Any]) -> None:
+        """Write soon after any of these changes."""
+        for value in values:
+            value.changed.connect(lambda _: self.touch())
+
+    def touch(self) -> None:
+        """Something changed: write at the next `save`."""
+        self._is_changed = True
+
+    def save(self) -> str:
+        """Write if something changed since last time; returns a sentence the first time that it fails.
+
+        Called by a clock, so that many changes cost one write.
+        """
+        if not self._is_changed:
+            return ""
+        self._is_changed = False
+        session = self._collect()
+        if session == self._written:
+            return ""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(self._path, session.model_dump_json(indent=1).encode())
+        except (OSError, StoreError) as error:
+            return self._complain(f"What is open cannot be kept for after a crash: {error}")
+        self._written = session
+        return ""
+
+    def _complain(self, text: str) -> str:
+        _log.warning("%s", text)
+        first, self._has_complained = not self._has_complained, True
+        return text if first else ""
+
+    def end(self) -> None:
+        """The program ends well: nothing has to be come back to."""
+        self._path.unlink(missing_ok=True)
+
+    def left_behind(self) -> tuple[Session | None, str]:
+        """The newest session of a program that crashed, and a sentence on one that cannot be read.
+
+        All that were left are taken away, so that they are offered once.
+        """
+        newest: Session | None = None
+        trouble = ""
+        for path in sorted(self._folder.glob(f"{_PREFIX}*.json"), key=_age, reverse=True):
+            number = path.stem.removeprefix(_PREFIX)
+            if not number.isdigit() or (int(number) != self._process and is_running(int(number))):
+                continue
+            try:
+                found = Session.model_validate_json(path.read_bytes())
+            except (OSError, ValidationError) as error:
+                trouble = (
+                    f"What was open before the crash could not be read ({type(error).__name__})."
+                    f"{set_aside(path)} Open your files by File, Open recent."
+                )
+                continue
+            path.unlink(missing_ok=True)
+            if newest is None and found.names:
+                newest = found
+        return newest, trouble
+
+
+def _age(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def is_running(process: int) -> bool:
+    """Whether a process of that number runs and is a Python program, as a later one may have the number."""
+    import psutil
+
+    try:
+        words = psutil.Process(process).cmdline()
+    except (psutil.Error, OSError):
+        return False
+    return any("python" in word or "dsl-scan" in word for word in words[:2])

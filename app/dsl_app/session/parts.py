@@ -1,0 +1,174 @@
+"""What each page gives to the session and how it comes back to it. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from typing import TypeVar
+
+from dsl_app.compare.pair.controller import CompareController
+from dsl_app.compare.pair.state import CompareState, Side
+from dsl_app.compare.series.controller import SeriesController
+from dsl_app.compare.series.state import Kind, SeriesState
+from dsl_app.results.controller import ResultsController
+from dsl_app.results.files import is_complete
+from dsl_app.results.state import Quality, ResultsState, View
+from dsl_app.scan.controller import ScanController
+from dsl_app.scan.state import CalibrationChoice, ScanState, preset_of
+from dsl_app.session.records import ComparePart, ResultsPart, ScanPart, SeriesPart
+from dsl_app.shared.evented import Event, Value
+from dsl_core.evaluation.time_sweep import FIGURES
+from dsl_core.io.file_names import MANIFEST_NAME
+from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.presets import on_cycles
+
+E = TypeVar("E", bound=Enum)
+T = TypeVar("T")
+#: The plan that a page begins with is nothing to come back to.
+_FIRST_PLAN = "reference"
+
+
+def results_part(state: ResultsState) -> ResultsPart | None:
+    """The result that is open and its views."""
+    result = state.result.value
+    if result is None:
+        return None
+    return ResultsPart(
+        path=result.path,
+        view=state.view.value.value,
+        cloud_by=state.cloud_by.value.value,
+        quality=state.quality.value.value,
+        band=state.band.value,
+        light=state.light.value,
+        adapted=state.adapted.value,
+        cursor=state.cursor.value,
+        depth_limits=state.depth_limits.value,
+    )
+
+
+def come_back_to_result(part: ResultsPart, control: ResultsController) -> None:
+    """Open the result again, and look at it as before once it is there."""
+    state = control.state
+
+    def look(result: ResultArrays) -> None:
+        if part.cursor is not None:
+            control.point_at(part.cursor)
+        if result.has_spectra:
+            control.step_band(part.band - state.band.value)
+        _set_named(state.cloud_by, View, part.cloud_by)
+        _set_named(state.quality, Quality, part.quality)
+        state.depth_limits.set(part.depth_limits)
+        view = _named(View, part.view)
+        if view is not None:
+            control.show(view)
+        if (part.light, part.adapted) != (state.light.value, state.adapted.value):
+            control.relight(part.light, part.adapted)
+
+    _once(control.opened, look, lambda result: result.path == part.path)
+    control.open(part.path)
+
+
+def scan_part(state: ScanState) -> ScanPart | None:
+    """The plan and where it goes, unless it is the one that everybody begins with."""
+    preset = preset_of(on_cycles(state.plan.value, state.period_ms.value), state.period_ms.value)
+    is_begun = state.phase.value.is_busy or state.interrupted.value is not None
+    if not is_begun and preset is not None and preset.key == _FIRST_PLAN:
+        return None
+    return ScanPart(
+        plan=state.plan.value,
+        target=state.target.value,
+        then_reconstruct=state.then_reconstruct.value,
+        calibration=state.calibration.value.key,
+    )
+
+
+def come_back_to_scan(part: ScanPart, control: ScanController) -> None:
+    """Plan the same again; a scan that the crash interrupted is offered to be gone on with.
+
+    That a calibration is used although settings differ is asked anew: a crash is no reason to skip the check.
+    """
+    control.state.then_reconstruct.set(part.then_reconstruct)
+    if (part.target / MANIFEST_NAME).is_file() and not is_complete(part.target):
+        control.open(part.target)
+        return
+    control.plans.change_plan(part.plan)
+    if not part.target.exists():
+        control.plans.set_target(part.target)
+    if part.calibration:
+        control.plans.choose_calibration(CalibrationChoice(part.calibration, part.calibration))
+
+
+def compare_part(state: CompareState) -> ComparePart | None:
+    """The two sides."""
+    first, second = state.first.value, state.second.value
+    if first is None and second is None:
+        return None
+    truth = second is not None and second.truth is not None
+    return ComparePart(first=_path(first), second=None if truth else _path(second), with_truth=truth)
+
+
+def come_back_to_comparison(part: ComparePart, control: CompareController) -> None:
+    """Open A, then B or the truth of A."""
+
+    def then(_: Side | None) -> None:
+        if part.with_truth:
+            control.use_truth()
+        elif part.second is not None:
+            control.open_side(part.second, second=True)
+
+    if part.first is None:
+        if part.second is not None:
+            control.open_side(part.second, second=True)
+        return
+    _once(control.state.first.changed, then, lambda side: _path(side) == part.first)
+    control.open_side(part.first, second=False)
+
+
+def series_part(state: SeriesState) -> SeriesPart | None:
+    """The results with their positions, and what is asked of them."""
+    rows = state.rows.value
+    if not rows:
+        return None
+    return SeriesPart(
+        rows=tuple((row.path, row.position_mm) for row in rows),
+        kind=state.kind.value.value,
+        figure=state.figure.value.field,
+        against=state.against.value,
+        region=state.region.value,
+    )
+
+
+def come_back_to_series(part: SeriesPart, control: SeriesController) -> None:
+    """Ask the same of the same results."""
+    state = control.state
+    _set_named(state.kind, Kind, part.kind)
+    for figure in FIGURES:
+        if figure.field == part.figure:
+            state.figure.set(figure)
+    control.come_back(part.rows, part.against, part.region)
+
+
+def _path(side: Side | None) -> Path | None:
+    return None if side is None else side.arrays.path
+
+
+def _named(kind: type[E], name: str) -> E | None:
+    return next((each for each in kind if each.value == name), None)
+
+
+def _set_named(value: Value[E], kind: type[E], name: str) -> None:
+    found = _named(kind, name)
+    if found is not None:
+        value.set(found)
+
+
+def _once(event: Event[T], do: Callable[[T], object], if_: Callable[[T], bool]) -> None:
+    """Do something the first time that an event is what is waited for."""
+
+    def judge(now: T) -> None:
+        if if_(now):
+            stop()
+            do(now)
+
+    stop = event.connect(judge)

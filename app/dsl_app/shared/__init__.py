@@ -1,0 +1,1 @@
+"""What several slices need: evented values, file kinds, settings, theme."""

@@ -1,0 +1,86 @@
+"""Runs jobs in threads and brings their ends back to the window's thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from PySide6.QtCore import QObject, QTimer, Signal
+
+from dsl_app.shared.jobs.base import Job, JobState
+from dsl_app.shared.jobs.housekeeping import return_memory
+from dsl_core.errors import DeviceError
+
+#: How often listeners hear of progress, ms: often enough to look alive, seldom enough to cost nothing.
+TICK_MS = 100
+WORKERS = 3
+
+
+class QtRunner(QObject):
+    """A `JobRunner` whose callbacks run in the thread of the window.
+
+    ``changed`` fires when a job starts or ends, and every `TICK_MS` while one runs.
+    """
+
+    changed = Signal()
+    _ended = Signal(object, object)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._pool = ThreadPoolExecutor(WORKERS, thread_name_prefix="job")
+        self._active: list[Job[Any]] = []
+        self._is_over = False
+        self._ended.connect(self._finish)
+        self._ticker = QTimer(self)
+        self._ticker.setInterval(TICK_MS)
+        self._ticker.timeout.connect(self.changed)
+
+    @property
+    def active(self) -> tuple[Job[Any], ...]:
+        """Jobs that wait or run."""
+        return tuple(self._active)
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        """Start a job; raises `DeviceError` when another one uses what it needs alone.
+
+        After `shut_down` nobody waits for a job any more, and none is begun.
+        """
+        if self._is_over:
+            job.state = JobState.CANCELLED
+            return job
+        for other in self._active:
+            if job.exclusive and other.exclusive == job.exclusive:
+                raise DeviceError(
+                    f"{job.title} needs {job.exclusive}, which {other.title} uses. Wait for it, or cancel it."
+                )
+        self._active.append(job)
+        job.accept()
+        self._pool.submit(self._work, job)
+        self._ticker.start()
+        self.changed.emit()
+        return job
+
+    def cancel_all(self) -> None:
+        """Ask every job to stop."""
+        for job in self._active:
+            job.cancel()
+
+    def shut_down(self) -> None:
+        """Stop all jobs and wait for their threads; what they had to tell is dropped."""
+        self._is_over = True
+        self.cancel_all()
+        self._ticker.stop()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def _work(self, job: Job[Any]) -> None:
+        finish = job.run()
+        return_memory()
+        self._ended.emit(job, finish)
+
+    def _finish(self, job: Job[Any], finish: Callable[[], None]) -> None:
+        self._active.remove(job)
+        if not self._active:
+            self._ticker.stop()
+        finish()
+        self.changed.emit()

@@ -1,0 +1,71 @@
+"""Figures beside their limits, with what to do about those that miss them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHeaderView, QTableWidgetItem
+
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.read_table import ReadTable, cell
+from dsl_core.model.figure import Figure
+
+_COLUMNS = ("", "Figure", "Value", "Wanted", "What to do")
+_MARK_PX = 26
+#: A hyphen that is the sign of a number, as in ``order -1``.
+_SIGN = re.compile(r"(?<!\w)-(?=\d)")
+
+
+class FiguresTable(ReadTable):
+    """A row a figure: whether it passes, value ± standard deviation with unit, limits, advice."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name, "Values with their standard deviation, against their limits", _COLUMNS)
+        self._theme, self._figures = DARK, tuple[Figure, ...]()
+        header = self.horizontalHeader()
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
+        header.resizeSection(0, _MARK_PX)
+        self.wrap(len(_COLUMNS) - 1)
+
+    def show_figures(self, figures: Sequence[Figure]) -> None:
+        """Show figures in their order."""
+        self._figures = tuple(figures)
+        self.show_rows([self._items(figure) for figure in self._figures])
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.show_figures(self._figures)
+
+    def _items(self, figure: Figure) -> tuple[QTableWidgetItem, ...]:
+        theme, limited = self._theme, bool(figure.limits)
+        colour = theme.text if not limited else (theme.good if figure.passed else theme.bad)
+        mark = "" if not limited else ("✓" if figure.passed else "✗")
+        advice = "" if figure.passed else figure.advice
+        first = cell(mark, colour)
+        first.setData(
+            Qt.ItemDataRole.AccessibleTextRole,
+            "" if not limited else ("passed" if figure.passed else "missed"),
+        )
+        return (
+            first,
+            cell(_SIGN.sub("−", figure.name), theme.text),
+            cell(value_words(figure), colour if not figure.passed else theme.text),
+            cell(figure.limits.replace("-", "−"), theme.muted),
+            cell(advice, theme.text),
+        )
+
+
+def value_words(figure: Figure) -> str:
+    """Value ± standard deviation and unit, with a typographic minus.
+
+    >>> value_words(Figure(name="shift", value=-1.25, std=0.04, unit="nm"))
+    '−1.250 ± 0.040 nm'
+    >>> value_words(Figure(name="corners", value=77.0, unit=""))
+    '77'
+    """
+    if figure.std is None and figure.unit == "" and figure.value == round(figure.value):
+        return f"{figure.value:.0f}".replace("-", "−")
+    return str(figure).removeprefix(figure.name).strip().replace("-", "−")

@@ -1,0 +1,68 @@
+"""What dialogs that order some long work have in common: a remark, *Show command line*, and who may start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QVBoxLayout, QWidget
+
+from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.text_windows import command_window
+
+
+class OrderCommands(Protocol):
+    """What such a dialog asks of its controller."""
+
+    def start(self) -> bool:
+        """Carry the order out; False where it cannot be."""
+
+    def command_line(self) -> str:
+        """The command that does the same."""
+
+
+class OrderDialog(QDialog):
+    """Closes once its order has been taken. Lay out what is asked in `column`, then call `close_column`."""
+
+    def __init__(self, commands: OrderCommands, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._orders = commands
+        #: What follows a state as long as the dialog is open.
+        self.stops: list[Callable[[], None]] = []
+        self.column = QVBoxLayout(self)
+        self.text: QLabel = label("", "muted")
+        self.text.setWordWrap(True)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
+        self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
+        self.command.setToolTip("The command that does the same in a terminal")
+        self.command.clicked.connect(lambda: command_window(commands.command_line(), self).open())
+        self.buttons.accepted.connect(self._start)
+        self.buttons.rejected.connect(self.reject)
+
+    def name_buttons(self, go: str, go_tip: str, cancel_tip: str) -> None:
+        """Say what starting and leaving do."""
+        self.go.setText(go)
+        self.go.setToolTip(go_tip)
+        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip(cancel_tip)
+
+    def close_column(self) -> None:
+        """Add remark and buttons below everything else."""
+        self.column.addWidget(self.text)
+        self.column.addWidget(self.buttons)
+
+    def judge(self, trouble: str, remark: str, is_busy: bool = False) -> None:
+        """Say what is wrong, else the remark; only an order without trouble can be started."""
+        self.text.setText(trouble or remark)
+        set_role(self.text, "warn" if trouble else "muted")
+        self.go.setEnabled(not trouble and not is_busy)
+
+    def _start(self) -> None:
+        if self._orders.start():
+            self.accept()
+
+    def done(self, result: int) -> None:
+        """Follow nothing more."""
+        for stop in self.stops:
+            stop()
+        super().done(result)

@@ -1,0 +1,46 @@
+"""What every page of the rail can do; the main window knows pages only by this."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtWidgets import QWidget
+
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.figure_file import Figure
+
+
+class PageWidget(QWidget):
+    """A page. Everything is optional: a page overrides what it has to say."""
+
+    def page_actions(self) -> dict[str, Callable[[], object]]:
+        """Actions of the table, by key, that the page does itself while it is open."""
+        return {}
+
+    def command_line(self) -> str:
+        """The command that does what the page does now; empty when there is none."""
+        return ""
+
+    def figure(self) -> Figure | None:
+        """The plot of the page that can be saved as a figure; None when there is none."""
+        return None
+
+    def subject(self) -> Path | None:
+        """The scan or result that the page is about, for who acts on it; None when there is none."""
+        return None
+
+    def open_path(self, path: Path) -> bool:
+        """Open a file or folder that was chosen or dropped; False when it is none of the page's."""
+        return False
+
+    @property
+    def is_reading(self) -> bool:
+        """Whether what was opened last is still being read; further files wait for that."""
+        return False
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+
+    def release(self) -> None:
+        """Let go of devices, files and threads before the window closes."""

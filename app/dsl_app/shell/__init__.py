@@ -1,0 +1,1 @@
+"""The main window: pages, menus, toasts, tour and log."""

@@ -1,0 +1,196 @@
+"""The application: Qt, theme, log, the one exception hook, and the window."""
+
+from __future__ import annotations
+
+import builtins
+import logging
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Literal
+
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtGui import QColor, QIcon, QPalette
+from PySide6.QtWidgets import QApplication
+
+from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.jobs.housekeeping import LOOK_MS, Housekeeper, share_heaps
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.known_files import Kind
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.recent import RecentFiles
+from dsl_app.shared.settings import load_settings, settings_folder
+from dsl_app.shared.theme import DARK, LIGHT, Theme, style_sheet
+from dsl_app.shared.undo import UndoStack
+from dsl_app.shared.widgets.icons import icon
+from dsl_app.shell.log import LogRecords
+from dsl_app.shell.main_window import Command, MainWindow, PageMaker, Taker
+from dsl_app.shell.paged_window import Parts
+from dsl_app.shell.warm_up import import_early
+
+_log = logging.getLogger(__name__)
+_SCHEMES = {
+    "system": Qt.ColorScheme.Unknown,
+    "light": Qt.ColorScheme.Light,
+    "dark": Qt.ColorScheme.Dark,
+}
+
+
+#: How long a thread keeps Python's lock that the window wants, s: the window asks often while it paints.
+SWITCH_S = 0.001
+
+
+def make_application(arguments: Sequence[str]) -> QApplication:
+    """The one Qt application, in a style that looks alike on all systems."""
+    sys.setswitchinterval(SWITCH_S)
+    share_heaps()
+    _import_plainly()
+    application = QApplication.instance()
+    if not isinstance(application, QApplication):
+        application = QApplication(list(arguments))
+    application.setApplicationName("dsl-scan")
+    application.setDesktopFileName("dsl-scan")
+    application.setStyle("Fusion")
+    return application
+
+
+def keep_house(window: MainWindow) -> Housekeeper:
+    """Look for garbage in the window's thread alone from now on."""
+    keeper = Housekeeper(lambda: bool(window.parts.runner.active))
+    keeper.take_charge()
+    timer = QTimer(window)
+    timer.setInterval(LOOK_MS)
+    timer.timeout.connect(keeper.look)
+    timer.start()
+    return keeper
+
+
+def _import_plainly() -> None:
+    """Undo that PySide reads and keeps the source of every module, to see if it wants ``snake_case`` names.
+
+    It makes imports slower by a tenth and the program larger by a hundred megabytes.
+    """
+    builtins.__import__ = getattr(builtins, "__orig_import__", builtins.__import__)
+
+
+def set_theme(name: str) -> Theme:
+    """Give the whole application the theme of a name; returns its colours."""
+    application = QApplication.instance()
+    assert isinstance(application, QApplication)
+    hints = application.styleHints()
+    hints.setColorScheme(_SCHEMES[name])
+    dark = name == "dark" or (name == "system" and hints.colorScheme() == Qt.ColorScheme.Dark)
+    theme = DARK if dark else LIGHT
+    application.setPalette(_palette(theme))
+    application.setStyleSheet(style_sheet(theme))
+    return theme
+
+
+def make_window(
+    pages: dict[str, PageMaker],
+    folder: Path | None = None,
+    theme: Literal["system", "light", "dark"] | None = None,
+    commands: dict[str, Command] | None = None,
+    imports: Mapping[str, Sequence[str]] | None = None,
+    takers: dict[Kind, Taker] | None = None,
+) -> MainWindow:
+    """The window with its settings of a folder (default: the system's); told troubles become toasts.
+
+    ``theme`` overrides that of the settings. The page that was open last is there at once, or, where
+    ``imports`` says what pages need, after the first paint and once a thread has imported that.
+    """
+    path = (folder or settings_folder()) / "settings.json"
+    settings, trouble = load_settings(path)
+    settings.theme = theme or settings.theme
+    records = LogRecords()
+    logging.getLogger().addHandler(records)
+    logging.getLogger("dsl_core").setLevel(logging.INFO)
+    parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme, RecentFiles(settings))
+    window = MainWindow(parts, pages, commands, takers)
+    records.setParent(window)
+    parts.runner.setParent(window)
+    window.setWindowIcon(app_icon(window.theme))
+    settings.page = settings.page if settings.page in pages else next(iter(pages))
+    if imports is None:
+        window.open_page(settings.page)
+    else:
+        window.painted.connect(lambda: _open_imported(window, imports[window.page]))
+    if trouble:
+        window.toasts.tell("warning", trouble)
+    return window
+
+
+def _open_imported(window: MainWindow, modules: Sequence[str]) -> None:
+    """Open the page once a thread has imported what it needs, or another one that was chosen meanwhile."""
+
+    def show(_: object) -> None:
+        window.open_page(window.page)
+
+    # What cannot be imported fails again while the page is made, where a person is told.
+    job = Job("Open the page", lambda progress: import_early(modules), show, show, is_minor=True)
+    window.parts.runner.submit(job)
+
+
+class ExceptionHook(QObject):
+    """Turns what nobody caught, in any thread, into a toast and a log entry; the window stays usable."""
+
+    #: Crosses from the thread of the error to that of the window.
+    caught = Signal(str)
+
+    def __init__(self, notifier: Notifier) -> None:
+        super().__init__()
+        self.caught.connect(lambda text: notifier.tell("error", text))
+
+    def install(self) -> None:
+        """Take the place of Python's hooks."""
+        sys.excepthook = self.handle
+        threading.excepthook = lambda args: self.handle(
+            args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback
+        )
+
+    def handle(
+        self, kind: type[BaseException], error: BaseException, traceback: TracebackType | None
+    ) -> None:
+        """Log an exception and tell of it."""
+        if issubclass(kind, KeyboardInterrupt):
+            application = QApplication.instance()
+            if application is not None:
+                application.quit()
+            return
+        _log.error("Unexpected error: %s", error, exc_info=(kind, error, traceback))
+        self.caught.emit(
+            f"Something unexpected happened ({kind.__name__}: {error}). Your data are safe; the log has the"
+            " details (Help, Save a report bundle).",
+        )
+
+
+def _palette(theme: Theme) -> QPalette:
+    palette = QPalette()
+    roles = QPalette.ColorRole
+    for role, colour in (
+        (roles.Window, theme.window),
+        (roles.WindowText, theme.text),
+        (roles.Base, theme.base),
+        (roles.AlternateBase, theme.window),
+        (roles.Text, theme.text),
+        (roles.PlaceholderText, theme.muted),
+        (roles.Button, theme.raised),
+        (roles.ButtonText, theme.text),
+        (roles.ToolTipBase, theme.raised),
+        (roles.ToolTipText, theme.text),
+        (roles.Highlight, theme.accent),
+        (roles.HighlightedText, theme.on_accent),
+        (roles.Link, theme.accent),
+        (roles.Accent, theme.accent),
+    ):
+        palette.setColor(role, QColor(colour))
+    for role in (roles.WindowText, roles.Text, roles.ButtonText):
+        palette.setColor(QPalette.ColorGroup.Disabled, role, QColor(theme.muted))
+    return palette
+
+
+def app_icon(theme: Theme) -> QIcon:
+    """The application's own icon."""
+    return icon("results", theme.accent)

@@ -1,0 +1,89 @@
+"""The log dock: what the program said, with a filter."""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import (
+    QApplication,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.shared.widgets.forms import ChoiceBox
+
+MOST_LINES = 5000
+LEVELS = (("Everything", logging.DEBUG), ("Information", logging.INFO), ("Warnings", logging.WARNING))
+
+
+class LogRecords(QObject, logging.Handler):
+    """Takes log records of any thread to the window's thread and keeps the last ones."""
+
+    arrived = Signal(int, str)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        QObject.__init__(self, parent)
+        logging.Handler.__init__(self, logging.DEBUG)
+        self.setFormatter(logging.Formatter("%(asctime)s  %(levelname)-7s  %(name)s  %(message)s"))
+        self.lines: deque[tuple[int, str]] = deque(maxlen=MOST_LINES)
+
+    def emit(self, record: logging.LogRecord) -> None:  # type: ignore[override]
+        """Keep a record and pass it on."""
+        text = self.format(record)
+        self.lines.append((record.levelno, text))
+        self.arrived.emit(record.levelno, text)
+
+
+class LogPanel(QWidget):
+    """Shows the records at or above a level that hold a text."""
+
+    def __init__(self, records: LogRecords, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._records = records
+        self._level = ChoiceBox("Least level shown", "Leave out messages below this level")
+        for name, level in LEVELS:
+            self._level.addItem(name, level)
+        self._level.setCurrentIndex(1)
+        self._filter = QLineEdit()
+        self._filter.setPlaceholderText("Filter by text")
+        self._filter.setClearButtonEnabled(True)
+        self._filter.setAccessibleName("Filter by text")
+        self._filter.setToolTip("Show only messages that hold this text")
+        copy = QPushButton("Copy")
+        copy.setToolTip("Copy the shown lines to the clipboard")
+        self.view = QPlainTextEdit()
+        self.view.setObjectName("log")
+        self.view.setReadOnly(True)
+        self.view.setMaximumBlockCount(MOST_LINES)
+        self.view.setAccessibleName("Log")
+        self.view.setToolTip("What the program did and what went wrong, the latest last")
+        self.view.setPlaceholderText("Nothing to tell yet.")
+        row = QHBoxLayout()
+        for widget in (QLabel("Show"), self._level, self._filter, copy):
+            row.addWidget(widget)
+        column = QVBoxLayout(self)
+        column.addLayout(row)
+        column.addWidget(self.view)
+        self._level.currentIndexChanged.connect(self._refill)
+        self._filter.textChanged.connect(self._refill)
+        copy.clicked.connect(lambda: QApplication.clipboard().setText(self.view.toPlainText()))
+        records.arrived.connect(self._add)
+        self._refill()
+
+    def _matches(self, level: int, text: str) -> bool:
+        return level >= int(self._level.currentData()) and self._filter.text().lower() in text.lower()
+
+    def _add(self, level: int, text: str) -> None:
+        if self._matches(level, text):
+            self.view.appendPlainText(text)
+
+    def _refill(self) -> None:
+        lines = [text for level, text in self._records.lines if self._matches(level, text)]
+        self.view.setPlainText("\n".join(lines))

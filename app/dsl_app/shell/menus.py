@@ -1,0 +1,46 @@
+"""The menus of a window, made from the table of actions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMainWindow, QMenu
+
+from dsl_app.shell.actions import Action
+
+
+class Menus:
+    """Makes an action of Qt for each of the table; ``do`` gets the key of the one that is triggered."""
+
+    def __init__(self, window: QMainWindow, table: Iterable[Action], do: Callable[[str], object]) -> None:
+        self._window, self._do = window, do
+        self.actions: dict[str, QAction] = {}
+        self._menus: dict[str, QMenu] = {}
+        for record in table:
+            self._add(record)
+
+    def _add(self, record: Action) -> None:
+        if record.menu not in self._menus:
+            menu = self._window.menuBar().addMenu(f"&{record.menu}")
+            menu.setToolTipsVisible(True)
+            self._menus[record.menu] = menu
+        if record.separator:
+            self._menus[record.menu].addSeparator()
+        made = QAction(record.text, self._window)
+        if record.shortcut:
+            made.setShortcut(QKeySequence(record.shortcut))
+        made.setStatusTip(record.tip)
+        made.setToolTip(record.tip or record.text.replace("&", ""))
+        made.setCheckable(record.checkable)
+        made.triggered.connect(lambda _checked=False, key=record.key: self._do(key))
+        self.actions[record.key] = made
+        self._menus[record.menu].addAction(made)
+
+    def put_after(self, key: str, menu: QMenu) -> None:
+        """Put a submenu below an action."""
+        for home in self._menus.values():
+            entries = home.actions()
+            if self.actions[key] in entries:
+                place = entries.index(self.actions[key]) + 1
+                home.insertMenu(entries[place], menu)

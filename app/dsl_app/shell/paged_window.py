@@ -1,0 +1,205 @@
+"""A window with a rail of pages and toasts: opens pages and files, shows a theme, ends well."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from PySide6.QtCore import QSize, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QMessageBox, QStackedWidget, QWidget
+
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
+from dsl_app.shared.recent import RecentFiles
+from dsl_app.shared.settings import Settings, save_settings
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.undo import UndoStack
+from dsl_app.shared.widgets.drops import FilesInTurn, dropped_paths
+from dsl_app.shared.widgets.job_strip import JobStrip
+from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shell.actions import PAGES, Page
+from dsl_app.shell.layout_memory import keep_layout
+from dsl_app.shell.log import LogRecords
+from dsl_app.shell.rail import Rail
+from dsl_app.shell.toasts import Toasts
+
+_log = logging.getLogger(__name__)
+SMALLEST = QSize(1024, 700)
+
+
+@dataclass
+class Parts:
+    """What the window is made of and hands to its pages."""
+
+    settings: Settings
+    settings_path: Path
+    records: LogRecords
+    runner: QtRunner
+    undo: UndoStack
+    set_theme: Callable[[str], Theme]
+    recent: RecentFiles
+
+
+class PagedWindow(QMainWindow):
+    """Pages are made by ``makers`` when they are first opened; ``takers`` take files that are no page's.
+
+    ``opened`` tells the key of the page that is open now, ``painted`` once that the window is on screen,
+    ``closed`` that it ends well.
+    """
+
+    opened = Signal(str)
+    painted = Signal()
+    closed = Signal()
+
+    def __init__(
+        self,
+        parts: Parts,
+        makers: Mapping[str, Callable[[], PageWidget]],
+        takers: Mapping[Kind, Callable[[Path], object]],
+    ) -> None:
+        super().__init__()
+        self._takers = takers
+        self.parts = parts
+        self.theme: Theme = DARK
+        self._is_painted = False
+        self._makers, self._made = makers, dict[str, PageWidget]()
+        self.setWindowTitle("dsl-scan")
+        self.setMinimumSize(SMALLEST)
+        self.resize(1280, 800)
+        self.setAcceptDrops(True)
+        self.toasts = Toasts(self)
+        self.rail = Rail([page for page in PAGES if page.key in makers])
+        self.rail.chosen.connect(self.open_page)
+        self.stack = QStackedWidget()
+        self.strip = JobStrip(parts.runner)
+        self.statusBar().addPermanentWidget(self.strip)
+        self._dropped = FilesInTurn(self.open_path, self._is_reading, self)
+        parts.runner.changed.connect(self._dropped.go_on)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        centre = QWidget()
+        row = QHBoxLayout(centre)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(0)
+        row.addWidget(self.rail)
+        row.addWidget(self.stack, 1)
+        self.setCentralWidget(centre)
+
+    # Pages -----------------------------------------------------------------------------------------
+
+    @property
+    def page(self) -> str:
+        """Key of the page that is open."""
+        return self.parts.settings.page
+
+    @property
+    def about_page(self) -> Page:
+        """What the table says of the page that is open."""
+        return next(page for page in PAGES if page.key == self.page)
+
+    @property
+    def pages(self) -> tuple[str, ...]:
+        """Keys of all pages, made or not."""
+        return tuple(self._makers)
+
+    def open_page(self, key: str) -> PageWidget:
+        """Show a page, making it when it is opened for the first time."""
+        page = self.page_of(key)
+        self.stack.setCurrentWidget(page)
+        self.rail.mark(key)
+        self.parts.settings.page = key
+        self.setWindowTitle(f"{self.about_page.title} – dsl-scan")
+        self.opened.emit(key)
+        return page
+
+    def page_of(self, key: str) -> PageWidget:
+        """The widget of a page, made when it is asked for first; it need not be open."""
+        if key not in self._made:
+            self._made[key] = self._makers[key]()
+            self.stack.addWidget(self._made[key])
+        return self._made[key]
+
+    # Files -----------------------------------------------------------------------------------------
+
+    def open_path(self, path: Path) -> None:
+        """Open a file or folder on the page that knows it, the open page first; says why when none does."""
+        path = meant_by(path)
+        kind = kind_of(path)
+        if kind in self._takers:
+            self._takers[kind](path)
+            return
+        if kind not in (Kind.MISSING, Kind.UNKNOWN):
+            for key in (self.page, *(key for key in self._makers if key != self.page)):
+                if self.page_of(key).open_path(path):
+                    self.parts.recent.add(path)
+                    self.open_page(key)
+                    return
+        if kind is Kind.MISSING:
+            self.parts.recent.forget(path)
+        self.toasts.tell("warning", refusal(path))
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Files may be dropped anywhere."""
+        if dropped_paths(event.mimeData()):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped, one after the other."""
+        event.acceptProposedAction()
+        self._dropped.add(dropped_paths(event.mimeData()))
+
+    def _is_reading(self) -> bool:
+        return any(page.is_reading for page in self._made.values())
+
+    # Look, memory, end -----------------------------------------------------------------------------
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Tell of the first paint, once what was painted has reached the screen."""
+        super().paintEvent(event)
+        if not self._is_painted:
+            self._is_painted = True
+            QTimer.singleShot(0, self, self.painted.emit)
+
+    def apply_theme(self, name: str) -> None:
+        """Show a theme by name: system, light or dark."""
+        self.theme = self.parts.set_theme(name)
+        self.parts.settings.theme = name  # type: ignore[assignment]
+        self.rail.paint_icons(self.theme)
+        for page in self._made.values():
+            page.apply_theme(self.theme)
+
+    def remember(self) -> None:
+        """Write the settings, the layout among them."""
+        keep_layout(self, self.parts.settings)
+        trouble = save_settings(self.parts.settings, self.parts.settings_path)
+        if trouble:
+            _log.warning("%s", trouble)
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask before work is stopped; end all threads and remember the layout."""
+        if not self._may_stop():
+            event.ignore()
+            return
+        for page in self._made.values():
+            page.release()
+        self.parts.runner.shut_down()
+        self.remember()
+        self.closed.emit()
+        # Python's logging outlives the window and must not call into it.
+        logging.getLogger().removeHandler(self.parts.records)
+        event.accept()
+
+    def _may_stop(self) -> bool:
+        titles = ", ".join(job.title for job in self.parts.runner.active if not job.is_minor)
+        if not titles:
+            return True
+        answer = QMessageBox.question(
+            self,
+            "Work is running",
+            f"{titles} is still running. Stop it and leave? What is captured is kept and can be resumed.",
+        )
+        return answer == QMessageBox.StandardButton.Yes

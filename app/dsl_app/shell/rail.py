@@ -1,0 +1,56 @@
+"""The rail of activities at the left of the window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtWidgets import QButtonGroup, QFrame, QToolButton, QVBoxLayout, QWidget
+
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.icons import icon
+from dsl_app.shell.actions import Page
+
+
+class Rail(QFrame):
+    """One button a page, in the order of the work; ``chosen`` tells the key of the page."""
+
+    chosen = Signal(str)
+
+    def __init__(self, pages: Sequence[Page], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("rail")
+        self._pages = tuple(pages)
+        self._group = QButtonGroup(self)
+        self._group.setExclusive(True)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 6, 0, 6)
+        column.setSpacing(2)
+        self._buttons: dict[str, QToolButton] = {}
+        for number, page in enumerate(pages, 1):
+            button = self._button(page, number)
+            self._buttons[page.key] = button
+            self._group.addButton(button)
+            column.addWidget(button)
+        column.addStretch(1)
+
+    def _button(self, page: Page, number: int) -> QToolButton:
+        button = QToolButton(self)
+        button.setText(page.title)
+        button.setCheckable(True)
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
+        button.setIconSize(QSize(26, 26))
+        button.setFixedWidth(84)
+        button.setToolTip(f"{page.tip} (Ctrl+{number})")
+        button.setAccessibleName(page.title)
+        button.clicked.connect(lambda _checked, key=page.key: self.chosen.emit(key))
+        return button
+
+    def mark(self, key: str) -> None:
+        """Show a page as the one that is open."""
+        self._buttons[key].setChecked(True)
+
+    def paint_icons(self, theme: Theme) -> None:
+        """Draw the icons in the colours of a theme."""
+        for page in self._pages:
+            self._buttons[page.key].setIcon(icon(page.icon, theme.text))

@@ -1,0 +1,187 @@
+"""The guided tour: the window darkens but for one part, and a card beside it says what that is for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import label
+from dsl_app.shell.tour_steps import Step
+
+CARD_PX, GAP_PX, MARGIN_PX = 360, 14, 6
+SHADE = QColor(0, 0, 0, 130)
+_FORWARD = (Qt.Key.Key_Right, Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_PageDown)
+_ARROWS = (Qt.Key.Key_Left, Qt.Key.Key_Right)
+_BACK = (Qt.Key.Key_Left, Qt.Key.Key_Backspace, Qt.Key.Key_PageUp)
+
+
+class Tour(QWidget):
+    """Lies over a window; ``wanted`` tells the step that should be shown, ``ended`` that it is over.
+
+    Who hears ``wanted`` opens its page and then calls `point_at` with the part of the window.
+    """
+
+    wanted = Signal(object)
+    ended = Signal()
+
+    def __init__(self, steps: Sequence[Step], theme: Theme, window: QWidget) -> None:
+        super().__init__(window)
+        self._window = window
+        self._steps, self._theme, self._at = tuple(steps), theme, 0
+        self._target: QWidget | None = None
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._count, self._title, self._text = label("", "muted"), label("", "heading"), label("")
+        self._text.setWordWrap(True)
+        self.skip = _button("&Skip", "Leave the tour (Escape)")
+        self.back = _button("&Back", "The step before (left arrow)")
+        self.next = _button("&Next", "The next step (right arrow or Enter)")
+        self.next.setProperty("role", "primary")
+        self.skip.clicked.connect(self.leave)
+        self.back.clicked.connect(lambda: self.go(self._at - 1))
+        self.next.clicked.connect(lambda: self.go(self._at + 1))
+        self.card = self._make_card()
+        for watched in (window, self.skip, self.back, self.next):
+            watched.installEventFilter(self)
+
+    def _make_card(self) -> QFrame:
+        card = QFrame(self)
+        card.setProperty("role", "card")
+        card.setFixedWidth(CARD_PX)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.skip)
+        buttons.addStretch(1)
+        buttons.addWidget(self.back)
+        buttons.addWidget(self.next)
+        column = QVBoxLayout(card)
+        column.setContentsMargins(14, 12, 14, 12)
+        for widget in (self._count, self._title, self._text):
+            column.addWidget(widget)
+        column.addSpacing(6)
+        column.addLayout(buttons)
+        return card
+
+    @property
+    def step(self) -> Step:
+        """The step that is shown."""
+        return self._steps[self._at]
+
+    def start(self) -> None:
+        """Show the first step."""
+        self.setGeometry(self._window.rect())
+        self.show()
+        self.raise_()
+        self.go(0)
+
+    def go(self, to: int) -> None:
+        """Show a step by its number; behind the last one the tour ends."""
+        if to >= len(self._steps):
+            self.leave()
+            return
+        self._at = max(to, 0)
+        step = self.step
+        self._count.setText(f"{self._at + 1} of {len(self._steps)}")
+        self._title.setText(step.title)
+        self._text.setText(step.text)
+        self.setAccessibleName(f"Tour: {step.title}")
+        self.setAccessibleDescription(step.text)
+        self.back.setEnabled(self._at > 0)
+        self.next.setText("&Done" if self._at + 1 == len(self._steps) else "&Next")
+        self.wanted.emit(step)
+        self.next.setFocus()
+
+    def point_at(self, target: QWidget) -> None:
+        """Leave a part of the window bright, and put the card beside it."""
+        self._target = target
+        self._settle()
+
+    def leave(self) -> None:
+        """End the tour."""
+        self._window.removeEventFilter(self)
+        self.hide()
+        self.ended.emit()
+        self.deleteLater()
+
+    # Place -----------------------------------------------------------------------------------------
+
+    @property
+    def hole(self) -> QRect:
+        """What stays bright, in pixels of the window."""
+        if self._target is None:
+            return QRect()
+        corner = self._target.mapTo(self._window, QPoint(0, 0))
+        around = QRect(corner, self._target.size()).adjusted(-MARGIN_PX, -MARGIN_PX, MARGIN_PX, MARGIN_PX)
+        return around.intersected(self.rect())
+
+    def _settle(self) -> None:
+        self.card.adjustSize()
+        self.card.move(beside(self.hole, self.card.size().width(), self.card.size().height(), self.rect()))
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Darken all but the target."""
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        hole = QPainterPath()
+        hole.addRoundedRect(self.hole, 6, 6)
+        shade = QPainterPath()
+        shade.addRect(self.rect())
+        painter.fillPath(shade.subtracted(hole), SHADE)
+        painter.setPen(QPen(QColor(self._theme.accent), 2))
+        painter.drawPath(hole)
+
+    # Keys and size ---------------------------------------------------------------------------------
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Arrows, Enter and Escape."""
+        if event.key() in _FORWARD:
+            self.go(self._at + 1)
+        elif event.key() in _BACK:
+            self.go(self._at - 1)
+        elif event.key() == Qt.Key.Key_Escape:
+            self.leave()
+
+    def focusNextPrevChild(self, forward: bool) -> bool:
+        """Keep Tab inside the card."""
+        stops = [button for button in (self.skip, self.back, self.next) if button.isEnabled()]
+        at = next((i for i, button in enumerate(stops) if button.hasFocus()), -1)
+        stops[(at + (1 if forward else -1)) % len(stops)].setFocus()
+        return True
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Follow the window's size, and take the arrows that buttons would use among themselves."""
+        if watched is self._window and event.type() == QEvent.Type.Resize:
+            self.setGeometry(self._window.rect())
+            self._settle()
+        if isinstance(event, QKeyEvent) and event.type() == QEvent.Type.KeyPress and event.key() in _ARROWS:
+            self.keyPressEvent(event)
+            return True
+        return False
+
+
+def beside(hole: QRect, width: int, height: int, room: QRect) -> QPoint:
+    """Where a card of a size stands beside a hole: right, left, below or above it, else in its middle."""
+    inside = QRect(room.left() + GAP_PX, room.top() + GAP_PX, room.width() - width - 2 * GAP_PX, 0)
+    inside.setHeight(room.height() - height - 2 * GAP_PX)
+    x = min(max(hole.left(), inside.left()), inside.right())
+    y = min(max(hole.top(), inside.top()), inside.bottom())
+    if hole.right() + GAP_PX + width < room.right():
+        return QPoint(hole.right() + GAP_PX, y)
+    if hole.left() - GAP_PX - width > room.left():
+        return QPoint(hole.left() - GAP_PX - width, y)
+    if hole.bottom() + GAP_PX + height < room.bottom():
+        return QPoint(x, hole.bottom() + GAP_PX)
+    if hole.top() - GAP_PX - height > room.top():
+        return QPoint(x, hole.top() - GAP_PX - height)
+    return QPoint(hole.center().x() - width // 2, hole.center().y() - height // 2)
+
+
+def _button(text: str, tip: str) -> QPushButton:
+    button = QPushButton(text)
+    button.setToolTip(tip)
+    # Enter presses the one that has the focus, as in a dialog.
+    button.setAutoDefault(True)
+    return button

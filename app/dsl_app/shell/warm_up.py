@@ -1,0 +1,128 @@
+"""Imports what the window will soon need, in a thread, so that no click has to wait for it. No Qt here."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import importlib
+import importlib.util
+import logging
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+_log = logging.getLogger(__name__)
+#: In small steps: first what connecting a rig needs, then pages, calibrations, results and the 3D view.
+STEPS = (
+    "scipy.linalg",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.interpolate",
+    "cv2",
+    "torch",
+    "dsl_core.simulation.sim_devices",
+    "zarr",
+    "dsl_core.pipeline",
+    "dsl_app.rig.page",
+    "dsl_app.scan.controller",
+    "dsl_app.scan.forecast.controller",
+    "dsl_app.scan.effects.controller",
+    "dsl_app.scan.page",
+    "dsl_app.results.controller",
+    "dsl_app.results.page",
+    "dsl_app.calibrate.controller",
+    "dsl_app.calibrate.page",
+    "dsl_app.compare.pair.controller",
+    "dsl_app.compare.series.controller",
+    "dsl_app.compare.page",
+    "dsl_app.calibrate.wizard.window",
+    "pandas",
+    "xarray",
+    "dsl_core.workflows.sessions",
+    "dsl_core.campaign.recipes",
+    "dsl_app.calibrate.evidence.selftest",
+    "dsl_app.calibrate.evidence.geometry",
+    "dsl_app.calibrate.evidence.spectralon",
+    "dsl_app.calibrate.evidence.color_checker",
+    "dsl_app.calibrate.evidence.bandpass",
+    "dsl_app.calibrate.evidence.depth_stage",
+    "matplotlib.figure",
+    "colour",
+    "pyvista",
+    "pyvista.plotting",
+    "vtkmodules.vtkInteractionWidgets",
+    "vtkmodules.vtkViewsContext2D",
+    "vtkmodules.vtkInteractionStyle",
+)
+#: Rest between two steps, s.
+REST_S = 0.05
+#: The bulk of some packages: while the system loads it by itself, Python's lock is free.
+_BULK = {"torch": "lib/libtorch_cpu.so", "cv2": "cv2.abi3.so"}
+
+
+class WarmUp:
+    """Runs the steps once; `stop` ends after the step at hand."""
+
+    def __init__(self, steps: Sequence[str] = STEPS) -> None:
+        self._steps = steps
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="warm-up")
+
+    @property
+    def is_over(self) -> bool:
+        """Whether it has done all it ever will."""
+        return self._thread.ident is not None and not self._thread.is_alive()
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End soon, and wait for that."""
+        self._stop.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        for name in self._steps:
+            if self._stop.wait(REST_S):
+                return
+            try:
+                _import(name)
+            except Exception as error:  # who needs it will say so where a person can do something
+                _log.debug("%s could not be imported early: %s", name, error)
+
+
+def import_early(names: Sequence[str]) -> None:
+    """Import modules in a thread that nobody waits for."""
+    for name in names:
+        _import(name)
+
+
+def _import(name: str) -> None:
+    if name in sys.modules:
+        return
+    # What modules are made of stays. Looking through all of it for garbage, again and again, would hold
+    # Python's lock longer than anything else here.
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        _load_bulk(name)
+        importlib.import_module(name)
+        gc.freeze()
+    finally:
+        if was_on:
+            gc.enable()
+
+
+def _load_bulk(name: str) -> None:
+    found = importlib.util.find_spec(name) if name in _BULK and sys.platform == "linux" else None
+    if found is None or found.origin is None:
+        return
+    load = ctypes.CDLL(None).dlopen  # unlike ctypes.CDLL(path), a function that is called frees the lock
+    load.restype = ctypes.c_void_p
+    path = Path(found.origin).parent / _BULK[name]
+    if path.is_file():
+        load(str(path).encode(), os.RTLD_NOW | os.RTLD_GLOBAL)

@@ -1,1 +1,0 @@
-"""One page or dock a file."""

@@ -1,1 +1,0 @@
-"""What the application knows, without Qt: values that tell when they change."""

@@ -1,0 +1,1 @@
+"""Response and emission refined on a Color Checker."""

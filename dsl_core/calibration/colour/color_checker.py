@@ -1,0 +1,209 @@
+"""Response and emission from the patches of a chart, with patches held out in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.colour.patches import ChartPose, PatchSamples, PatchSignals, patch_signals
+from dsl_core.calibration.light.spectral_refinement import (
+    FINE_NM,
+    PUBLISHED_WEIGHT,
+    UNKNOWNS,
+    Refinement,
+    SpectralModel,
+    SurfaceSignals,
+    refine,
+    refined_curves,
+    residuals,
+)
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.color_checker import ColorCheckerCalibration, PatchResult
+from dsl_core.model.rig import Rig
+from dsl_core.optics.charts import chart_reflectance
+from dsl_core.optics.shading import Plane
+from dsl_core.progress import NoProgress, Progress
+
+Floats = NDArray[np.float64]
+
+#: What each light is made of: red, green, blue and white pictures.
+LIGHTS = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+#: Every so many patches are held out together.
+FOLDS = 4
+#: Patches with more saturated pixels, or fewer pixels, are wrong.
+SATURATED, MIN_PIXELS = 0.02, 8
+#: The white that the rig already reproduces is known to this, at best.
+WHITE_FLOOR = 2e-4
+
+
+@dataclass(frozen=True)
+class ChartPictures:
+    """Mosaics of the chart (lights, rows, columns), DN per ms at full drive, and where each is saturated.
+
+    ``shading`` (rows, columns) is that of the chart's plane times the camera's relative gain.
+    """
+
+    radiance: Floats
+    saturated: NDArray[np.bool_]
+    shading: Floats
+
+
+def expected_colours(rig: Rig, chart: str) -> Floats:
+    """Signals of the 24 patches under white as the rig has it, (24, 3); what orientations are told by."""
+    data = _surfaces(chart)
+    return SpectralModel(rig).predict(_zero(), data)[0][:, :, 3]
+
+
+def measure_patches(
+    pictures: ChartPictures, rig: Rig, samples: PatchSamples, chart: str
+) -> list[PatchSignals]:
+    """Signals at unit shading, for each light; raises `CalibrationError` naming a patch that is no good."""
+    seen = [
+        patch_signals(picture / pictures.shading, pictures.saturated, rig.sensor.bayer, samples)
+        for picture in pictures.radiance
+    ]
+    for p, name in enumerate(chart_reflectance(FINE_NM, chart)):
+        share = max(float(light.saturated[p].max()) for light in seen)
+        if share > SATURATED:
+            raise CalibrationError(
+                f"The patch {name!r} of the Color Checker is saturated ({share:.0%} of its pixels). Capture"
+                " it again with less light or a shorter exposure."
+            )
+        count = min(int(light.count[p].min()) for light in seen)
+        if count < MIN_PIXELS:
+            raise CalibrationError(
+                f"The patch {name!r} of the Color Checker shows {count} pixels of a colour. Move the chart"
+                " closer."
+            )
+    return seen
+
+
+def refine_on_chart(
+    rig: Rig,
+    seen: Sequence[PatchSignals],
+    pose: ChartPose,
+    plane: Plane,
+    chart: str,
+    progress: Progress | None = None,
+) -> ColorCheckerCalibration:
+    """Refine the rig's response and emission; ``seen`` are signals of the patches for each of `LIGHTS`.
+
+    The white that the rig reproduces already (from a Spectralon) counts as one more surface. Where held-out
+    patches are not explained better than before, the curves stay as they were.
+    """
+    names = list(chart_reflectance(FINE_NM, chart))
+    signal = np.stack([light.mean for light in seen], 2)
+    std = np.stack([light.std for light in seen], 2)
+    data = _with_white(rig, _surfaces(chart, signal, std))
+    progress = progress or NoProgress()
+    found = refine(rig, data, weight=None, progress=progress)
+    held_out = _held_out(rig, data, found.weight, found.reflectance_error, progress)
+    before = _patch_rms(residuals(rig, data, _unchanged(found)))
+    if _rms(held_out) > _rms(before):
+        found, held_out = _unchanged(found), before
+    response, emission, white_scale = refined_curves(rig, found)
+    after = _patch_rms(residuals(rig, data, found))
+    patches = tuple(
+        PatchResult(
+            name=name,
+            pixels=int(seen[3].count[p].sum()),
+            saturated=max(float(light.saturated[p].max()) for light in seen),
+            signal=tuple(tuple(row) for row in signal[p].tolist()),
+            std=tuple(tuple(row) for row in std[p].tolist()),
+            residual=float(after[p]),
+            held_out=float(held_out[p]),
+            start=float(before[p]),
+        )
+        for p, name in enumerate(names)
+    )
+    published = _held_out(rig, data, PUBLISHED_WEIGHT, None, progress)
+    a, b, c, d = ((float(x), float(y)) for x, y in pose.corners_px)
+    return ColorCheckerCalibration(
+        chart=chart,
+        corners_px=(a, b, c, d),
+        quarter_turns=pose.quarter_turns,
+        patches=patches,
+        response=response,
+        emission=emission,
+        white_scale=white_scale,
+        weight=found.weight,
+        reflectance_error=found.reflectance_error,
+        chart_level=float(np.expm1(found.chart_level)),
+        published_held_out=_rms(published),
+        tilt_deg=plane.tilt_deg,
+        distance_mm=plane.distance_mm,
+    )
+
+
+def _zero() -> Floats:
+    return np.zeros(6 * UNKNOWNS + 1)
+
+
+def _surfaces(chart: str, signal: Floats | None = None, std: Floats | None = None) -> SurfaceSignals:
+    reflectance = np.stack(list(chart_reflectance(FINE_NM, chart).values()))
+    none = np.zeros((len(reflectance), 3, len(LIGHTS)))
+    return SurfaceSignals(
+        none if signal is None else signal,
+        none if std is None else std,
+        reflectance,
+        LIGHTS,
+        np.ones(len(reflectance), bool),
+    )
+
+
+def _with_white(rig: Rig, data: SurfaceSignals) -> SurfaceSignals:
+    """The patches and, last, a perfect diffuser with the signals that the rig gives."""
+    white = SurfaceSignals(
+        np.zeros((1, 3, len(LIGHTS))),
+        np.zeros((1, 3, len(LIGHTS))),
+        np.ones((1, len(FINE_NM))),
+        LIGHTS,
+        np.zeros(1, bool),
+    )
+    signal, _ = SpectralModel(rig).predict(_zero(), white)
+    relative = max(rig.white_scale_rel_std, WHITE_FLOOR)
+    std = relative * (signal + 0.1 * signal.max(2, keepdims=True))
+    return SurfaceSignals(
+        np.concatenate([data.signal, signal]),
+        np.concatenate([data.std, std]),
+        np.concatenate([data.reflectance, white.reflectance]),
+        LIGHTS,
+        np.concatenate([data.own_level, white.own_level]),
+    )
+
+
+def _held_out(
+    rig: Rig, data: SurfaceSignals, weight: float, error: float | None, progress: Progress
+) -> Floats:
+    """Residual of each patch with curves fitted to the patches of the other folds, (24,)."""
+    patch = np.arange(len(data.own_level))
+    out = np.empty(int(data.own_level.sum()))
+    for fold in range(FOLDS):
+        progress.report("hold patches out", fold, FOLDS)
+        left_out = data.own_level & (patch % FOLDS == fold)
+        found = refine(rig, data.only(~left_out), weight, error)
+        out[left_out[data.own_level]] = _patch_rms(residuals(rig, data.only(left_out), found))
+    return out
+
+
+def _unchanged(found: Refinement) -> Refinement:
+    """The same refinement with nothing moved but the chart's level."""
+    return Refinement(
+        np.zeros_like(found.deviation),
+        found.covariance,
+        found.chart_level,
+        found.weight,
+        found.reflectance_error,
+        found.evidence,
+    )
+
+
+def _patch_rms(residual: Floats) -> Floats:
+    return np.asarray(np.sqrt((residual**2).mean((1, 2))))
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,233 @@
+"""The classic chart in a picture: found, turned the right way round, and its patches measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.colour.chart_alignment import (
+    align_corners,
+    apply_homography,
+    grid_corners,
+    homography,
+)
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.charts import CHART_SHAPE
+from dsl_core.optics.demosaic import demosaic
+from dsl_core.optics.sensor import bayer_channels
+
+Floats = NDArray[np.float64]
+
+#: Inner part of a patch that is measured: half width as a share of the distance between patches.
+INNER = 0.28
+#: Mean logarithmic distance of measured from expected colours: above it the chart is none.
+NOT_THIS_CHART = 0.35
+#: The next best orientation must be this many times farther off.
+CLEARLY = 1.5
+MIN_PIXELS = 12
+
+
+@dataclass(frozen=True)
+class ChartPose:
+    """Where the chart lies in a picture.
+
+    ``corners_px`` (4, 2) are column and row of the outer corners of the grid of patches: beside the first
+    patch (dark skin), the sixth (bluish green), the last (black) and the nineteenth (white).
+    ``quarter_turns`` says how far the chart is turned clockwise, to the nearest right angle.
+    ``colour_distance`` is the mean logarithmic distance of the patches' colours from those expected.
+    """
+
+    corners_px: Floats
+    quarter_turns: int
+    colour_distance: float
+
+
+@dataclass(frozen=True)
+class PatchSamples:
+    """Pixels of the inner part of each patch, as flat indices into the picture, in reading order."""
+
+    pixels: tuple[NDArray[np.int64], ...]
+
+
+def chart_picture(mosaic: NDArray[np.floating], bayer: BayerPattern) -> NDArray[np.uint8]:
+    """A picture for chart detection, shape (rows, columns, 3), blue first, from a linear mosaic.
+
+    Channels are balanced by their bright end and encoded by a gamma of 2.2, as detectors expect.
+    """
+    rgb = np.moveaxis(np.asarray(demosaic(mosaic, bayer), np.float64), 0, -1)
+    bright = np.maximum(np.percentile(rgb, 99, axis=(0, 1)), 1e-12)
+    encoded = 255 * np.clip(rgb / bright, 0, 1) ** (1 / 2.2)
+    return np.ascontiguousarray(encoded.astype(np.uint8)[..., ::-1])
+
+
+def find_chart(mosaic: NDArray[np.floating], bayer: BayerPattern, expected: Floats, name: str) -> ChartPose:
+    """Find the chart in any orientation; ``expected`` (24, 3) are its colours up to one scale a channel.
+
+    Raises `CalibrationError` that calls the picture ``name`` when there is no chart, or another one.
+    """
+    picture = chart_picture(mosaic, bayer)
+    centres = _detected_centres(picture)
+    if centres is None:
+        raise CalibrationError(
+            f"No Color Checker was found in {name}. Place the chart so that all 24 patches are in view, lit"
+            " evenly and not saturated; or give its four corners."
+        )
+    corners = apply_homography(homography(_grid_centres(), centres), grid_corners())
+    corners = align_corners(picture, corners)
+    return orient_chart(mosaic, bayer, corners, expected, name)
+
+
+def orient_chart(
+    mosaic: NDArray[np.floating], bayer: BayerPattern, corners_px: Floats, expected: Floats, name: str
+) -> ChartPose:
+    """The pose whose corners are the four given, in cyclic order from any start, decided by colours.
+
+    For corners that a person has set. Raises `CalibrationError` when no order gives the chart's colours, or
+    only a mirrored one does.
+    """
+    orders = [np.roll(order, turn, axis=0) for order in (corners_px, corners_px[::-1]) for turn in range(4)]
+    distances = [_colour_distance(mosaic, bayer, order, expected) for order in orders]
+    best, second = np.argsort(distances)[:2]
+    corners, distance = orders[best], distances[best]
+    if not np.isfinite(distance):
+        raise CalibrationError(
+            f"Patches of the Color Checker in {name} are outside the picture or too small. Place the chart so"
+            " that all 24 patches are in view, or correct its corners."
+        )
+    if not (distance < NOT_THIS_CHART and distances[second] > CLEARLY * distance):
+        raise CalibrationError(
+            f"What was found in {name} does not have the colours of a classic Color Checker in any"
+            f" orientation (mean difference {100 * np.expm1(distance):.0f} %). Check that it is the classic"
+            " chart of 24 patches, that its corners are right, and that no colours are exchanged."
+        )
+    if _signed_area(corners) < 0:
+        raise CalibrationError(
+            f"The Color Checker in {name} is mirrored. Switch the mirroring of the camera's picture off."
+        )
+    along = corners[1] - corners[0]
+    turns = round(float(np.degrees(np.arctan2(along[1], along[0]))) / 90) % 4
+    return ChartPose(corners, turns, float(distance))
+
+
+def patch_samples(corners_px: Floats, shape: tuple[int, int]) -> PatchSamples:
+    """Inner pixels of the 24 patches in a picture of ``shape``; raises `CalibrationError` when cut off."""
+    to_picture = homography(grid_corners(), corners_px)
+    to_grid: Floats = np.linalg.inv(to_picture).astype(np.float64)
+    rows, columns = CHART_SHAPE
+    picked = []
+    for index in range(rows * columns):
+        centre = np.array([index % columns + 0.5, index // columns + 0.5])
+        pixels = _inside(to_picture, to_grid, centre, shape)
+        if len(pixels) < MIN_PIXELS:
+            raise CalibrationError(
+                f"Patch {index + 1} of the Color Checker is outside the picture or too small"
+                f" ({len(pixels)} pixels). Move the chart into view, closer, or set its corners."
+            )
+        picked.append(pixels)
+    return PatchSamples(tuple(picked))
+
+
+@dataclass(frozen=True)
+class PatchSignals:
+    """Per patch and channel: robust mean, its deviation, number of pixels, and share of saturated ones.
+
+    Arrays of shape (24, 3); mean and deviation in the unit of the picture.
+    """
+
+    mean: Floats
+    std: Floats
+    count: NDArray[np.int64]
+    saturated: Floats
+
+
+def patch_signals(
+    mosaic: NDArray[np.floating], saturated: NDArray[np.bool_], bayer: BayerPattern, samples: PatchSamples
+) -> PatchSignals:
+    """Statistics of a linear mosaic (rows, columns) over the patches.
+
+    The mean is that of the values within four robust deviations of the median, so that dust and hot pixels
+    do not count; saturated pixels never do.
+    """
+    channel = bayer_channels(bayer, *mosaic.shape).ravel()
+    flat, full = mosaic.ravel(), saturated.ravel()
+    shape = (len(samples.pixels), 3)
+    mean, std = np.full(shape, np.nan), np.full(shape, np.nan)
+    count, share = np.zeros(shape, np.int64), np.zeros(shape)
+    for p, pixels in enumerate(samples.pixels):
+        for c in range(3):
+            own = pixels[channel[pixels] == c]
+            share[p, c] = full[own].mean() if len(own) else 1.0
+            values = flat[own[~full[own]]].astype(float)
+            if len(values) >= 3:
+                mean[p, c], std[p, c], count[p, c] = _robust_mean(values)
+    return PatchSignals(mean, std, count, share)
+
+
+def _robust_mean(values: Floats) -> tuple[float, float, int]:
+    middle = np.median(values)
+    spread = 1.4826 * np.median(np.abs(values - middle))
+    kept = values[np.abs(values - middle) <= 4 * max(spread, 1e-12)]
+    return float(kept.mean()), float(kept.std(ddof=1) / np.sqrt(len(kept))), len(kept)
+
+
+def _detected_centres(picture: NDArray[np.uint8]) -> Floats | None:
+    """Centres (24, 2) of the patches as OpenCV's detector orders them, None without a chart."""
+    import cv2
+
+    mcc: Any = cv2.mcc  # its functions differ between OpenCV 4 and 5
+    make = getattr(mcc, "CCheckerDetector_create", None) or mcc.CCheckerDetector.create
+    detector = make()
+    if hasattr(detector, "setColorChartType"):
+        detector.setColorChartType(mcc.MCC24)
+        found = detector.process(picture, 1)
+    else:
+        found = detector.process(picture, mcc.MCC24, 1)
+    if not found:
+        return None
+    quads = np.asarray(detector.getBestColorChecker().getColorCharts(), float).reshape(-1, 4, 2)
+    return quads.mean(1) if len(quads) == CHART_SHAPE[0] * CHART_SHAPE[1] else None
+
+
+def _colour_distance(
+    mosaic: NDArray[np.floating], bayer: BayerPattern, corners: Floats, expected: Floats
+) -> float:
+    """Mean logarithmic distance of the patches from expected colours, a scale a channel left free."""
+    try:
+        samples = patch_samples(corners, (mosaic.shape[0], mosaic.shape[1]))
+    except CalibrationError:
+        return np.inf
+    none = np.zeros(mosaic.shape, bool)
+    measured = patch_signals(mosaic, none, bayer, samples).mean
+    floor = 0.01 * np.nanmax(measured, axis=0)
+    ratio = np.log(np.maximum(measured, floor)) - np.log(np.maximum(expected, 0.01 * expected.max(0)))
+    if not np.isfinite(ratio).all():
+        return np.inf
+    return float(np.abs(ratio - np.median(ratio, axis=0)).mean())
+
+
+def _inside(to_picture: Floats, to_grid: Floats, centre: Floats, shape: tuple[int, int]) -> NDArray[np.int64]:
+    """Flat indices of the pixels in the inner part of a patch; none when part of it is out of view."""
+    square = centre + INNER * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    outline = apply_homography(to_picture, square)
+    low, high = np.floor(outline.min(0)).astype(int), np.ceil(outline.max(0)).astype(int)
+    if (low < 0).any() or high[0] >= shape[1] or high[1] >= shape[0]:
+        return np.empty(0, np.int64)
+    x, y = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
+    place = apply_homography(to_grid, np.stack([x.ravel(), y.ravel()], 1).astype(float))
+    inside = (np.abs(place - centre) <= INNER).all(1)
+    return np.asarray((y.ravel() * shape[1] + x.ravel())[inside], np.int64)
+
+
+def _signed_area(corners: Floats) -> float:
+    """Twice the area of a quadrilateral, positive when its corners run clockwise as seen (rows go down)."""
+    x, y = corners.T
+    return float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
+
+
+def _grid_centres() -> Floats:
+    rows, columns = CHART_SHAPE
+    return np.array([[i % columns + 0.5, i // columns + 0.5] for i in range(rows * columns)])

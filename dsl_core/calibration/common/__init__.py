@@ -1,0 +1,1 @@
+"""Planes and averages over tiles, which every calibration may use."""

@@ -1,0 +1,1 @@
+"""Whether a rig still is as calibrated."""

@@ -1,0 +1,1 @@
+"""The film's pose, period and bend from a depth stage."""

@@ -1,0 +1,243 @@
+"""Film and geometry from a flat target on a stage: planes first, then the first orders on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.calibration.film.film import FilmFit, OrderSamples, fit_film, grating_columns, with_geometry
+from dsl_core.calibration.film.filter_template import filter_template
+from dsl_core.calibration.film.line_samples import LineFrames
+from dsl_core.calibration.film.peaks import find_coarsely, find_shifts
+from dsl_core.calibration.film.residual import choose_residual
+from dsl_core.calibration.film.stage_grid import fit_stage_grid
+from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.depth_stage import DepthStageCalibration, FilterSeen, StagePosition
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.shading import Plane
+from dsl_core.progress import Progress
+
+Floats = NDArray[np.float64]
+
+ORDERS = (1, -1)
+#: First a search over many columns, then fits from within a few.
+FINE_ROUNDS = 2
+#: Tiles, of both orders together, that a capture needs.
+MIN_TILES = 40
+#: A filter's light lies this far (px) from where all others say it should: another filter, a tilted one.
+WRONG_PX, OFF_PX = 2.0, 0.5
+#: Doubt about a filter: this far off (px).
+DOUBT_PX = 0.15
+
+
+@dataclass(frozen=True)
+class StageFilter:
+    """A bandpass filter: nominal centre, transmission, and whether that was measured."""
+
+    filter_nm: float
+    transmission: SpectralCurve
+    measured: bool
+
+
+@dataclass(frozen=True)
+class StageData:
+    """What was captured of the plane.
+
+    ``positions_mm`` are what the stage said, with the deviation ``stage_std_mm``; ``columns`` are the zero
+    order's tile means at each; ``frames(position, filter)`` reads the lines of a position through a filter,
+    by their indices; ``exposures`` counts all.
+    """
+
+    positions_mm: tuple[float, ...]
+    stage_std_mm: float
+    columns: tuple[ColumnSamples, ...]
+    filters: tuple[StageFilter, ...]
+    frames: Callable[[int, int], LineFrames]
+    exposures: int
+
+    def name(self, position: int, filter: int) -> str:
+        """What a person calls a capture."""
+        return f"{self.positions_mm[position]:g} mm, filter of {self.filters[filter].filter_nm:g} nm"
+
+
+def calibrate_depth_stage(
+    rig: Rig, data: StageData, progress: Progress, grid: bool = False
+) -> DepthStageCalibration:
+    """Refine lenses and pose by planes, and fit the film and its residual to first orders on them.
+
+    With ``grid`` the data-driven model of the seed is fitted too. The rig's `geometry_covariance` is the
+    prior of its geometry, which stays as it is without one. Raises `CalibrationError` that names the position
+    or the filter that does not fit.
+    """
+    progress.report("planes", 0, 1)
+    covariance = None
+    if rig.geometry_covariance is not None:
+        covariance = np.array(rig.geometry_covariance).reshape(24, 24)
+    planes = refine_planes(rig, data.positions_mm, data.columns, covariance, data.stage_std_mm)
+    film, samples = fit_first_orders(planes.rig, planes.planes, data, progress)
+    fitted = planes.rig.model_copy(update={"film": film.film})
+    film = with_geometry(film, fitted, samples, planes.variants(), progress)
+    residual, held_out = choose_residual(
+        fitted,
+        samples,
+        [f"position {z:g} mm" for z in data.positions_mm],
+        [f"filter {each.filter_nm:g} nm" for each in data.filters],
+        progress,
+    )
+    seen = _filters(fitted, data, samples)
+    return DepthStageCalibration(
+        camera=fitted.camera,
+        projector=fitted.projector,
+        pose=fitted.pose,
+        geometry_covariance=None if covariance is None else tuple(planes.covariance.ravel().tolist()),
+        column_std_px=planes.column_std_px if covariance is not None else rig.column_std_px,
+        depth_std_mm=planes.depth_std_mm,
+        geometry_pull=planes.pull,
+        bow_mm=planes.bow_mm,
+        bow_std_mm=planes.bow_std_mm,
+        positions=_positions(data, planes),
+        film=film.film,
+        film_std=film.std,
+        scatter_px=film.scatter_px,
+        filters=seen,
+        residual=residual,
+        held_out=held_out,
+        correspondence=fit_stage_grid(fitted, samples).grid if grid else None,
+        frames=data.exposures,
+        warnings=tuple(_warnings(data, seen)),
+    )
+
+
+def fit_first_orders(
+    rig: Rig, planes: Sequence[Plane], data: StageData, progress: Progress
+) -> tuple[FilmFit, OrderSamples]:
+    """The film fitted to first orders on known planes, from that of ``rig`` on, and the samples."""
+    here, mounting = rig, rig.film
+    for round_ in range(1 + FINE_ROUNDS):
+        samples = _samples(here, planes, data, round_ == 0, progress)
+        fit = fit_film(here, samples, mounting)
+        here = rig.model_copy(update={"film": fit.film})
+        _require_filters(rig, here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)
+    return fit, samples
+
+
+def _samples(
+    rig: Rig, planes: Sequence[Plane], data: StageData, coarse: bool, progress: Progress
+) -> OrderSamples:
+    model, find = GratingModel(rig), find_coarsely if coarse else find_shifts
+    parts = []
+    count = len(planes) * len(data.filters)
+    for number in range(count):
+        progress.report("first orders, roughly" if coarse else "first orders", number, count)
+        position, name = divmod(number, len(data.filters))
+        frames = data.frames(position, name)
+        found = [
+            find(rig, planes[position], frames, template, model)
+            for template in (
+                filter_template(rig, data.filters[name].transmission, order, _dispersion(rig))
+                for order in ORDERS
+            )
+        ]
+        if sum(len(part) for part in found) < MIN_TILES:
+            raise CalibrationError(
+                f"Position {data.name(position, name)}: no first orders were found. Check that this filter is"
+                " in the beam, that the film is on, and expose longer."
+            )
+        parts += [(position, name, part) for part in found if len(part)]
+    return OrderSamples.of(parts)
+
+
+def _dispersion(rig: Rig) -> float:
+    """Columns a nm, near the projector's axis: what turns its blur into wavelengths."""
+    return rig.projector.fx_px * rig.film.lines_per_mm * 1e-6
+
+
+def _require_filters(
+    mounted: Rig, fitted: Rig, data: StageData, samples: OrderSamples, limit_px: float
+) -> None:
+    """Raise `CalibrationError` when one filter's light lies elsewhere than all others say."""
+    limit_nm = limit_px / _dispersion(fitted)
+    if np.abs(_shifts_nm(fitted, data, samples)).max() < limit_nm:
+        return
+    position, name, off_nm = _odd_one(mounted, fitted, data, samples)
+    raise CalibrationError(
+        f"Position {data.name(position, name)}: the first orders lie where light of another wavelength would,"
+        f" about {off_nm:+.1f} nm off. Check that the filter is the right one, not tilted, and nothing moved,"
+        " and capture this step again."
+    )
+
+
+def _odd_one(mounted: Rig, fitted: Rig, data: StageData, samples: OrderSamples) -> tuple[int, int, float]:
+    """The capture without which all others agree best: position, filter, and how far it is off, nm."""
+    found = []
+    # A wrong capture pulls the film towards itself, so that others may look worse than it.
+    for position, name in np.ndindex(len(data.positions_mm), len(data.filters)):
+        mine = (samples.position == position) & (samples.filter == name)
+        film = fit_film(fitted, samples.only(~mine), mounted.film).film
+        shifts = _shifts_nm(fitted.model_copy(update={"film": film}), data, samples)
+        off = float(shifts[position, name])
+        shifts[position, name] = 0.0
+        found.append((float(np.abs(shifts).max()), position, name, off))
+    _, position, name, off = min(found)
+    return position, name, off
+
+
+def _shifts_nm(rig: Rig, data: StageData, samples: OrderSamples) -> Floats:
+    """By how many nm the light of each position and filter seems off, (positions, filters)."""
+    # Both orders move away from the zero order with wavelength, in opposite directions.
+    off = (samples.column_px - grating_columns(rig, samples)) * samples.order / _dispersion(rig)
+    shifts = np.zeros((len(data.positions_mm), len(data.filters)))
+    for position, name in np.ndindex(shifts.shape):
+        mine = (samples.position == position) & (samples.filter == name)
+        shifts[position, name] = np.median(off[mine])
+    return shifts
+
+
+def _filters(rig: Rig, data: StageData, samples: OrderSamples) -> tuple[FilterSeen, ...]:
+    shifts = _shifts_nm(rig, data, samples) * _dispersion(rig)
+    found = []
+    for name, each in enumerate(data.filters):
+        mine = samples.filter == name
+        found.append(
+            FilterSeen(
+                filter_nm=each.filter_nm,
+                effective_nm=float(samples.wavelength_nm[mine].mean()),
+                measured=each.measured,
+                shift_px=tuple(shifts[:, name].tolist()),
+                tiles=int(mine.sum()),
+            )
+        )
+    return tuple(found)
+
+
+def _positions(data: StageData, planes: PlaneRefinement) -> tuple[StagePosition, ...]:
+    return tuple(
+        StagePosition(
+            position_mm=position,
+            tilt_deg=plane.tilt_deg,
+            distance_mm=float(1 / np.linalg.norm(plane.inverse)),
+            plane_rms_mm=float(planes.plane_rms_mm[k]),
+            column_rms_px=float(planes.residual_rms_px[k]),
+            step_error_mm=float(planes.step_error_mm[k]),
+            step_std_mm=float(planes.step_std_mm[k]),
+        )
+        for k, (position, plane) in enumerate(zip(data.positions_mm, planes.planes, strict=True))
+    )
+
+
+def _warnings(data: StageData, seen: Sequence[FilterSeen]) -> list[str]:
+    """Filters whose light lies a little off."""
+    return [
+        f"Through the filter of {each.filter_nm:g} nm first orders lie {shift:+.2f} px off at"
+        f" {position:g} mm; it may be tilted or its transmission not the one given"
+        for each in seen
+        for position, shift in zip(data.positions_mm, each.shift_px, strict=True)
+        if abs(shift) > DOUBT_PX
+    ]

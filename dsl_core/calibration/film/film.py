@@ -1,0 +1,197 @@
+"""The film's pose, period and bend from columns of first orders on known planes.
+
+All six numbers of `Film` are fitted to all samples; where samples cannot tell them apart (distance and
+bend, or period and distance over few depths) the values of the mounting decide, as a prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.calibration.film.peaks import TileShifts
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import Film, Rig
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.shading import Plane
+from dsl_core.progress import NoProgress, Progress
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: Fitted fields, how well a mounting is known beforehand (one deviation), and steps of differences.
+FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "lines_per_mm", "distance_mm")
+PRIOR_STD = np.array([3.0, 3.0, 3.0, 0.01, 25.0, 3.0])
+STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-2, 1e-2])
+ROUNDS = 15
+#: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
+HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
+#: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
+#: either direction (seven drawn rigs, whose films then lie within 1.0 of their deviations, rms).
+COMMON_PX = 0.0015
+MIN_SAMPLES = 100
+
+
+@dataclass(frozen=True)
+class OrderSamples:
+    """Columns of first orders in one table; ``position`` and ``filter`` are indices into a recipe's lists."""
+
+    position: Ints
+    filter: Ints
+    order: Ints
+    wavelength_nm: Floats
+    tile: Ints
+    pixel: Ints
+    depth_mm: Floats
+    column_px: Floats
+    std_px: Floats
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[int, int, TileShifts]]) -> OrderSamples:
+        """One table of (position, filter, shifts); raises `CalibrationError` when there are none."""
+        if not parts:
+            raise CalibrationError("No first orders were captured. Capture the lines through filters first.")
+        sizes = [len(shifts) for _, _, shifts in parts]
+
+        def numbers(values: list[int]) -> Ints:
+            return np.repeat(np.array(values, np.int64), sizes)
+
+        return cls(
+            position=numbers([position for position, _, _ in parts]),
+            filter=numbers([name for _, name, _ in parts]),
+            order=numbers([shifts.order for _, _, shifts in parts]),
+            wavelength_nm=np.repeat([shifts.wavelength_nm for _, _, shifts in parts], sizes),
+            tile=np.concatenate([shifts.tiles for _, _, shifts in parts]),
+            pixel=np.concatenate([shifts.pixels for _, _, shifts in parts]),
+            depth_mm=np.concatenate([shifts.depth_mm for _, _, shifts in parts]),
+            column_px=np.concatenate([shifts.column_px for _, _, shifts in parts]),
+            std_px=np.concatenate([shifts.std_px for _, _, shifts in parts]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.column_px)
+
+    def only(self, keep: NDArray[np.bool_]) -> OrderSamples:
+        """The samples where ``keep`` is true."""
+        return OrderSamples(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+
+@dataclass(frozen=True)
+class FilmFit:
+    """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px).
+
+    ``gain`` (fields, samples) is how far each field moves when a column does.
+    """
+
+    film: Film
+    covariance: Floats
+    scatter_px: float
+    gain: Floats
+
+    @property
+    def std(self) -> dict[str, float]:
+        """Standard deviation of every field, by name, in its unit."""
+        return dict(zip(FIELDS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+
+def grating_columns(rig: Rig, samples: OrderSamples) -> Floats:
+    """Columns (px) that the rig's grating equation gives for samples, shape (n,)."""
+    model, found = GratingModel(rig), np.empty(len(samples))
+    keys = np.stack([samples.order, samples.wavelength_nm], 1)
+    unique, which = np.unique(keys, axis=0, return_inverse=True)
+    for k, (order, nm) in enumerate(unique):
+        mine = which.ravel() == k
+        pixels, depth = torch.as_tensor(samples.pixel[mine]), torch.as_tensor(samples.depth_mm[mine])
+        found[mine] = model.exact(pixels, depth, int(order), np.array([nm])).columns[0].numpy()
+    return found
+
+
+def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUNDS) -> FilmFit:
+    """Fit the film of ``rig`` by Gauss and Newton, robustly; ``mounting`` is what its prior is about.
+
+    Raises `CalibrationError` with too few samples, or when the fit does not converge.
+    """
+    if len(samples) < MIN_SAMPLES:
+        raise CalibrationError(
+            f"First orders were found in only {len(samples)} tiles of the image; {MIN_SAMPLES} are needed to"
+            " fit the film. Check that the film is on, the filters, and the exposure."
+        )
+    centre, values = _values(mounting), _values(rig.film)
+    sigma = np.hypot(samples.std_px, FLOOR_PX)
+    scale, covariance, gain = 1.0, np.eye(len(FIELDS)), np.empty((len(FIELDS), len(samples)))
+    for _ in range(rounds):
+        here = grating_columns(_with(rig, values), samples)
+        residual = samples.column_px - here
+        ahead = [grating_columns(_with(rig, values + step), samples) for step in np.diag(STEPS)]
+        jacobian = (np.stack(ahead, 1) - here[:, None]) / STEPS * PRIOR_STD
+        scale = max(1.0, 1.4826 * float(np.median(np.abs(residual / sigma))))
+        off = np.abs(residual) / (scale * sigma)
+        weight = np.minimum(1.0, HUBER_SIGMAS / np.maximum(off, 1e-12)) / (scale * sigma) ** 2
+        information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(FIELDS))
+        gradient = jacobian.T @ (weight * residual) + (centre - values) / PRIOR_STD
+        covariance = np.linalg.inv(information)
+        gain = covariance @ (jacobian * weight[:, None]).T * PRIOR_STD[:, None]
+        step = covariance @ gradient
+        values = values + PRIOR_STD * step.clip(-1, 1)
+        if np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-2:
+            break
+    if not np.isfinite(values).all() or values[4] <= 0 or values[5] <= 0:
+        raise CalibrationError(
+            "The fit of the film did not converge. Check the filters, and the film's data."
+        )
+    film = _with(rig, values).film
+    spread = covariance * np.outer(PRIOR_STD, PRIOR_STD)
+    common = gain @ _common_offsets(rig, samples)
+    return FilmFit(film, spread + common @ common.T, scale * float(np.median(sigma)), gain)
+
+
+def _common_offsets(rig: Rig, samples: OrderSamples) -> Floats:
+    """One deviation (px) of what samples of a filter and order have in common, (samples, offsets)."""
+    rows, columns = np.divmod(samples.pixel, rig.camera.width_px)
+    across, down = 2 * columns / rig.camera.width_px - 1, 2 * rows / rig.camera.height_px - 1
+    # A ramp over -1..1 has a variance of a third.
+    shapes = np.stack([np.ones(len(samples)), np.sqrt(3) * across, np.sqrt(3) * down], 1)
+    _, group = np.unique(samples.filter * 8 + samples.order, return_inverse=True)
+    mine = group[:, None] == np.arange(group.max() + 1)
+    offsets: Floats = COMMON_PX * (mine[:, :, None] * shapes[:, None, :]).reshape(len(samples), -1)
+    return offsets
+
+
+def with_geometry(
+    fit: FilmFit,
+    rig: Rig,
+    samples: OrderSamples,
+    variants: Iterable[tuple[Rig, tuple[Plane, ...]]],
+    progress: Progress | None = None,
+) -> FilmFit:
+    """The fit with a covariance that holds what the geometry leaves open.
+
+    ``variants`` are rigs and planes of all positions, each one deviation off in an independent direction. The
+    film makes up for such errors, so that columns come out right though its own numbers are off.
+    """
+    here = grating_columns(_with(rig, _values(fit.film)), samples)
+    covariance = fit.covariance.copy()
+    progress = progress or NoProgress()
+    for other, planes in variants:
+        progress.report("what the geometry leaves open", 0, 1)
+        rays = pixel_rays(other.camera).reshape(3, -1)[:, samples.pixel]
+        inverse = np.stack([plane.inverse for plane in planes])[samples.position]
+        there = replace(samples, depth_mm=1 / (inverse.T * rays).sum(0))
+        moved = fit.gain @ (here - grating_columns(_with(other, _values(fit.film)), there))
+        covariance += np.outer(moved, moved)
+    progress.report("what the geometry leaves open", 1, 1)
+    return replace(fit, covariance=covariance)
+
+
+def _values(film: Film) -> Floats:
+    return np.array([getattr(film, name) for name in FIELDS])
+
+
+def _with(rig: Rig, values: Floats) -> Rig:
+    film = rig.film.model_copy(update=dict(zip(FIELDS, values.tolist(), strict=True)))
+    return rig.model_copy(update={"film": film})

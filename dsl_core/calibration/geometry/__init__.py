@@ -1,0 +1,1 @@
+"""Lenses and pose of camera and projector."""

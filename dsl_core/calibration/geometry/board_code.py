@@ -1,0 +1,155 @@
+"""Reading the Gray code on a board: where projector pixels land, and why nothing can be read."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.geometry.boards import Corners, pitches_px
+from dsl_core.calibration.geometry.code_model import Window
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.plan import GrayCode
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, frame_count, lit_mask
+
+Floats = NDArray[np.float64]
+
+#: Pixels within this share of the distance between corners tell of a corner (into all four squares around
+#: it), at most so far away, where lenses still are nearly quadratic.
+REACH, MIN_REACH_PX, MAX_REACH_PX = 0.8, 4.0, 24.0
+#: Decoded pixels that a corner needs, and the residual (projector px) beyond which one is decoded wrongly.
+MIN_PIXELS, INLIER_PX = 30, 1.5
+#: A bit counts when it differs from its inverse by this share of the light on its pixel.
+MIN_MARGIN = 0.05
+#: Pixels with less light than this share of the brightest ones are in shadow.
+MIN_LIGHT = 0.03
+#: Share of readable pixels that may tell of places that the projector does not have.
+MAX_OUTSIDE = 0.02
+
+
+def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:
+    """Raise `CalibrationError` when the pictures of a pose are incomplete, of mixed sizes or exchanged."""
+    wanted = frame_count(GrayCode(), projector_size_px) - 2
+    if len(frames.pairs) != wanted:
+        width, height = projector_size_px
+        raise CalibrationError(
+            f"{frames.name} has {len(frames.pairs)} pattern pictures; a projector of {width} x {height} px"
+            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or take the"
+            " pose again."
+        )
+    shapes = {np.shape(picture) for picture in (*frames.pairs, frames.white, frames.black)}
+    if len(shapes) > 1:
+        raise CalibrationError(
+            f"The pictures of {frames.name} differ in size ({', '.join(map(str, sorted(shapes)))})."
+            " Take all pictures with one setting of the camera."
+        )
+    if not all(np.isfinite(np.asarray(p)).all() for p in (*frames.pairs, frames.white, frames.black)):
+        raise CalibrationError(f"Pictures of {frames.name} hold values that are not finite. Take them again.")
+    if np.mean(frames.white) <= np.mean(frames.black):
+        raise CalibrationError(
+            f"{frames.name}: the white picture is not brighter than the black one. They are exchanged, or the"
+            " projector was off; correct the order of the pictures."
+        )
+
+
+def decode_pose(frames: PoseFrames, projector_size_px: tuple[int, int]) -> DecodedCode:
+    """Projector column and row of every camera pixel; undecided in shadow and where a bit is unclear.
+
+    A mosaic is decoded pixel by pixel, since a pixel is compared with itself only.
+    """
+    decoder = GrayDecoder(GrayCode(), projector_size_px)
+    light = _one_channel(frames.white) - _one_channel(frames.black)
+    bright = float(np.quantile(light, 0.99))
+    # Noise of a bit over the light it is made of: the limit is a share, so each pixel has its own scale.
+    scale = np.where(lit_mask(light, 0, MIN_LIGHT * bright), light, np.inf)
+    for pattern, inverse in zip(frames.pairs[::2], frames.pairs[1::2], strict=True):
+        decoder.add(_one_channel(pattern), _one_channel(inverse), scale)
+    return decoder.finish(min_sigmas=MIN_MARGIN)
+
+
+def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[int, int]) -> None:
+    """Raise `CalibrationError` when clear bits lead outside the projector: then its size is wrong."""
+    assert code.margin_sigmas is not None
+    clear = code.margin_sigmas >= MIN_MARGIN
+    outside = float((code.undecided & clear).sum() / max(clear.sum(), 1))
+    if outside > MAX_OUTSIDE:
+        width, height = projector_size_px
+        raise CalibrationError(
+            f"{name}: {outside:.0%} of the pixels that can be read tell of places outside a projector of"
+            f" {width} x {height} px. Correct its size; width and height may be exchanged."
+        )
+
+
+def readable_share(code: DecodedCode, corners: Corners) -> float:
+    """Share of the corners around which the code can be read."""
+    maps = [decoded_maps(code, window) for window in windows_around(code, corners)]
+    return sum(each is not None for each in maps) / max(len(maps), 1)
+
+
+def windows_around(code: DecodedCode, corners: Corners) -> list[Window]:
+    """The pixels that tell of each corner."""
+    radii = np.clip(REACH * pitches_px(corners.points_px), MIN_REACH_PX, MAX_REACH_PX)
+    return [
+        Window.around(point, radius, code.undecided.shape)
+        for point, radius in zip(corners.points_px, radii, strict=True)
+    ]
+
+
+def decoded_maps(code: DecodedCode, window: Window) -> Floats | None:
+    """Quadratic maps (2, 6) to column and row through most of the decoded pixels; None for too few."""
+    import cv2
+
+    assert code.row is not None
+    read = ~code.undecided[window.rows, window.columns]
+    near = window.terms[read][:, 1:3]
+    if len(near) < MIN_PIXELS or not _surrounds(near):
+        return None
+    pixels = (window.rows[read], window.columns[read])
+    seen = np.stack([code.column[pixels], code.row[pixels]], 1).astype(float)
+    homography, used = cv2.findHomography(near, seen, cv2.RANSAC, INLIER_PX)
+    if homography is None or used.sum() < max(MIN_PIXELS, 0.5 * len(near)):
+        return None
+    agree = used.ravel() > 0
+    maps, *_ = np.linalg.lstsq(window.terms[read][agree], seen[agree], rcond=None)
+    return np.asarray(maps.T)
+
+
+def _surrounds(near: Floats) -> bool:
+    """Whether points lie on all sides of the origin, so that nothing is extrapolated."""
+    return bool((near.min(0) < 0).all() and (near.max(0) > 0).all())
+
+
+def _one_channel(picture: NDArray[Any]) -> NDArray[np.float32]:
+    values = np.asarray(picture, np.float32)
+    return np.asarray(values.mean(2)) if values.ndim == 3 else values
+
+
+def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, int]) -> str:
+    """Why a code cannot be read: another order of the pictures that can, or else how they are lit."""
+    bits = bit_counts(GrayCode(), projector_size_px)
+    for words, pairs in _other_orders(list(frames.pairs), bits[0]):
+        code = decode_pose(replace(frames, pairs=pairs), projector_size_px)
+        read = readable_share(code, corners)
+        if read > 0.8:
+            return f"It can be read if {words}: the order of the patterns is wrong. Correct it."
+    return (
+        "Check that the projector lights the whole board, that its pictures are neither too dark nor"
+        " over-exposed, and the order of the patterns (columns first, most significant bit first, each"
+        " followed by its inverse)."
+    )
+
+
+def _other_orders(frames: list[NDArray[Any]], column_bits: int) -> list[tuple[str, list[NDArray[Any]]]]:
+    """Orders that are easily mistaken for the right one, in words and as pictures put right."""
+    pairs = list(zip(frames[::2], frames[1::2], strict=True))
+    half, rows = len(pairs), len(pairs) - column_bits
+    orders = {
+        "every inverse comes before its pattern": [(b, a) for a, b in pairs],
+        "rows come before columns": pairs[rows:] + pairs[:rows],
+        "the least significant bit comes first": pairs[:column_bits][::-1] + pairs[column_bits:][::-1],
+        "all patterns come before all inverses": list(zip(frames[:half], frames[half:], strict=True)),
+    }
+    return [(words, [picture for pair in order for picture in pair]) for words, order in orders.items()]

@@ -1,0 +1,143 @@
+"""Corners of printed boards, found to a fraction of a pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError
+from dsl_core.model.board import Board, Charuco, Checkerboard
+from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.rig import BayerPattern
+from dsl_core.optics.demosaic import demosaic
+
+#: A board with fewer corners in view says too little of its pose.
+MIN_CORNERS = 12
+#: Pixels above this share of the largest value are saturated.
+SATURATED_SHARE = 0.998
+#: Edges within this share of the distance between corners refine a corner (less where markers are near).
+REACH, ARUCO_REACH, MAX_REACH_PX = 0.35, 0.12, 11
+#: Red, green and blue in the grey picture, as a mosaic samples them.
+_GREY = np.array([0.25, 0.5, 0.25], np.float32)
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Corners of a board in a picture: their numbers on the board, and positions (column, row) in px."""
+
+    ids: NDArray[np.int64]
+    points_px: NDArray[np.float64]
+
+
+def grey_of(picture: NDArray[Any], bayer: BayerPattern | None = None) -> NDArray[np.float32]:
+    """A picture of one value a pixel, shape (rows, columns), from mono, colour or mosaic; unit unchanged."""
+    values = np.asarray(picture, np.float32)
+    if values.ndim == 3:
+        return np.asarray(values.mean(2))
+    if bayer is None:
+        return values
+    return np.tensordot(_GREY, np.asarray(demosaic(values, bayer), np.float32), 1)
+
+
+def find_corners(grey: NDArray[np.float32], board: Board, name: str) -> Corners:
+    """Corners of the board in a linear grey picture, shape (rows, columns).
+
+    Raises `CalibrationError` that calls the picture ``name`` when the board is not there.
+    """
+    if not np.isfinite(grey).all():
+        raise CalibrationError(f"{name} holds values that are not finite. Take the picture again.")
+    eight_bit = _eight_bit(grey)
+    found = _charuco(eight_bit, board) if isinstance(board, Charuco) else _checkerboard(eight_bit, board)
+    columns, rows = board.corner_grid
+    if found is None or len(found.ids) < min(MIN_CORNERS, columns * rows):
+        seen = "no corners" if found is None else f"{len(found.ids)} corners"
+        raise CalibrationError(
+            f"The board of {columns} x {rows} inner corners was not found in {name} ({seen})."
+            f"{_exposure_hint(eight_bit, grey)} Check that the whole board is in view, sharp and evenly lit,"
+            " and that the numbers of corners are those of the printed board; or leave this pose out."
+        )
+    return found
+
+
+def _checkerboard(grey: NDArray[np.uint8], board: Checkerboard) -> Corners | None:
+    import cv2
+
+    # Duda and Frese (BMVC 2018): finds and refines in one; does not bend at squares of few pixels.
+    thorough = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE
+    half = cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    # Noise of a dark surrounding, or squares of many pixels, hide a board from one attempt but not from all.
+    for picture, flags in ((grey, cv2.CALIB_CB_ACCURACY), (half, thorough), (grey, thorough)):
+        ok, points = cv2.findChessboardCornersSB(picture, board.corner_grid, flags=flags)
+        if ok and points is not None:
+            at = points.reshape(-1, 2) if picture is grey else points.reshape(-1, 2) * 2 + 0.5
+            return Corners(np.arange(len(at)), _refined(grey, at))
+    return None
+
+
+def _charuco(grey: NDArray[np.uint8], board: Charuco) -> Corners | None:
+    import cv2
+
+    if not hasattr(cv2.aruco, board.dictionary):
+        raise CalibrationError(
+            f"OpenCV knows no markers {board.dictionary!r}. Use a name like DICT_5X5_100 or DICT_4X4_50."
+        )
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
+    size = (board.columns, board.rows)
+    drawn = cv2.aruco.CharucoBoard(size, float(board.square_mm), float(board.marker_mm), dictionary)
+    drawn.setLegacyPattern(board.legacy)
+    # The stubs do not know that nothing may be found.
+    answer: tuple[Any, ...] = cv2.aruco.CharucoDetector(drawn).detectBoard(grey)
+    points, ids = answer[:2]
+    if points is None or ids is None:
+        return None
+    return Corners(np.asarray(ids, np.int64).ravel(), _refined(grey, points, ARUCO_REACH))
+
+
+def saturated(frames: PoseFrames) -> NDArray[np.bool_]:
+    """Pixels whose white is as bright as the camera can tell, shape (rows, columns)."""
+    if frames.saturated is not None:
+        return frames.saturated
+    white = np.asarray(frames.white)
+    if np.issubdtype(white.dtype, np.floating):
+        return np.zeros(white.shape[:2], bool)
+    full = next(2.0**bits - 1 for bits in (8, 10, 12, 14, 16, 64) if np.max(white) < 2**bits)
+    full_pixels = white >= SATURATED_SHARE * full
+    return np.asarray(full_pixels.any(2) if white.ndim == 3 else full_pixels)
+
+
+def _refined(grey: NDArray[np.uint8], points: NDArray[Any], reach: float = REACH) -> NDArray[np.float64]:
+    """Corners moved to where the edges around them meet, shape (corners, 2).
+
+    Foerstner's operator over all edges in reach averages over more pixels than the detectors do.
+    """
+    import cv2
+
+    # OpenCV 4 gives (corners, 1, 2), OpenCV 5 (corners, 2).
+    start = np.asarray(points, np.float32).reshape(-1, 1, 2).copy()
+    pitch = float(np.median(pitches_px(start.reshape(-1, 2))))
+    radius = int(np.clip(reach * pitch, 2, MAX_REACH_PX))
+    criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-5)
+    refined = cv2.cornerSubPix(grey, start, (radius, radius), (-1, -1), criteria)
+    return np.asarray(refined, np.float64).reshape(-1, 2)
+
+
+def pitches_px(points: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Distance from each corner to its nearest neighbour, px, shape (corners,)."""
+    gaps = np.linalg.norm(points[:, None].astype(np.float64) - points[None], axis=-1)
+    np.fill_diagonal(gaps, np.inf)
+    return np.asarray(gaps.min(1))
+
+
+def _eight_bit(grey: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """The detectors want bytes; all but the brightest thousandth keep their differences."""
+    top = max(float(np.quantile(grey, 0.999)), 1e-12)
+    return np.asarray(np.clip(grey * (255 / top), 0, 255).round(), np.uint8)
+
+
+def _exposure_hint(eight_bit: NDArray[np.uint8], grey: NDArray[np.float32]) -> str:
+    if float((grey >= grey.max()).mean()) > 0.2:
+        return " A fifth of the picture is equally bright: it is probably over-exposed."
+    return " The picture has hardly any contrast." if float(eight_bit.std()) < 5 else ""

@@ -1,0 +1,208 @@
+"""Where the projector sees points of a board, from the grey values of a Gray code instead of its bits.
+
+Near a transition of a bit the difference of pattern and inverse, over their sum, changes gradually, since
+the projector's pixels are blurred and a camera pixel is wide. Every boundary of projector pixels is the
+transition of one bit, so that every camera pixel tells its place far below one projector pixel. Around a
+corner a quadratic map from camera to projector is fitted to all bits of all pixels at once; blur and contrast
+are fitted too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.geometry.boards import saturated
+from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.plan import GrayCode
+from dsl_core.patterns.gray_code import bit_counts, gray_bit
+
+Floats = NDArray[np.float64]
+
+#: Only the finest bits change within such a window often enough to matter.
+FINEST_BITS = 5
+ROUNDS = 6
+#: Samples of a projector pixel in the tables of blurred bits.
+OVERSAMPLE = 16
+#: Blur (standard deviation, projector px) at the start, and its range.
+START_BLUR_PX, BLUR_RANGE_PX = 0.7, (0.15, 3.0)
+#: Differences farther from the model than this many robust deviations do not count.
+OUTLIER_SIGMAS = 4.0
+#: Pixels with less light than this share of the brightest ones are in shadow.
+LEAST_LIGHT = 0.01
+#: Pixels that a corner needs.
+MIN_PIXELS = 30
+
+
+@dataclass(frozen=True)
+class CodeLight:
+    """What a pose says of the finest bits of one axis.
+
+    ``contrast`` (bits, rows, columns) is the difference of pattern and inverse over their sum, from -1 to 1;
+    ``weight`` (rows, columns) the inverse of its variance up to a factor, 0 where a pixel must not count.
+    ``signs`` (bits, projector pixels) is the pattern itself, -1 or 1.
+    """
+
+    contrast: NDArray[np.float32]
+    weight: NDArray[np.float32]
+    signs: Floats
+
+
+def code_light(frames: PoseFrames, projector_size_px: tuple[int, int]) -> tuple[CodeLight, CodeLight]:
+    """The finest bits of columns and of rows."""
+    columns, _ = bit_counts(GrayCode(), projector_size_px)
+    black = _mono(frames.black)
+    white = _mono(frames.white)
+    light = np.maximum(white - black, 0)
+    usable = np.isfinite(white) & (light > LEAST_LIGHT * np.quantile(light, 0.99)) & ~saturated(frames)
+    variance = light if frames.variance is None else np.asarray(frames.variance, np.float32)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Noise of pattern and inverse, which together are as bright as white, over their sum.
+        weight = np.where(usable, light**2 / variance, 0).astype(np.float32)
+    weight[~np.isfinite(weight)] = 0
+    found = []
+    for first, size in ((0, projector_size_px[0]), (columns, projector_size_px[1])):
+        bits = (size - 1).bit_length()
+        pairs = range(first + max(bits - FINEST_BITS, 0), first + bits)
+        contrast = np.stack([_contrast(frames, pair, black) for pair in pairs])
+        signs = np.stack([2.0 * gray_bit(size, first + bits - 1 - pair) - 1 for pair in pairs])
+        found.append(CodeLight(contrast, weight, signs))
+    return found[0], found[1]
+
+
+def _contrast(frames: PoseFrames, pair: int, black: NDArray[np.float32]) -> NDArray[np.float32]:
+    one, other = _mono(frames.pairs[2 * pair]), _mono(frames.pairs[2 * pair + 1])
+    total = one + other - 2 * black
+    return np.asarray(np.divide(one - other, total, out=np.zeros_like(total), where=total > 0))
+
+
+def _mono(picture: NDArray[Any]) -> NDArray[np.float32]:
+    values = np.asarray(picture, np.float32)
+    return np.asarray(values.mean(2)) if values.ndim == 3 else values
+
+
+@dataclass(frozen=True)
+class Window:
+    """Pixels (rows, columns) around a corner, and the six terms of a quadratic map there, (pixels, 6).
+
+    Terms are those of the distance from the corner in units of the window's radius, the constant first, so
+    that the first coefficient of a map is its value at the corner.
+    """
+
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    terms: Floats
+    radius_px: float
+
+    @classmethod
+    def around(cls, point_px: Floats, radius_px: float, shape: tuple[int, ...]) -> Window:
+        """All pixels of a picture within a radius of a point (column, row)."""
+        reach = int(np.ceil(radius_px))
+        middle = np.rint(point_px).astype(int)
+        rows, columns = (
+            np.arange(max(at - reach, 0), min(at + reach + 1, size))
+            for at, size in ((middle[1], shape[0]), (middle[0], shape[1]))
+        )
+        y, x = (part.ravel() for part in np.meshgrid(rows, columns, indexing="ij"))
+        u, v = (x - point_px[0]) / radius_px, (y - point_px[1]) / radius_px
+        inside = u**2 + v**2 <= 1
+        u, v = u[inside], v[inside]
+        terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], 1)
+        return cls(y[inside], x[inside], terms, radius_px)
+
+
+def refine_maps(light: CodeLight, windows: Sequence[Window], maps: Floats) -> Floats:
+    """Quadratic maps (corners, 6) of camera pixels to projector columns (or rows), px.
+
+    ``maps`` come from decoded bits and must be right within a pixel. A window without light keeps its map.
+    """
+    seen = [
+        (light.contrast[:, w.rows, w.columns].astype(float), light.weight[w.rows, w.columns].astype(float))
+        for w in windows
+    ]
+    fit = _Fit(START_BLUR_PX, 1.0, np.full(len(light.signs), np.inf))
+    maps = maps.copy()
+    for _ in range(ROUNDS):
+        table = _Table(light.signs, fit.blur_px)
+        fit = fit.improved(table, windows, seen, maps)
+        table = _Table(light.signs, fit.blur_px)
+        for k, (window, (contrast, weight)) in enumerate(zip(windows, seen, strict=True)):
+            maps[k] = fit.step(table, window, contrast, weight, maps[k])
+    return maps
+
+
+class _Table:
+    """Blurred bits and their slopes at any place."""
+
+    def __init__(self, signs: Floats, blur_px: float) -> None:
+        from scipy.ndimage import gaussian_filter1d
+
+        fine = np.repeat(signs, OVERSAMPLE, 1)
+        sigma = blur_px * OVERSAMPLE
+        self.values = gaussian_filter1d(fine, sigma, axis=1, mode="nearest")
+        self.slopes = np.gradient(self.values, axis=1) * OVERSAMPLE
+        # The equation of diffusion: blur changes a profile by its curvature.
+        self.by_blur = np.gradient(self.slopes, axis=1) * OVERSAMPLE * blur_px
+
+    def at(self, place_px: Floats, *tables: Floats) -> list[Floats]:
+        """Tables at places (pixels,), each (bits, pixels), linear between samples."""
+        last = self.values.shape[1] - 1
+        position = ((place_px + 0.5) * OVERSAMPLE - 0.5).clip(0, last - 1e-6)
+        whole = position.astype(np.int64)
+        part = position - whole
+        return [table[:, whole] * (1 - part) + table[:, whole + 1] * part for table in tables]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """What all windows share: blur, contrast, and noise of each bit (times the root of the weight).
+
+    Light scattered between surfaces takes contrast from all fine bits alike.
+    """
+
+    blur_px: float
+    strength: float
+    sigma: Floats
+
+    def improved(
+        self, table: _Table, windows: Sequence[Window], seen: Sequence[tuple[Floats, Floats]], maps: Floats
+    ) -> _Fit:
+        """Blur by a step of Gauss and Newton, contrast by least squares, noises by the median residual."""
+        place = np.concatenate([w.terms @ m for w, m in zip(windows, maps, strict=True)])
+        contrast = np.concatenate([c for c, _ in seen], 1)
+        weight = np.concatenate([w for _, w in seen])
+        value, by_blur = table.at(place, table.values, table.by_blur)
+        residual = contrast - self.strength * value
+        used = weight * self._near(residual, weight)
+        strength = float((used * value * contrast).sum() / max((used * value**2).sum(), 1e-30))
+        residual = contrast - strength * value
+        change = strength * by_blur
+        step = (used * change * residual).sum() / max((used * change**2).sum(), 1e-30)
+        blur = float(np.clip(self.blur_px + np.clip(step, -0.3, 0.3), *BLUR_RANGE_PX))
+        lit = weight > 0
+        scatter = np.abs(residual[:, lit]) * np.sqrt(weight[lit])
+        sigma = 1.4826 * np.median(scatter, 1) if lit.any() else np.ones(len(contrast))
+        return _Fit(blur, strength, np.maximum(sigma, 1e-6))
+
+    def step(self, table: _Table, window: Window, contrast: Floats, weight: Floats, start: Floats) -> Floats:
+        """A map after one step of Gauss and Newton."""
+        value, slope = table.at(window.terms @ start, table.values, table.slopes)
+        slope = slope * self.strength
+        residual = contrast - self.strength * value
+        each = weight * self._near(residual, weight) / self.sigma[:, None] ** 2
+        information = (each * slope**2).sum(0)
+        square = (window.terms * information[:, None]).T @ window.terms
+        right = window.terms.T @ (each * slope * residual).sum(0)
+        if (information > 0).sum() < MIN_PIXELS:
+            return start
+        step = np.linalg.pinv(square, rcond=1e-10, hermitian=True) @ right
+        limit = min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-12))
+        return np.asarray(start + limit * step)
+
+    def _near(self, residual: Floats, weight: Floats) -> NDArray[np.bool_]:
+        """Differences that are no outliers."""
+        return np.asarray(np.abs(residual) * np.sqrt(weight) <= OUTLIER_SIGMAS * self.sigma[:, None])

@@ -1,0 +1,139 @@
+"""The columns that a flat target on a stage shows a camera, as a function of all that is uncertain.
+
+Fitted numbers: the 24 of lenses and pose, whitened by their prior; the plane's slopes ``a, b`` and its
+distance ``d`` at the first position; ``gain``, by which share more than along the camera axis the stage
+moves the plane; and a step error for each position. The plane is ``(a x + b y + z) / sqrt(1 + a^2 + b^2) =
+distance``; a step ``s`` of the stage along the axis moves it by ``s / sqrt(1 + a^2 + b^2)``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR, SHARED, STEREO, rotation_of, vector_of
+from dsl_core.calibration.geometry.solve import lens_of
+from dsl_core.model.geometry import Lens
+from dsl_core.model.rig import Rig
+from dsl_core.optics.pinhole import distort, rays_at
+from dsl_core.optics.shading import Plane
+
+Floats = NDArray[np.float64]
+
+#: Places of the plane's numbers behind those of the geometry.
+SLOPES, DISTANCE, GAIN, STEPS = slice(SHARED, SHARED + 2), SHARED + 2, SHARED + 3, SHARED + 4
+#: A stage askew to the camera axis by 0.8 degrees moves a plane by this share too little.
+GAIN_STD = 1e-4
+#: Half of the width over which a bulge is stated.
+BOW_RADIUS_MM = 150.0
+
+
+def shared_parameters(rig: Rig) -> Floats:
+    """The 24 numbers of a rig's lenses and pose, in the order of `GeometryCalibration.covariance`."""
+
+    def numbers(lens: Lens) -> list[float]:
+        return [lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, *lens.distortion]
+
+    turn = vector_of(rig.pose.matrix)
+    return np.array([*numbers(rig.camera), *numbers(rig.projector), *turn, *rig.pose.translation_mm])
+
+
+def plane_of(slopes: Floats, distance_mm: float) -> Plane:
+    """The plane of two slopes and a distance along its normal (mm)."""
+    return Plane(np.array([*slopes, 1.0]) / np.sqrt(1 + slopes @ slopes) / distance_mm)
+
+
+def rays_through(camera: Floats, pixels: Floats) -> Floats:
+    """Rays (3, n) with z = 1 of sub-pixel positions (n, 2) through a lens of nine numbers."""
+    # The size of the image plays no part in where a ray goes.
+    return rays_at(lens_of(camera, (1, 1)), pixels[:, 0], pixels[:, 1])
+
+
+def columns_at(shared: Floats, points_mm: Floats) -> Floats:
+    """Zero-order columns (n,) of points (3, n) in camera coordinates."""
+    moved = rotation_of(shared[STEREO][:3]) @ points_mm + shared[STEREO][3:, None]
+    lens = shared[PROJECTOR]
+    u, _ = distort(moved[0] / moved[2], moved[1] / moved[2], tuple(lens[4:].tolist()))
+    return np.asarray(u * lens[0] + lens[2])
+
+
+class StageProblem:
+    """Columns of all positions in one array, with the prior of the numbers they depend on."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        positions_mm: Sequence[float],
+        samples: Sequence[ColumnSamples],
+        covariance: Floats | None,
+        stage_std_mm: float,
+    ) -> None:
+        """``covariance`` (24, 24) of lenses and pose; None holds them fixed."""
+        self.mean = shared_parameters(rig)
+        self.root = np.zeros((SHARED, SHARED)) if covariance is None else covariance_root(covariance)
+        self.steps_mm = np.asarray(positions_mm, float) - positions_mm[0]
+        self.position_of = np.repeat(np.arange(len(samples)), [len(part) for part in samples])
+        self.camera_px = np.concatenate([part.camera_px for part in samples])
+        self.column_px = np.concatenate([part.column_px for part in samples])
+        self.std_px = np.concatenate([part.std_px for part in samples])
+        count = STEPS + len(positions_mm)
+        self.prior_weight = np.zeros(count)
+        self.prior_weight[:SHARED] = 1.0
+        self.prior_weight[GAIN] = 1 / GAIN_STD
+        self.prior_weight[STEPS:] = 1 / stage_std_mm
+
+    def shared(self, numbers: Floats) -> Floats:
+        """Lenses and pose of fitted numbers."""
+        return np.asarray(self.mean + self.root @ numbers[:SHARED])
+
+    def distances_mm(self, numbers: Floats) -> Floats:
+        """Distance of the plane at every position."""
+        slopes = numbers[SLOPES]
+        along = (1 + numbers[GAIN]) / np.sqrt(1 + slopes @ slopes)
+        return np.asarray(numbers[DISTANCE] + along * self.steps_mm + numbers[STEPS:])
+
+    def points_mm(self, numbers: Floats) -> Floats:
+        """Points (3, n) of the plane where the samples see it."""
+        rays = rays_through(self.shared(numbers)[CAMERA], self.camera_px)
+        slopes = numbers[SLOPES]
+        along = (slopes @ rays[:2] + rays[2]) / np.sqrt(1 + slopes @ slopes)
+        return np.asarray(rays * (self.distances_mm(numbers)[self.position_of] / along))
+
+    def residual_px(self, numbers: Floats) -> Floats:
+        """Seen minus predicted columns (n,)."""
+        return np.asarray(self.column_px - columns_at(self.shared(numbers), self.points_mm(numbers)))
+
+    def bulge(self, numbers: Floats) -> Floats:
+        """Change of predicted columns (n,) for a target whose middle stands 1 mm before its rim.
+
+        The rim is a circle of `BOW_RADIUS_MM` about the middle of all points; a bulge about another place
+        differs by slopes and distance, which are fitted.
+        """
+        points = self.points_mm(numbers)
+        middle = points[:2] - points[:2].mean(1, keepdims=True)
+        back_mm = (middle**2).sum(0) / BOW_RADIUS_MM**2
+        farther = 1 + back_mm / self.distances_mm(numbers)[self.position_of]
+        shared = self.shared(numbers)
+        return np.asarray(columns_at(shared, points * farther) - columns_at(shared, points))
+
+    def jacobian(self, numbers: Floats, free: NDArray[np.int64]) -> Floats:
+        """Change of predicted columns (n, free numbers) by central differences."""
+        steps = np.full(len(numbers), 1e-3)
+        steps[SLOPES], steps[GAIN] = 1e-5, 1e-5
+        found = np.empty((len(self.column_px), len(free)))
+        for i, k in enumerate(free):
+            ahead, behind = numbers.copy(), numbers.copy()
+            ahead[k] += steps[k]
+            behind[k] -= steps[k]
+            found[:, i] = (self.residual_px(behind) - self.residual_px(ahead)) / (2 * steps[k])
+        return found
+
+
+def covariance_root(covariance: Floats) -> Floats:
+    """A square root of a covariance whose parameters have very different sizes."""
+    scale = np.sqrt(np.diag(covariance).clip(1e-300))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(values.clip(0)))

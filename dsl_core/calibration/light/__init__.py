@@ -1,0 +1,1 @@
+"""Response, emission, white level, blur and halo."""

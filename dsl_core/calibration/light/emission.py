@@ -1,0 +1,135 @@
+"""Emission of the LEDs from a spectroradiometer that looks at a white standard.
+
+Red, green, blue and white pictures minus black give four spectra of three unknowns; where they agree on
+red + green + blue = white, all four count by their noise. Seed section 3.1: divided by the reflectance of
+the Spectralon.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.light.curve_smoothing import smooth_curve
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.spectralon import (
+    COLOURS,
+    EMISSION_SUM_NM,
+    EmissionReadings,
+    LightColour,
+    MeasuredEmission,
+)
+from dsl_core.model.spectral import SpectralCurve
+
+Floats = NDArray[np.float64]
+
+#: Share by which white may differ from red + green + blue and still be used for the LEDs.
+ADDITIVE = 0.01
+#: Wavelengths (samples) over which the noise of repeated readings is pooled.
+POOLED = 31
+#: Red, green and blue must each lead where they should: their centroids rise from blue to red.
+_LEDS: tuple[LightColour, ...] = ("red", "green", "blue")
+
+
+def measured_emission(readings: EmissionReadings, reflectance: SpectralCurve) -> MeasuredEmission:
+    """Emission with deviations; raises `CalibrationError` naming the picture whose spectrum is wrong."""
+    missing = [colour for colour in COLOURS if not readings.readings.get(colour)]
+    if missing:
+        raise CalibrationError(
+            f"The spectrum under {' and '.join(missing)} is missing. Measure all of {', '.join(COLOURS)}."
+        )
+    nm = np.array(readings.readings["white"][0].wavelengths_nm)
+    mean, variance = _means(readings, nm)
+    leds = np.stack([mean[c] - mean["black"] for c in _LEDS]) / reflectance.at(nm)
+    white = (mean["white"] - mean["black"]) / reflectance.at(nm)
+    noise = {c: variance[c] / reflectance.at(nm) ** 2 for c in COLOURS}
+    _check_leds(nm, leds)
+    step = np.gradient(nm)
+    total = float((leds.sum(0) * step).sum())
+    additivity = float((white * step).sum()) / total
+    # White minus the sum of the three contains black twice.
+    miss = noise["white"] + sum(noise[c] for c in _LEDS) + 4 * noise["black"]
+    additivity_std = float(np.sqrt((miss * step**2).sum())) / total
+    spread = np.stack([noise[c] + noise["black"] for c in _LEDS])
+    if abs(additivity - 1) < ADDITIVE:
+        leds, spread = _with_white(leds, white, spread, noise)
+    return _smoothed(nm, leds, np.sqrt(spread), (additivity, additivity_std), len(readings.readings["white"]))
+
+
+def _means(
+    readings: EmissionReadings, nm: Floats
+) -> tuple[dict[LightColour, Floats], dict[LightColour, Floats]]:
+    """Mean of the repeats on one grid, and the variance of that mean."""
+    mean, variance = {}, {}
+    for colour in COLOURS:
+        stack = np.stack([curve.at(nm) for curve in readings.readings[colour]])
+        mean[colour], variance[colour] = stack.mean(0), _variance(stack) / len(stack)
+    return mean, variance
+
+
+def _variance(stack: Floats) -> Floats:
+    """Variance of one reading (wavelengths,): scatter of repeats pooled over neighbours, else roughness."""
+    from scipy.ndimage import uniform_filter1d
+
+    if len(stack) > 1:
+        return np.asarray(uniform_filter1d(stack.var(0, ddof=1), POOLED, mode="reflect"))
+    # A single reading: second differences see its noise and little of a smooth spectrum.
+    rough = np.median(np.abs(np.diff(stack[0], 2))) / 0.6745
+    return np.full(stack.shape[1], rough**2 / 6)
+
+
+def _with_white(
+    leds: Floats, white: Floats, spread: Floats, noise: dict[LightColour, Floats]
+) -> tuple[Floats, Floats]:
+    """Least squares update of the LEDs by white = red + green + blue, per wavelength."""
+    black = noise["black"]
+    covariance = black + np.eye(3)[:, :, None] * np.stack([noise[c] for c in _LEDS])
+    with_sum = covariance.sum(1) - black  # of each LED with white minus the sum, up to sign
+    innovation = covariance.sum((0, 1)) + noise["white"] + black - 6 * black
+    gain = with_sum / np.maximum(innovation, 1e-300)
+    better = leds + gain * (white - leds.sum(0))
+    return better, np.maximum(spread - gain * with_sum, 0.1 * spread)
+
+
+def _smoothed(
+    nm: Floats, leds: Floats, std: Floats, additivity: tuple[float, float], count: int
+) -> MeasuredEmission:
+    smooth = [smooth_curve(nm, value, noise) for value, noise in zip(leds, std, strict=True)]
+    scale = EMISSION_SUM_NM / float((sum(s.values for s in smooth) * np.gradient(nm)).sum())
+    # Negative emission does not exist; what noise leaves below zero is far within its deviation.
+    red, green, blue = (
+        SpectralCurve(
+            wavelengths_nm=tuple(nm.tolist()),
+            values=tuple((scale * s.values).clip(0).tolist()),
+            std=tuple((scale * s.std).tolist()),
+        )
+        for s in smooth
+    )
+    ends = max(max(curve.values[0], curve.values[-1]) / max(curve.values) for curve in (red, green, blue))
+    first, second, third = (s.length_nm for s in smooth)
+    return MeasuredEmission(
+        curves=(red, green, blue),
+        smoothing_nm=(first, second, third),
+        additivity=additivity[0],
+        additivity_std=additivity[1],
+        readings=count,
+        end_share=float(ends),
+    )
+
+
+def _check_leds(nm: Floats, leds: Floats) -> None:
+    """Raise `CalibrationError` for a dark LED or spectra that are exchanged."""
+    power = (leds * np.gradient(nm)).sum(1)
+    for colour, value in zip(_LEDS, power, strict=True):
+        if not value > 1e-3 * power.max():
+            raise CalibrationError(
+                f"Under {colour} the Spectralon is hardly brighter than under black. Check that the projector"
+                " shows the picture, that the instrument looks at the Spectralon, and its unit."
+            )
+    centre = (leds * nm * np.gradient(nm)).sum(1) / power
+    if not centre[0] > centre[1] > centre[2]:
+        found = ", ".join(f"{c} {value:.0f} nm" for c, value in zip(_LEDS, centre, strict=True))
+        raise CalibrationError(
+            f"The mean wavelengths of the LEDs are out of order ({found}). Spectra are exchanged: name each"
+            " after the picture it was measured under."
+        )

@@ -1,0 +1,124 @@
+"""What a person judges a Spectralon and its calibration by."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.calibration.spectralon import SpectralonCalibration
+from dsl_core.model.figure import Figure
+from dsl_core.model.rig import Rig
+from dsl_core.optics.sensor import bayer_channels
+
+#: Limits: scatter of blocks in the middle (%), tilt (degrees).
+UNEVEN, TILT_DEG = 1.0, 15.0
+LOOK_UNEVEN = 25.0
+_LEDS = ("red", "green", "blue")
+
+
+def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
+    """How far the middle half of a white mosaic (DN per ms) is from even, the worst colour."""
+    rows, columns = (slice(n // 4, 3 * n // 4) for n in picture.shape)
+    colour = bayer_channels(rig.sensor.bayer, *picture.shape)[rows, columns]
+    inner = picture[rows, columns]
+    spread = 0.0
+    for c in range(3):
+        low, middle, high = np.quantile(inner[colour == c], (0.05, 0.5, 0.95))
+        spread = max(spread, float((high - low) / max(middle, 1e-9)))
+    return Figure(
+        name="unevenness of the middle",
+        value=100 * spread,
+        unit="%",
+        high=LOOK_UNEVEN,
+        advice="Let the Spectralon alone fill the middle half of the picture; keep shadows off.",
+    )
+
+
+def spectralon_figures(record: SpectralonCalibration) -> tuple[Figure, ...]:
+    """Figures of emission, pictures and white, each with its limits and what to do."""
+    return (*_emission_figures(record), *_picture_figures(record))
+
+
+def _emission_figures(record: SpectralonCalibration) -> list[Figure]:
+    emission = record.emission
+    noise = [
+        100 * float(np.array(curve.std or (0.0,)).max()) / max(curve.values) for curve in emission.curves
+    ]
+    return [
+        Figure(
+            name="white over red + green + blue",
+            value=emission.additivity,
+            std=emission.additivity_std,
+            unit="1",
+            low=0.97,
+            high=1.03,
+            advice="Switch off the projector's colour enhancement; give all spectra in one unit.",
+        ),
+        Figure(
+            name="deviation of the emission, of its peak",
+            value=max(noise),
+            unit="%",
+            high=1.0,
+            advice="Read each spectrum more often or with a longer integration.",
+        ),
+        Figure(
+            name="emission at the ends of the range, of its peak",
+            value=100 * emission.end_share,
+            unit="%",
+            high=2.0,
+            advice="The instrument's range cuts the LEDs off; what lies beyond is taken as constant.",
+        ),
+    ]
+
+
+def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
+    white = record.white
+    worst = max(abs(share - 1) for share in white.white_over_sum)
+    total = np.array(white.signal).sum(1)
+    spread = np.linalg.norm(np.array(white.signal) * np.array(white.rel_std), axis=1) / total
+    gain = np.array(record.flat_field.gain)
+    return [
+        Figure(
+            name="saturated pixels",
+            value=100 * record.saturated_share,
+            unit="%",
+            high=0.1,
+            advice="Close the aperture or move the target away; the shortest exposure is too bright.",
+        ),
+        Figure(
+            name="middle filled by the Spectralon",
+            value=100 * record.filled_share,
+            unit="%",
+            low=90.0,
+            advice="Move the Spectralon so that it fills the middle half of the picture.",
+        ),
+        Figure(
+            name="tilt of the Spectralon",
+            value=record.plane.tilt_deg,
+            unit="degrees",
+            high=TILT_DEG,
+            advice="Turn the Spectralon to face the camera.",
+        ),
+        Figure(
+            name="unevenness about the smooth part",
+            value=100 * record.unevenness,
+            unit="%",
+            high=UNEVEN,
+            advice="Clean the Spectralon and keep shadows and reflections off.",
+        ),
+        Figure(
+            name="white over red + green + blue in the pictures, largest difference",
+            value=100 * worst,
+            unit="%",
+            high=2.0,
+            advice="Switch off the projector's colour enhancement.",
+        ),
+        Figure(
+            name="deviation of white",
+            value=100 * float(spread.max()),
+            unit="%",
+            high=0.5,
+            advice="Let the Spectralon fill more of the picture and expose longer.",
+        ),
+        Figure(name="range of the flat field", value=100 * float(np.ptp(gain)), unit="%"),
+    ]

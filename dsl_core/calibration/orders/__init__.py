@@ -1,0 +1,1 @@
+"""Where the diffraction orders are and how much light each takes."""

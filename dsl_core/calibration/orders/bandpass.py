@@ -1,0 +1,256 @@
+"""From what each filter shows to efficiencies, response, white scale, blur and halo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.light.chain_equations import LineScan, colours_of
+from dsl_core.calibration.light.zero_order import ZeroOrderFit, fit_zero_order
+from dsl_core.calibration.orders.efficiency import (
+    EfficiencyFit,
+    RatioSample,
+    fit_efficiency,
+    second_order_share,
+)
+from dsl_core.calibration.orders.filter_check import PlacedFilter, effective_nm, found_wavelengths, verdict
+from dsl_core.calibration.orders.narrow_band import BandSample, fit_response
+from dsl_core.calibration.orders.order_graph import MIN_PIXELS, PlanePixels, by_cell
+from dsl_core.calibration.orders.order_light import FilterLight
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import FINE_NM, passed
+from dsl_core.optics.unlit import unlit_px
+from dsl_core.progress import Progress
+
+Floats = NDArray[np.float64]
+
+FIRST, SECOND = (1, -1), (2, -2)
+#: Pixels that blur and halo are fitted to.
+PROFILE_PIXELS = 3000
+#: Zero orders moved farther than this (px) mean that target or rig moved between captures.
+MOVED_PX = 0.15
+#: Rows left free at the frame's edges, px.
+ROW_MARGIN_PX = 8.0
+
+
+@dataclass(frozen=True)
+class SeenFilter:
+    """One filter: nominal centre, transmission, whether that was measured, and what was seen."""
+
+    filter_nm: float
+    transmission: SpectralCurve
+    measured_curve: bool
+    light: FilterLight
+
+
+def profile_scan(scan: LineScan) -> LineScan:
+    """The pixels that blur and halo are fitted to, spread over all."""
+    return scan.at(np.arange(0, len(scan.pixels), max(len(scan.pixels) // PROFILE_PIXELS, 1)))
+
+
+def plane_profile(rig: Rig, scan: LineScan, progress: Progress | None = None) -> ZeroOrderFit:
+    """Blur and halo from the scan without filter; raises `CalibrationError`."""
+    some = profile_scan(scan)
+    reach_px = unlit_px(rig, some.lines.width_px)[1]
+    return fit_zero_order(
+        some.lines, some.column_px, some.radiance, some.std, rig.projector_response, reach_px, progress
+    )
+
+
+def plane_pixels(rig: Rig, scan: LineScan, filter_nm: float) -> PlanePixels:
+    """The pixels of the scan without filter, as the captures through a filter need them."""
+    import torch
+
+    from dsl_core.optics.correspondence import GratingModel
+
+    rows, columns = np.divmod(scan.pixels, rig.camera.width_px)
+    place = np.stack([(rows + 0.5) / rig.camera.height_px, (columns + 0.5) / rig.camera.width_px])
+    # The film's data sheet is good enough for which rows light comes from.
+    model = GratingModel(rig)
+    whole: dict[int, NDArray[np.bool_]] = {}
+    ends = np.array([filter_nm - 15.0, filter_nm + 15.0])
+    for order in (*FIRST, *SECOND):
+        at = model.trace(
+            torch.as_tensor(scan.pixels), torch.as_tensor(scan.depth_mm), order, ends
+        ).rows.numpy()
+        last = rig.projector.height_px - 1 - ROW_MARGIN_PX
+        whole[order] = np.asarray(((at > ROW_MARGIN_PX) & (at < last)).all(0))
+    return PlanePixels(scan.column_px, scan.shading, colours_of(rig, scan), place, whole)
+
+
+def fit_bandpass(
+    rig: Rig, scan: LineScan, profile: ZeroOrderFit, filters: Sequence[SeenFilter], reflectance: float = 0.99
+) -> BandpassCalibration:
+    """All that filters say of a rig whose response and emission are known about.
+
+    ``scan`` is the target without filter. Raises `CalibrationError` that names a filter which is not the one
+    asked for, and where too few filters show an order.
+    """
+    if not filters:
+        raise CalibrationError("No filter was captured. Capture at least two of different wavelengths.")
+    lights = [passed(rig, each.transmission) for each in filters]
+    placed = [_placed(each, light) for each, light in zip(filters, lights, strict=True)]
+    found = found_wavelengths(rig, placed)
+    warnings = _check(filters, placed, found)
+    fits = {order: fit_efficiency(order, _ratios(order, filters, lights)) for order in FIRST}
+    share, share_std = second_order_share(_second(filters, lights, fits))
+    white, white_std = _white(rig, profile_scan(scan), profile)
+    bands = [
+        BandSample(each.light.zero, each.light.zero_std, light * reflectance, each.measured_curve)
+        for each, light in zip(filters, lights, strict=True)
+    ]
+    response = fit_response(rig, bands, white, white_std, reflectance)
+    efficiency = {order: fit.curve for order, fit in fits.items()}
+    if np.isfinite(share_std):
+        for order in FIRST:
+            efficiency[2 * order] = _scaled(fits[order].curve, share, share_std)
+    return BandpassCalibration(
+        filters=tuple(
+            _sample(each, place, where) for each, place, where in zip(filters, placed, found, strict=True)
+        ),
+        efficiency=efficiency,
+        second_order_share=share,
+        second_order_share_std=share_std if np.isfinite(share_std) else 1.0,
+        misfit={order: fit.misfit for order, fit in fits.items()},
+        response=response.response,
+        white_scale=response.white_scale,
+        white_scale_rel_std=response.white_scale_rel_std,
+        blur_px=profile.response.blur_px,
+        blur_std_px=profile.std[0],
+        halo_peak_per_px=profile.response.halo_peak_per_px,
+        halo_peak_std_per_px=profile.std[1],
+        halo_decay_px=profile.response.halo_decay_px,
+        halo_decay_std_px=profile.std[2],
+        warnings=tuple(warnings),
+    )
+
+
+def _placed(each: SeenFilter, light: Floats) -> PlacedFilter:
+    offsets = {
+        order: (each.light.orders[order].offset_px, each.light.orders[order].offset_std_px)
+        for order in FIRST
+        if np.isfinite(each.light.orders[order].offset_px)
+    }
+    return PlacedFilter(each.filter_nm, effective_nm(light), each.measured_curve, offsets)
+
+
+def _check(
+    filters: Sequence[SeenFilter],
+    placed: Sequence[PlacedFilter],
+    found: Sequence[tuple[float, float] | None],
+) -> list[str]:
+    """Sentences on doubtful filters; raises `CalibrationError` with all that cannot be used."""
+    wrong: list[str] = []
+    doubts: list[str] = []
+    for each, place, where in zip(filters, placed, found, strict=True):
+        first = [
+            each.light.orders[order] for order in FIRST if np.isfinite(each.light.orders[order].offset_px)
+        ]
+        width = max((light.width_px for light in first), default=0.0)
+        share = min((light.share for light in first), default=1.0)
+        unusable, sentence = verdict(place, where, width, share)
+        shift = each.light.shift_px[0]
+        if abs(shift) > MOVED_PX:
+            unusable, sentence = True, _moved(each.filter_nm, shift)
+        if sentence:
+            (wrong if unusable else doubts).append(sentence)
+    if wrong:
+        raise CalibrationError("; ".join(wrong)[:1].upper() + "; ".join(wrong)[1:] + ".")
+    return doubts
+
+
+def _moved(filter_nm: float, shift_px: float) -> str:
+    return (
+        f"the filter of {filter_nm:g} nm: the zero order stands {shift_px:+.2f} columns from where it stood"
+        " without filter. Target, camera or projector moved; capture all steps again"
+    )
+
+
+def _ratios(order: int, filters: Sequence[SeenFilter], lights: Sequence[Floats]) -> list[RatioSample]:
+    return [
+        RatioSample(float(seen.ratio[c]), float(seen.std[c]), light[c])
+        for each, light in zip(filters, lights, strict=True)
+        for seen in [each.light.orders[order]]
+        for c in range(3)
+        if np.isfinite(seen.std[c])
+    ]
+
+
+def _second(
+    filters: Sequence[SeenFilter], lights: Sequence[Floats], fits: dict[int, EfficiencyFit]
+) -> list[tuple[float, float, float]]:
+    """Second-order ratios with deviation, and what the first order has at the same light."""
+    return [
+        (
+            float(seen.ratio[c]),
+            float(seen.std[c]),
+            float(light[c] @ fits[order].curve.at(FINE_NM) / light[c].sum()),
+        )
+        for each, light in zip(filters, lights, strict=True)
+        for order in FIRST
+        for seen in [each.light.orders[2 * order]]
+        for c in range(3)
+        if np.isfinite(seen.std[c]) and light[c].sum() > 0
+    ]
+
+
+def _scaled(curve: SpectralCurve, share: float, share_std: float) -> SpectralCurve:
+    values = np.array(curve.values)
+    std = np.hypot(share * np.array(curve.std), share_std * values)
+    return SpectralCurve.of(curve.wavelengths_nm, share * values).model_copy(
+        update={"std": tuple(std.tolist())}
+    )
+
+
+def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Floats]:
+    """Zero order of white at unit shading in each colour (DN per ms), and its deviation by cells.
+
+    The amplitudes are those of the fit that knows blur and halo.
+    """
+    pixels = plane_pixels(rig, scan, 550.0)
+    relative = profile.amplitude / scan.shading
+    value, std = np.zeros(3), np.zeros(3)
+    for colour in range(3):
+        masks = by_cell(pixels, (pixels.colour == colour) & profile.good)
+        masks = [mask for mask in masks if mask.sum() >= MIN_PIXELS]
+        cells = np.array([float(np.median(relative[mask])) for mask in masks])
+        if len(cells) < 2:
+            raise CalibrationError(
+                "The scan without filter shows too little of the target. Let a flat white target fill the"
+                " picture and capture the step again."
+            )
+        value[colour], std[colour] = cells.mean(), cells.std() / np.sqrt(len(cells) - 1)
+    return value, std
+
+
+def _sample(each: SeenFilter, place: PlacedFilter, found: tuple[float, float] | None) -> FilterSample:
+    orders = []
+    for order, light in sorted(each.light.orders.items()):
+        use = np.isfinite(light.std)
+        if use.any() and np.isfinite(light.offset_px):
+            weight = light.std[use] ** -2
+            orders.append(
+                OrderSample(
+                    order=order,
+                    ratio=float((weight * light.ratio[use]).sum() / weight.sum()),
+                    ratio_std=float(weight.sum() ** -0.5),
+                    offset_px=light.offset_px,
+                    offset_std_px=light.offset_std_px,
+                )
+            )
+    red, green, blue = (float(value) for value in np.nan_to_num(each.light.zero))
+    return FilterSample(
+        filter_nm=each.filter_nm,
+        effective_nm=place.effective_nm,
+        found_nm=None if found is None else found[0],
+        found_std_nm=None if found is None else found[1],
+        curve_measured=each.measured_curve,
+        zero_dn_per_ms=(red, green, blue),
+        orders=tuple(orders),
+    )

@@ -1,0 +1,144 @@
+"""How much light each diffraction order takes from scan lines seen through a bandpass filter.
+
+The lines tile the projector's frame, so that what a pixel sees of an order, summed over the lines, is that
+order's light whatever the spectrum, the blur or the place. Where an order lies is found without knowing the
+film: in each cell of the image, signals are lined up by their distance from the zero order's column and added
+up, and the first orders stand out as peaks on either side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.orders.order_graph import (
+    MIN_PIXELS,
+    ZERO_HALF_PX,
+    Graph,
+    PlanePixels,
+    by_cell,
+    line_graph,
+)
+from dsl_core.calibration.orders.order_place import (
+    ORDER_HALF_PX,
+    SECOND_HALF_PX,
+    OrderPlace,
+    find_order,
+    find_second,
+)
+from dsl_core.model.plan import ScanLines
+from dsl_core.model.rig import ProjectorResponse
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OrderLight:
+    """Light of one order relative to the zero order.
+
+    ``ratio`` and ``std`` are those of the three colours (NaN, infinite: not seen). ``offset_px`` is the
+    distance of the peak from the zero order in the middle of the image, with its deviation (NaN: not found);
+    ``share`` how much of all light where first orders may be lies in the peak; ``width_px`` its rms width.
+    """
+
+    order: int
+    ratio: Floats
+    std: Floats
+    offset_px: float
+    offset_std_px: float
+    share: float
+    width_px: float
+    pixels: int
+
+
+@dataclass(frozen=True)
+class FilterLight:
+    """What one filter passes: ``zero`` (3,) zero-order signal at unit shading, DN per ms, and its deviation.
+
+    ``shift_px`` is how far the zero order moved against the capture without filter, and its deviation;
+    ``saturated`` the share of pixels whose zero order is saturated.
+    """
+
+    zero: Floats
+    zero_std: Floats
+    orders: dict[int, OrderLight]
+    shift_px: tuple[float, float]
+    saturated: float
+
+
+def filter_light(
+    lines: ScanLines,
+    pixels: PlanePixels,
+    radiance: NDArray[np.floating],
+    std: NDArray[np.floating],
+    response: ProjectorResponse,
+    reach_px: tuple[float, float],
+    unlit_px: tuple[float, float],
+    frame_px: int,
+) -> FilterLight:
+    """Measure one filter from ``radiance`` and ``std`` (frames, P), DN per ms; infinite where saturated.
+
+    ``reach_px`` are the smallest and largest distance from the zero order at which a first order may lie,
+    whatever the filter, and ``unlit_px`` those between which none does; ``frame_px`` is the projector's
+    width.
+    """
+    centres = (lines.width_px - 1) / 2 + lines.step_px * np.arange(len(radiance))
+    saturated = ~np.isfinite(std).all(0)
+    inside = (pixels.column_px > ZERO_HALF_PX) & (pixels.column_px < frame_px - 1 - ZERO_HALF_PX)
+    use = inside & ~saturated
+    chosen = pixels.at(use)
+    signal, error = radiance[:, use].astype(float), std[:, use].astype(float)
+    graph, shift = line_graph(
+        lines, chosen, signal, error, centres[:, None] - chosen.column_px, response, unlit_px, frame_px
+    )
+    zero, zero_std = _zero_signals(graph)
+    orders: dict[int, OrderLight] = {}
+    for sign in (1, -1):
+        first = find_order(graph, sign, reach_px)
+        orders[sign] = _light(graph, sign, first, ORDER_HALF_PX)
+        orders[2 * sign] = _light(graph, 2 * sign, find_second(graph, sign, first), SECOND_HALF_PX)
+    share = float(saturated[inside].mean()) if inside.any() else 1.0
+    return FilterLight(zero, zero_std, orders, shift, share)
+
+
+def _zero_signals(graph: Graph) -> tuple[Floats, Floats]:
+    """Mean zero order of each colour at unit shading, and its deviation by the cells' scatter."""
+    value, spread = np.full(3, np.nan), np.full(3, np.inf)
+    relative = graph.amplitude / graph.pixels.shading
+    for colour in range(3):
+        cells = [
+            float(relative[which].mean())
+            for which in by_cell(graph.pixels, graph.pixels.colour == colour)
+            if which.sum() >= MIN_PIXELS
+        ]
+        if len(cells) > 1:
+            value[colour] = np.mean(cells)
+            spread[colour] = np.std(cells) / np.sqrt(len(cells) - 1)
+    return value, spread
+
+
+def _light(graph: Graph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:
+    """Sum an order's light around its place, over pixels whose window lies in the frame."""
+    ratio, spread = np.full(3, np.nan), np.full(3, np.inf)
+    if place is None:
+        return OrderLight(order, ratio, spread, np.nan, np.inf, 0.0, np.nan, 0)
+    centre = place.at(graph.pixels.place)
+    use = graph.holds(centre, half_px)
+    use &= graph.pixels.whole.get(order, np.ones(len(use), bool))
+    window = np.abs(graph.distance - centre) < half_px
+    light, variance = (graph.signal * window).sum(0), (graph.variance * window).sum(0)
+    for colour in range(3):
+        mine = use & (graph.pixels.colour == colour)
+        total = float(graph.amplitude[mine].sum())
+        if mine.sum() < MIN_PIXELS or not total > 0:
+            continue
+        ratio[colour] = float(light[mine].sum()) / total
+        noise = float(np.sqrt(variance[mine].sum())) / total
+        cells = [which for which in by_cell(graph.pixels, mine) if which.sum() >= MIN_PIXELS]
+        apart = [float(light[which].sum() / graph.amplitude[which].sum()) for which in cells]
+        scatter = float(np.std(apart) / np.sqrt(len(apart) - 1)) if len(apart) > 2 else 0.0
+        spread[colour] = max(noise, scatter)
+    middle = float(place.at(np.array([[0.5], [0.5]]))[0])
+    return OrderLight(order, ratio, spread, middle, place.std_px, place.share, place.width_px, int(use.sum()))

@@ -1,0 +1,158 @@
+"""Where a diffraction order lies in the signals of scan lines, found without knowing the film.
+
+In each cell of the image the signals, lined up by their distance from the zero order, are added up; the order
+is the brightest peak. Its distance changes smoothly over the image, as a quadratic of the pixel's place that
+is fitted to the cells and refined with signals lined up by the fit itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.orders.order_graph import MIN_PIXELS, Graph, by_cell
+
+Floats = NDArray[np.float64]
+
+#: Half windows (px) around first and second orders.
+ORDER_HALF_PX, SECOND_HALF_PX = 20.0, 27.0
+#: Distance of second from first orders, as multiples of the first's.
+SECOND_PLACE = (1.9, 2.35)
+#: Bins of the lined-up signals, px, and smoothing (bins) before the peak is searched.
+BIN_PX, SMOOTH_BINS = 2.0, 9
+#: How many deviations a peak must stand above nothing, and its least share of the light of the zero order.
+MIN_SIGMAS, MIN_SHARE = 8.0, 2e-4
+#: Cells whose peak lies farther from the others' than this are not used, px; terms of the quadratic.
+OUTLIER_PX, TERMS = 12.0, 6
+REFINEMENTS = 3
+#: A cell's peak is never better known than this, px; what the quadratic's terms change by in a refinement.
+CELL_PX, TERM_PX = 0.3, 13.0
+#: How far inside the frame a cell's light must come from to be refined with, px: at the edge a part of the
+#: order is missing, which pulls its centre inwards, and where the order lies is known roughly only.
+INSIDE_PX = 30.0
+
+
+@dataclass(frozen=True)
+class OrderPlace:
+    """Signed distance of an order from the zero order as a quadratic over the image.
+
+    ``std_px`` is its deviation in the middle of the image; ``share`` the part of the light in the peak;
+    ``width_px`` the rms width of the peak.
+    """
+
+    coefficients: Floats
+    std_px: float
+    share: float
+    width_px: float
+
+    def at(self, place: Floats) -> Floats:
+        """Distance (px) at places (2, P) of the image, rows and columns 0..1."""
+        return np.asarray(_terms(place) @ self.coefficients)
+
+
+def find_order(graph: Graph, sign: int, reach_px: tuple[float, float]) -> OrderPlace | None:
+    """The first order on one side of the zero order, or None where no peak stands out."""
+    rough = _fit(graph, sign, np.zeros(len(graph.amplitude)), reach_px)
+    for _ in range(REFINEMENTS):
+        if rough is None:
+            return None
+        rough = _fit(graph, sign, rough.at(graph.pixels.place), (-ORDER_HALF_PX, ORDER_HALF_PX), rough)
+    return rough
+
+
+def find_second(graph: Graph, sign: int, first: OrderPlace | None) -> OrderPlace | None:
+    """The second order, a multiple of the first's distance; where none stands out, where it would stand."""
+    if first is None:
+        return None
+    lined = first.at(graph.pixels.place)
+    everywhere = np.ones(len(lined), bool)
+    middle = float(np.median(np.abs(lined)))
+    scale = middle / np.maximum(np.abs(lined), 1e-6)
+    reach = (SECOND_PLACE[0] * middle, SECOND_PLACE[1] * middle)
+    place, share, width = _peak(graph, everywhere, sign * graph.distance * scale, reach, SECOND_HALF_PX)
+    times = place / middle if np.isfinite(place) else float(np.mean(SECOND_PLACE))
+    return OrderPlace(first.coefficients * times, first.std_px * times, share, width)
+
+
+def _terms(place: Floats) -> Floats:
+    y, x = place[0] - 0.5, place[1] - 0.5
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
+
+
+def _fit(
+    graph: Graph,
+    sign: int,
+    centre: Floats,
+    reach_px: tuple[float, float],
+    before: OrderPlace | None = None,
+) -> OrderPlace | None:
+    """Peaks of all cells around a centre (P,), and the quadratic through them."""
+    distance = sign * (graph.distance - centre)
+    use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX)
+    peaks, places, widths, shares = [], [], [], []
+    for which in by_cell(graph.pixels, use):
+        peak, share, width = _peak(graph, which, distance, reach_px, ORDER_HALF_PX)
+        if np.isfinite(peak):
+            peaks.append(sign * peak + (float(centre[which].mean()) if before is None else 0.0))
+            places.append(graph.pixels.place[:, which].mean(1))
+            shares.append(share)
+            widths.append(width)
+    if not peaks:
+        return None
+    value, place = np.array(peaks), np.array(places).T
+    near = np.abs(value - np.median(value)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
+    terms = _terms(place[:, near])
+    # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is.
+    damping = np.diag([1e-9] + [(CELL_PX / TERM_PX) ** 2 if near.sum() > TERMS else 1e3] * (TERMS - 1))
+    change = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[near])
+    left = value[near] - terms @ change
+    coefficients = change if before is None else before.coefficients + change
+    share = float(np.median(shares)) if before is None else before.share
+    # Where few cells see the order, the middle of the image is far from them.
+    middle = _terms(np.array([[0.5], [0.5]]))[0]
+    lever = float(middle @ np.linalg.solve(terms.T @ terms + damping, middle))
+    std_px = float(np.hypot(np.sqrt((left**2).mean()), CELL_PX) * np.sqrt(lever))
+    return OrderPlace(coefficients, std_px, share, float(np.median(widths)))
+
+
+def _peak(
+    graph: Graph, which: NDArray[np.bool_], distance: Floats, reach_px: tuple[float, float], half_px: float
+) -> tuple[float, float, float]:
+    """Centre (px, NaN: none) of the brightest peak of lined-up signals, its share of the light, its width."""
+    nothing = np.nan, 0.0, np.nan
+    if which.sum() < MIN_PIXELS:
+        return nothing
+    low, high = reach_px[0] - half_px, reach_px[1] + half_px
+    own = distance[:, which]
+    inside = (own > low) & (own < high)
+    index = ((own[inside] - low) / BIN_PX).astype(int)
+    bins = int((high - low) / BIN_PX) + 1
+    weights = np.broadcast_to(graph.amplitude[which], own.shape)[inside]
+    light, noise, reference = (
+        np.bincount(index, values, bins)
+        for values in (graph.signal[:, which][inside], graph.variance[:, which][inside], weights)
+    )
+    box = np.ones(SMOOTH_BINS)
+    sums, spread, below = (np.convolve(values, box, "same") for values in (light, noise, reference))
+    enough = below > 0.2 * below.max(initial=0)
+    ratio = np.where(enough, sums / np.where(enough, below, 1), -np.inf)
+    best = int(ratio.argmax())
+    if not sums[best] > MIN_SIGMAS * np.sqrt(spread[best]) or ratio[best] < MIN_SHARE:
+        return nothing
+    density = np.where(enough & (reference > 0), light / np.where(reference > 0, reference, 1), 0.0)
+    at = low + (np.arange(bins) + 0.5) * BIN_PX
+    centre = float(at[best])
+    for _ in range(5):
+        window = np.abs(at - centre) < half_px
+        total = float(density[window].sum())
+        if not total > 0:
+            return nothing
+        centre = float((density * at)[window].sum()) / total
+    window = np.abs(at - centre) < half_px
+    total = float(density[window].sum())
+    if not (total > 0 and reach_px[0] <= centre <= reach_px[1]):
+        return nothing
+    width = float(np.sqrt(max((density * (at - centre) ** 2)[window].sum() / total, 0.0)))
+    return centre, total / float(density.sum()), width

@@ -1,0 +1,1 @@
+"""What a camera and a projector really do, measured."""

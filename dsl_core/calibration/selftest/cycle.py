@@ -1,0 +1,166 @@
+"""The colour cycle of a projector from short exposures at irregular times.
+
+Red, green and blue LEDs flash one after the other, so a short exposure shows a colour that depends on when it
+was taken. Harmonic least squares over trial frequencies (the periodogram of Lomb 1976 and Scargle 1982, with
+several harmonics and a constant, and all channels together) finds the frequency; irregular times leave no
+alias. A cycle at f is also one at f/2, f/3, ..., and its harmonics lie at 2f, 3f, ...: of all frequencies
+that explain the light about equally well, the highest is the cycle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.selftest.readings import Readings
+from dsl_core.model.calibration.selftest import Measured
+
+Floats = NDArray[np.float64]
+
+#: Where colour cycles are looked for.
+LOWEST_HZ, HIGHEST_HZ = 20.0, 300.0
+#: Light that varies less than this share of its mean counts as steady.
+STEADY = 0.01
+_HARMONICS, _FINE_HARMONICS = 3, 12
+#: Share of the variance that a cycle must explain; noise alone explains a quarter of 100 frames.
+_EXPLAINED = 0.5
+#: A lower residual than the smallest by this factor, or by this share of the variance, is no better.
+_AS_GOOD, _AS_GOOD_SHARE = 1.5, 0.01
+#: Gaps between time stamps must follow the waits asked for this closely to be believed.
+_TRUSTED = 0.95
+_CHUNK, _GROUPS = 1024, 8
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """``period_ms`` is None when none was found; ``modulation`` is relative to the mean."""
+
+    period_ms: Measured | None
+    modulation: Measured
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether there is nothing to be found."""
+        return self.period_ms is None and self.modulation.value < STEADY
+
+
+def advised_exposures(period_ms: float, wanted_ms: tuple[float, ...]) -> tuple[float, ...]:
+    """For each wanted exposure the nearest one that holds whole cycles, at least one.
+
+    >>> [round(ms, 2) for ms in advised_exposures(1000 / 60, (160.0, 320.0, 3.0))]
+    [166.67, 316.67, 16.67]
+    """
+    return tuple(max(1, round(wanted / period_ms)) * period_ms for wanted in wanted_ms)
+
+
+def has_trusted_times(readings: Readings) -> bool:
+    """Whether the time stamps rise and follow the waits between the frames."""
+    steps = np.diff(readings.timestamp_s) * 1000
+    if len(steps) < 3 or (steps <= 0).any():
+        return False
+    return bool(np.corrcoef(steps, readings.gap_ms[1:])[0, 1] > _TRUSTED)
+
+
+def find_cycle(readings: Readings, black_dn: float) -> Cycle:
+    """The cycle in short exposures of a white field at irregular, trusted times; see `Cycle`."""
+    mean = readings.mean_dn.mean(0) - black_dn
+    signal = (readings.mean_dn - black_dn) / mean - 1
+    time_s = readings.timestamp_s - readings.timestamp_s.mean()
+    spread = float(signal.std(0).max()) * np.sqrt(2)
+    whole = float((signal**2).sum())
+    hz, step = _coarse(time_s, signal, whole)
+    residual = _residual(time_s, signal, np.array([hz]), _HARMONICS)[0]
+    if spread < STEADY or residual > (1 - _EXPLAINED) * whole:
+        # Without a cycle all that varies is noise, and what could hide in it is bounded by three times that.
+        modulation = Measured(value=spread if spread >= STEADY else min(3 * spread, STEADY), std=spread)
+        return Cycle(None, modulation)
+    hz, std_hz, amplitude = _fine(time_s, signal, hz, step)
+    period = Measured(value=1000 / hz, std=1000 / hz**2 * std_hz)
+    return Cycle(period, amplitude)
+
+
+def _coarse(time_s: Floats, signal: Floats, whole: float) -> tuple[float, float]:
+    """The highest of the frequencies that explain the light about equally well, and the search's step."""
+    step = 1 / (4 * _HARMONICS * max(np.ptp(time_s), 0.1))
+    trial = np.arange(LOWEST_HZ, HIGHEST_HZ + step, step)
+    residual = np.concatenate(
+        [_residual(time_s, signal, trial[i : i + _CHUNK], _HARMONICS) for i in range(0, len(trial), _CHUNK)]
+    )
+    bound = _AS_GOOD * residual.min() + _AS_GOOD_SHARE * whole
+    low = residual <= bound
+    low[1:-1] &= (residual[1:-1] <= residual[:-2]) & (residual[1:-1] <= residual[2:])
+    return float(trial[np.flatnonzero(low)[-1]]), step
+
+
+def _fine(time_s: Floats, signal: Floats, hz: float, step: float) -> tuple[float, float, Measured]:
+    """Frequency with standard deviation, and the amplitude of the channel that varies most.
+
+    Steep edges leave residuals that repeat with the phase and are no noise, so the spread comes from fits
+    that leave out every ``_GROUPS``-th frame in turn (the jackknife); a handful of them may agree by chance,
+    so it is at least what the residuals say as noise.
+    """
+    harmonics = _worthwhile(time_s, signal, _nearest(time_s, signal, hz, step, _HARMONICS)[0])
+    best, amplitude = _nearest(time_s, signal, hz, step, harmonics)
+    parts = []
+    for i in range(_GROUPS):
+        kept = np.arange(len(time_s)) % _GROUPS != i
+        parts.append(_nearest(time_s[kept], signal[kept], best, step / 2, harmonics))
+    varied = np.array([*parts]).std(0) * np.sqrt(_GROUPS - 1)
+    width = step / 10
+    low, least, high = _residual(time_s, signal, best + width * np.arange(-1.0, 2.0), harmonics)
+    spare = signal.size - _parameters(harmonics)
+    noise = np.sqrt(2 * least / spare * width**2 / max(low + high - 2 * least, 1e-300))
+    return best, float(max(varied[0], noise)), Measured(value=amplitude, std=float(varied[1]))
+
+
+def _worthwhile(time_s: Floats, signal: Floats, hz: float) -> int:
+    """The number of harmonics that the light justifies (Bayesian information criterion)."""
+    most = max(1, min(_FINE_HARMONICS, len(time_s) // 7))
+    scores = [
+        signal.size * np.log(max(float(_residual(time_s, signal, np.array([hz]), count)[0]), 1e-12))
+        + _parameters(count) * np.log(signal.size)
+        for count in range(1, most + 1)
+    ]
+    return int(np.argmin(scores)) + 1
+
+
+def _parameters(harmonics: int) -> int:
+    """Of a wave in three channels, and its frequency."""
+    return 3 * (2 * harmonics + 1) + 1
+
+
+def _nearest(time_s: Floats, signal: Floats, hz: float, step: float, harmonics: int) -> tuple[float, float]:
+    """Frequency of least residual within ``step`` of a start, and half the height of its wave."""
+    from scipy.optimize import minimize_scalar
+
+    def cost(trial: float) -> float:
+        return float(_residual(time_s, signal, np.array([trial]), harmonics)[0])
+
+    grid = hz + np.linspace(-step, step, 4 * harmonics + 1)
+    near = grid[np.argmin(_residual(time_s, signal, grid, harmonics))]
+    width = 2 * step / (4 * harmonics)
+    bounds = (near - width, near + width)
+    best = float(minimize_scalar(cost, bounds=bounds, method="bounded", options={"xatol": 1e-7}).x)
+    design = _design(time_s, np.array([best]), harmonics)[0]
+    wave = design @ np.linalg.lstsq(design, signal, rcond=None)[0]
+    return best, float(np.ptp(wave, axis=0).max()) / 2
+
+
+def _residual(time_s: Floats, signal: Floats, trial_hz: Floats, harmonics: int) -> Floats:
+    """Sum of squares that harmonics of each trial frequency leave, all channels together."""
+    design = _design(time_s, trial_hz, harmonics)
+    right = design.swapaxes(1, 2) @ signal
+    normal = design.swapaxes(1, 2) @ design
+    # A little ridge keeps frequencies solvable whose harmonics coincide at the times of the frames.
+    normal += 1e-9 * len(time_s) * np.eye(normal.shape[-1])
+    found = np.linalg.solve(normal, right)
+    return np.asarray((signal**2).sum() - (found * right).sum((1, 2)))
+
+
+def _design(time_s: Floats, trial_hz: Floats, harmonics: int) -> Floats:
+    """Constant, cosines and sines at the times of the frames, (frequencies, frames, 1 + 2 * harmonics)."""
+    order = np.arange(1, harmonics + 1)
+    phase = 2 * np.pi * trial_hz[:, None, None] * time_s[:, None] * order
+    return np.concatenate([np.ones((*phase.shape[:2], 1)), np.cos(phase), np.sin(phase)], axis=-1)

@@ -1,0 +1,199 @@
+"""The self-test's figures against their limits, each with what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from dsl_core.calibration.selftest.record import PUBLISHED_MS
+from dsl_core.model.calibration.selftest import (
+    CameraCheck,
+    CycleCheck,
+    FocusCheck,
+    LatencyCheck,
+    Measured,
+    ProjectorCheck,
+    SelfTest,
+)
+from dsl_core.model.figure import Figure
+
+#: Limits: percent of full scale; times the read noise; share of full scale; share of pixels.
+LINEARITY_PERCENT, BLACK_NOISES, SATURATION, HOT = 0.5, 5.0, 0.9, 1e-3
+#: Largest difference of gamma between colours, rms residual of a ramp, both percent; largest black.
+GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 1.0, 0.01
+#: The new picture must be there when ``show`` returns, to this; beat at the advised exposures, percent.
+WAIT_MS, BEAT_PERCENT = 1.0, 0.3
+#: A line of a scan is 5 px wide, and its edges are modelled by a blur of about 0.6 px.
+BLUR_PX, AMBIENT = 1.5, 0.01
+
+
+def selftest_figures(found: SelfTest) -> tuple[Figure, ...]:
+    """All figures in the order of the test."""
+    return (
+        *_camera(found.camera),
+        *_projector(found.projector),
+        *_latency(found.latency),
+        *_cycle(found.cycle),
+        *_focus(found.focus),
+        _figure(
+            "light with the projector black, of white",
+            found.ambient.share_of_white,
+            "1",
+            high=AMBIENT,
+            advice="Switch lamps off and keep daylight out; what remains is the projector's own black.",
+        ),
+    )
+
+
+def _figure(
+    name: str,
+    measured: Measured,
+    unit: str,
+    low: float | None = None,
+    high: float | None = None,
+    advice: str = "",
+) -> Figure:
+    return Figure(
+        name=name, value=measured.value, std=measured.std, unit=unit, low=low, high=high, advice=advice
+    )
+
+
+def _camera(camera: CameraCheck) -> Iterator[Figure]:
+    worst = max(camera.linearity_percent, key=lambda each: each.value)
+    yield _figure(
+        "linearity, largest residual of full scale",
+        worst,
+        "%",
+        high=LINEARITY_PERCENT,
+        advice="Switch off the camera's gamma, white balance and automatic exposure and gain, and lamps that"
+        " flicker.",
+    )
+    yield _figure(
+        "black level",
+        camera.black_level_dn,
+        "DN",
+        low=BLACK_NOISES * camera.read_noise_dn.value,
+        advice="Noise is cut off at zero: raise the camera's black level.",
+    )
+    yield _figure("electrons per DN", camera.electrons_per_dn, "e-/DN")
+    yield _figure("read noise", camera.read_noise_dn, "DN")
+    yield _figure(
+        "saturation",
+        camera.saturation_dn,
+        "DN",
+        low=SATURATION * (2**camera.bit_depth - 1),
+        advice="The sensor ends before the scale does, or nothing was bright enough to clip: lower the gain's"
+        " offset, open the aperture, or set the camera's full bit depth.",
+    )
+    yield _figure(
+        "hot pixels",
+        camera.hot_share,
+        "1",
+        high=HOT,
+        advice="Let the camera cool, or have it correct its defective pixels.",
+    )
+
+
+def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
+    yield _figure(
+        "gamma",
+        projector.gamma,
+        "1",
+        low=1.0,
+        high=3.5,
+        advice="Set the projector's picture mode to one without dynamic contrast or film mode.",
+    )
+    values = [ramp.gamma.value for ramp in projector.ramps]
+    std = max(ramp.gamma.std for ramp in projector.ramps)
+    mean = projector.gamma.value
+    yield _figure(
+        "gamma, difference between colours",
+        Measured(value=100 * (max(values) - min(values)) / mean, std=100 * 2**0.5 * std / mean),
+        "%",
+        high=GAMMA_SPREAD_PERCENT,
+        advice="One gamma is kept for all colours: choose a picture mode without colour management, or scan"
+        " with one drive level only.",
+    )
+    worst = max((ramp.residual_percent for ramp in projector.ramps), key=lambda each: each.value)
+    yield _figure(
+        "ramps, rms distance from the power law",
+        worst,
+        "%",
+        high=RAMP_PERCENT,
+        advice="Switch off the projector's picture enhancements, and in the computer's display settings"
+        " colour profiles and night light.",
+    )
+    yield Figure(
+        name="ramps, steps that fall",
+        value=sum(ramp.falls for ramp in projector.ramps),
+        unit="",
+        high=0,
+        advice="More drive gave less light: switch off the projector's dynamic contrast and eco mode.",
+    )
+    yield _figure(
+        "projector black, of white",
+        projector.black_fraction,
+        "1",
+        high=BLACK,
+        advice="Switch lamps off; else lower the projector's brightness offset.",
+    )
+
+
+def _latency(latency: LatencyCheck) -> Iterator[Figure]:
+    both = Measured(
+        value=latency.blocking_ms.value + latency.wait_ms.value,
+        std=(latency.blocking_ms.std**2 + latency.wait_ms.std**2) ** 0.5,
+    )
+    yield _figure("latency from show to light", both, "ms")
+    yield _figure(
+        "latency not waited for",
+        latency.wait_ms,
+        "ms",
+        high=WAIT_MS,
+        advice=f"Pictures are late: raise the latency of the projector's driver from {latency.claimed_ms:g}"
+        f" to at least {latency.claimed_ms + latency.wait_ms.value + latency.wait_ms.std:.0f} ms.",
+    )
+    yield Figure(
+        name="stale frames",
+        value=latency.stale_frames,
+        unit="",
+        high=0,
+        advice="The camera delivers pictures exposed before they were asked for: have its driver trigger each"
+        " exposure, or empty its buffer first.",
+    )
+
+
+def _cycle(cycle: CycleCheck) -> Iterator[Figure]:
+    if cycle.period_ms is not None:
+        yield _figure("colour cycle", cycle.period_ms, "ms")
+    bound = cycle.period_ms is None
+    yield _figure("modulation of the light" + (", at most" if bound else ""), cycle.modulation, "1")
+    yield Figure(name="shortest safe exposure", value=cycle.shortest_ms, unit="ms")
+    for wanted, advised in zip(cycle.wanted_ms, cycle.advised_ms, strict=True):
+        yield Figure(name=f"advised exposure for {wanted:.1f} ms", value=advised, unit="ms")
+    safe = " or ".join(f"{each:.2f}" for each in cycle.advised_ms)
+    for beat in cycle.beats:
+        advised_one = any(abs(beat.exposure_ms - each) < 0.01 * each for each in cycle.advised_ms)
+        worst = max((*beat.channels_percent, beat.ratio_percent), key=lambda each: each.value)
+        published = beat.exposure_ms in PUBLISHED_MS and not advised_one
+        yield _figure(
+            f"beat at {beat.exposure_ms:.2f} ms",
+            worst,
+            "%",
+            high=None if published else BEAT_PERCENT + 3 * beat.floor_percent,
+            advice=f"Use {safe} ms, which hold whole cycles."
+            if published
+            else "The light is not steady over whole cycles: switch off lamps, let the projector warm up, and"
+            " repeat.",
+        )
+
+
+def _focus(focus: FocusCheck) -> Iterator[Figure]:
+    yield _figure("blur of edges in the camera", focus.camera_px, "px")
+    yield _figure(
+        "blur of edges, worst third",
+        focus.worst_px,
+        "projector px",
+        high=BLUR_PX,
+        advice="Focus the projector on the target first, then the camera; close the camera's aperture if only"
+        " one side is soft.",
+    )

@@ -1,0 +1,107 @@
+"""From all readings of a self-test to its record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.selftest.beat import check_beats
+from dsl_core.calibration.selftest.camera import check_camera, count_hot_pixels, fit_dark, fit_transfer
+from dsl_core.calibration.selftest.cycle import Cycle, advised_exposures, find_cycle, has_trusted_times
+from dsl_core.calibration.selftest.focus import BarFrames, check_focus
+from dsl_core.calibration.selftest.latency import check_latency
+from dsl_core.calibration.selftest.projector import check_projector
+from dsl_core.calibration.selftest.readings import Readings, RegionSizes, joined
+from dsl_core.calibration.selftest.spread import find_cycle_by_spread
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
+
+#: Exposures of the published prototype, whose beat is measured for comparison.
+PUBLISHED_MS = (160.0, 320.0)
+#: Exposures wanted for scans; what is advised are the nearest that hold whole cycles.
+WANTED_MS = (500.0 / 3.0, 1000.0 / 3.0)
+
+
+@dataclass(frozen=True)
+class SelfTestCapture:
+    """All that is kept of the frames.
+
+    ``parts`` are readings by name: ``dark``, ``cycle``, ``latency``, ``ramps``, ``series``, ``saturated``,
+    ``beat``, and ``spread`` where time stamps could not be used. ``dark_frames`` are two long ones.
+    """
+
+    parts: Mapping[str, Readings]
+    sizes: RegionSizes
+    bars: BarFrames
+    dark_frames: tuple[NDArray[np.uint16], NDArray[np.uint16]]
+    wanted_ms: tuple[float, ...]
+    shortest_ms: float
+    claimed_latency_ms: float
+    show_s: float
+    frames: int
+    duration_s: float
+
+
+def analyse(capture: SelfTestCapture) -> SelfTest:
+    """Everything that the readings say; raises `CalibrationError` naming the part that failed."""
+    parts, sizes = capture.parts, capture.sizes
+    dark = fit_dark(parts["dark"], sizes)
+    black_dn = dark.level_dn.value
+    transfer = fit_transfer(joined(parts["dark"], parts["series"]), black_dn, sizes)
+    first, second = capture.dark_frames
+    glow = np.array([np.median(first) - black_dn])
+    noise_dn = float(transfer.mean_std(glow, np.ones(1, np.int64))[0])
+    projector, ambient = check_projector(parts["ramps"], dark, transfer, sizes)
+    cycle, method = cycle_of(parts["cycle"], parts.get("spread"), black_dn)
+    period = cycle.period_ms
+    whole = None if period is None else period.value
+    return SelfTest(
+        camera=check_camera(
+            dark,
+            transfer,
+            parts["series"],
+            parts["saturated"],
+            (count_hot_pixels(first, second, noise_dn), first.size),
+            sizes,
+        ),
+        projector=projector,
+        latency=check_latency(
+            parts["latency"], capture.claimed_latency_ms, has_trusted_times(parts["cycle"]), capture.show_s
+        ),
+        cycle=CycleCheck(
+            period_ms=period,
+            modulation=cycle.modulation,
+            method="timestamps" if method == "timestamps" else "spread",
+            shortest_ms=capture.shortest_ms if whole is None else whole,
+            wanted_ms=capture.wanted_ms,
+            advised_ms=capture.wanted_ms if whole is None else advised_exposures(whole, capture.wanted_ms),
+            beats=check_beats(parts["beat"], black_dn, transfer, sizes),
+        ),
+        focus=check_focus(capture.bars, black_dn),
+        ambient=ambient,
+        frames=capture.frames,
+        duration_s=capture.duration_s,
+    )
+
+
+def cycle_of(cycle: Readings, spread: Readings | None, black_dn: float) -> tuple[Cycle, str]:
+    """The cycle and how it was found; raises `CalibrationError` for light that varies without a cycle."""
+    found = find_cycle(cycle, black_dn)
+    if spread is None or not needs_spread(cycle, found):
+        return found, "timestamps"
+    found = find_cycle_by_spread(spread, black_dn)
+    if found.period_ms is None and not found.is_steady:
+        raise CalibrationError(
+            f"The light varies by {found.modulation.value:.0%} without a cycle between 20 and 300 Hz, so no"
+            " exposure is safe. Switch off lamps and daylight, warm the projector up, and switch off its"
+            " dynamic contrast."
+        )
+    return found, "spread"
+
+
+def needs_spread(cycle: Readings, found: Cycle) -> bool:
+    """Whether the cycle has to be looked for without time stamps."""
+    return not found.is_steady and (found.period_ms is None or not has_trusted_times(cycle))

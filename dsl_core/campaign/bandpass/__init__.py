@@ -1,0 +1,1 @@
+"""The bandpass calibration, step by step."""

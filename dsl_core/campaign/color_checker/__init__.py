@@ -1,0 +1,1 @@
+"""The Color Checker calibration, step by step."""

@@ -1,0 +1,1 @@
+"""What the calibrations share: recipe, captures, exposures and targets."""

@@ -1,0 +1,127 @@
+"""What a person judges the depth-stage calibration by."""
+
+from __future__ import annotations
+
+from dsl_core.model.calibration.chain import ChainCorrection
+from dsl_core.model.calibration.depth_stage import DepthStageCalibration
+from dsl_core.model.figure import Figure
+
+#: Flatness of a plane and error of a stage's step, mm; error of columns that a fit never saw, px.
+MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
+#: How far planes may move the geometry, in its deviations, without a doubt.
+MAX_PULL = 1.8
+#: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
+MAX_BOW_MM, BOW_SIGMAS = 0.2, 3.0
+#: Filters and LEDs may disagree by so much (nm, at a wavelength) or so many deviations: the larger counts.
+#: The film's line density makes up for filters that are all off by one share; only the LEDs' spectra tell.
+MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
+
+
+def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    """Flatness, steps, what depth leaves open, held-out error, the film, and doubts."""
+    flat = max(record.positions, key=lambda each: each.plane_rms_mm)
+    step = max(record.positions, key=lambda each: abs(each.step_error_mm))
+    film = [
+        Figure(
+            name=name,
+            value=getattr(record.film, field),
+            unit=unit,
+            std=record.film_std[field],
+        )
+        for name, field, unit in (
+            ("film's lines", "lines_per_mm", "1/mm"),
+            ("film's distance", "distance_mm", "mm"),
+            ("film's tilt about x", "tilt_x_deg", "degrees"),
+            ("film's tilt about y", "tilt_y_deg", "degrees"),
+            ("film's roll", "roll_deg", "degrees"),
+            ("film's bend", "bend_per_mm", "1/mm"),
+        )
+    ]
+    return (
+        Figure(
+            name="scatter about the plane",
+            value=flat.plane_rms_mm,
+            unit="mm",
+            high=MAX_PLANE_MM,
+            advice=f"Use a flatter target, or check the lenses; worst at {flat.position_mm:g} mm.",
+        ),
+        Figure(
+            name="error of the stage's steps",
+            value=abs(step.step_error_mm),
+            unit="mm",
+            std=step.step_std_mm,
+            high=MAX_STEP_MM,
+            advice=f"Check the stage at {step.position_mm:g} mm; repeat the geometry with more poses.",
+        ),
+        Figure(
+            name="pull of the planes on the geometry",
+            value=record.geometry_pull,
+            unit="deviations",
+            high=MAX_PULL,
+            advice="Use a flatter target, check the stage's scale and the board's printed size, or calibrate"
+            " the geometry again: one of them is not what it seems.",
+        ),
+        *_bow(record),
+        Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),
+        Figure(
+            name="held-out error of first orders",
+            value=record.held_out_px,
+            unit="px",
+            high=MAX_HELD_OUT_PX,
+            advice="Use more filters or positions, lines closer together, or longer exposures.",
+        ),
+        *film,
+        *_chain(record.chain),
+        Figure(
+            name="captures in doubt",
+            value=float(len(record.warnings)),
+            unit="",
+            high=0.0,
+            advice=". ".join(record.warnings),
+        ),
+    )
+
+
+def _chain(chain: ChainCorrection | None) -> tuple[Figure, ...]:
+    if chain is None:
+        return ()
+    correction = Figure(
+        name="largest correction of the chain",
+        value=100 * chain.largest_correction,
+        unit="%",
+        high=15.0,
+        advice="Calibrate Spectralon, Color Checker and bandpass filters again.",
+    )
+    if chain.wavelength_scale is None:
+        return (correction,)
+    std_nm = MIDDLE_NM * chain.wavelength_scale_std
+    limit = max(MAX_FILTERS_NM, FILTER_SIGMAS * std_nm)
+    filters = Figure(
+        name=f"filters against the LEDs' spectra, at {MIDDLE_NM:g} nm",
+        value=MIDDLE_NM * chain.wavelength_scale,
+        unit="nm",
+        std=std_nm,
+        low=-limit,
+        high=limit,
+        advice="All filters together pass other light than stated: to the blue when they are tilted. Put them"
+        " flat before the lens, and check their transmissions and the spectroradiometer's wavelengths.",
+    )
+    return correction, filters
+
+
+def _bow(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    if record.bow_mm is None:
+        return ()
+    limit = max(MAX_BOW_MM, BOW_SIGMAS * record.bow_std_mm)
+    return (
+        Figure(
+            name="bulge of the target over 300 mm",
+            value=record.bow_mm,
+            unit="mm",
+            std=record.bow_std_mm,
+            low=-limit,
+            high=limit,
+            advice="Use a flatter target. If it is flat, the lenses are not what the board said: repeat the"
+            " geometry with poses that fill the picture.",
+        ),
+    )

@@ -1,0 +1,242 @@
+"""A flat target at a few positions of a stage: geometry refined, film, residual and chain of the spectra."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibrate_depth_stage
+from dsl_core.calibration.film.line_samples import LineFrames
+from dsl_core.campaign.common.exposures import LONGEST_MS, WhiteLevel, bracket, bright_setting, measure_white
+from dsl_core.campaign.common.filter_in_beam import note_of_filter
+from dsl_core.campaign.common.light_look import film_light
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.common.step_scan import is_complete, naming, scan_of, scan_step
+from dsl_core.campaign.depth_stage.figures import depth_stage_figures
+from dsl_core.campaign.depth_stage.stage_scans import lines_on_plane, zero_order_columns
+from dsl_core.errors import CalibrationError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.scan.reader import SessionReader
+from dsl_core.model.base import Record
+from dsl_core.model.calibration.chain import ChainCorrection
+from dsl_core.model.calibration.depth_stage import DepthStageCalibration, apply_depth_stage
+from dsl_core.model.figure import Figure
+from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.progress import Progress
+
+NOTE_NAME = "stage.json"
+#: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
+LONGER = 3.0
+#: The longer exposure of the scan without filter, which shows the first orders, over the shorter one.
+LONG_RATIO = 6.0
+
+
+class StageNote(Record):
+    """Where the stage said it was, and the filter of a step with its transmission."""
+
+    position_mm: float
+    filter_nm: float | None = None
+    transmission: SpectralCurve | None = None
+    measured: bool = False
+
+
+@dataclass(frozen=True)
+class DepthStageRecipe:
+    """The calibration with a plane on a stage.
+
+    ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the deviation with which it keeps
+    them; ``filters_nm`` are nominal centres of bandpass filters. ``code_step_px`` is the step of the lines
+    without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may lie far
+    apart. ``reflectance`` is that of the target; ``chain`` lets the plane correct the product of response,
+    emission and efficiency; ``grid`` adds a model of the columns that is drawn from the data, which needs
+    three positions.
+    """
+
+    positions_mm: tuple[float, ...] = (600.0, 750.0, 900.0)
+    filters_nm: tuple[float, ...] = (450.0, 540.0, 640.0)
+    code_step_px: int = 4
+    filter_step_px: int = 16
+    stage_std_mm: float = 0.02
+    reflectance: float = 0.99
+    chain: bool = True
+    grid: bool = False
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        return "depth-stage"
+
+    @property
+    def title(self) -> str:
+        """Title of the wizard."""
+        return "Depth stage"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Geometry to refine, and the chain that weighs the wavelengths of a filter."""
+        return ("geometry", "spectralon", "bandpass")
+
+    @property
+    def record_type(self) -> type[Record]:
+        """The record that `fit` makes."""
+        return DepthStageCalibration
+
+    def steps(self, bench: Bench) -> tuple[Step, ...]:
+        """At each position the plane without filter, then through each filter."""
+        positions, filters = sorted(set(self.positions_mm)), sorted(set(self.filters_nm))
+        if len(positions) < 2 or not filters:
+            raise CalibrationError(
+                "Depth stage: at least two different positions and one filter are needed, given"
+                f" {len(positions)} and {len(filters)}. Add some to positions_mm or filters_nm."
+            )
+        return tuple(
+            step for position in positions for step in (_plain_step(position), *_filtered(position, filters))
+        )
+
+    def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
+        """Brightness and other light."""
+        self._move(bench, step)
+        return film_light(measure_white(bench.devices, bench.rig), bench.rig)
+
+    def is_captured(self, bench: Bench, step: Step) -> bool:
+        """Whether the scan of a step is complete."""
+        return is_complete(bench.step_folder(step))
+
+    def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Move the stage, choose exposures by a test shot, and scan; goes on with a scan that was begun."""
+        note = self._move(bench, step)
+        scan_step(bench.devices, bench.step_folder(step), lambda: self._begin(bench, step, note), progress)
+
+    def fit(self, bench: Bench, progress: Progress) -> DepthStageCalibration:
+        """Calibrate from the captures of all steps."""
+        steps = self.steps(bench)
+        plain = [step for step in steps if step.placement.filter_nm is None]
+        filtered = [step for step in steps if step.placement.filter_nm is not None]
+        notes, count = [_note_of(bench, step) for step in plain], len(filtered) // len(plain)
+        data = StageData(
+            positions_mm=tuple(note.position_mm for note in notes),
+            stage_std_mm=self.stage_std_mm,
+            columns=tuple(self._columns(bench, step, progress) for step in plain),
+            filters=tuple(_filter_of(_note_of(bench, step)) for step in filtered[:count]),
+            frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
+            exposures=sum(_scan(bench, step).plan.shot_count for step in steps),
+        )
+        found = calibrate_depth_stage(bench.rig, data, progress, self.grid)
+        if not self.chain:
+            return found
+        return found.model_copy(update={"chain": self._chain(bench, plain, found, progress)})
+
+    def figures(self, record: Record) -> tuple[Figure, ...]:
+        """Flatness, steps, held-out error and doubts."""
+        assert isinstance(record, DepthStageCalibration)
+        return depth_stage_figures(record)
+
+    def apply(self, record: Record, rig: Rig) -> Rig:
+        """The rig with refined geometry, film, residual and chain."""
+        assert isinstance(record, DepthStageCalibration)
+        return apply_depth_stage(record, rig)
+
+    def _move(self, bench: Bench, step: Step) -> StageNote:
+        """Move the stage to a step's position; what is to be noted of the step."""
+        position, nm = float(step.placement.options["depth_mm"]), step.placement.filter_nm
+        if bench.devices.stage is not None:
+            position = bench.devices.stage.move_to(position)
+        if nm is None:
+            return StageNote(position_mm=position)
+        known = note_of_filter(bench.devices, nm)
+        return StageNote(
+            position_mm=position,
+            filter_nm=nm,
+            transmission=known.transmission,
+            measured=known.measured,
+        )
+
+    def _begin(self, bench: Bench, step: Step, note: StageNote) -> CapturePlan:
+        """The plan of a step by a test shot; keeps where the stage is and which filter this is."""
+        plan = self._plan(bench.rig, step, measure_white(bench.devices, bench.rig))
+        folder = bench.step_folder(step)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / NOTE_NAME, note.model_dump_json(indent=1).encode())
+        return plan
+
+    def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
+        if step.placement.filter_nm is None:
+            return CapturePlan(
+                name=step.title,
+                code=GrayCode(rows=False),
+                spectral=ScanLines(step_px=self.code_step_px),
+                settings=bracket(rig, white, step.title, LONG_RATIO),
+                code_settings=(0,),
+            )
+        bright = bright_setting(rig, white, step.title)
+        cycles = int(min(LONGER * bright.exposure_ms, LONGEST_MS) / rig.frame_period_ms)
+        return CapturePlan(
+            name=step.title,
+            code=NoCode(),
+            spectral=ScanLines(step_px=self.filter_step_px, sparse=True),
+            settings=(Setting(exposure_ms=max(cycles, 1) * rig.frame_period_ms, level=bright.level),),
+            code_settings=(0,),
+        )
+
+    def _columns(self, bench: Bench, step: Step, progress: Progress) -> ColumnSamples:
+        with naming(step):
+            return zero_order_columns(_scan(bench, step), bench.rig, progress)
+
+    def _lines(self, bench: Bench, step: Step) -> LineFrames:
+        with naming(step):
+            return lines_on_plane(_scan(bench, step), bench.rig)
+
+    def _chain(
+        self, bench: Bench, plain: list[Step], found: DepthStageCalibration, progress: Progress
+    ) -> ChainCorrection:
+        """What the lines without filter say of the chain, once it is known where the light goes."""
+        from dsl_core.calibration.light.chain import chain_correction
+        from dsl_core.campaign.common.diffuser_lines import diffuser_lines
+
+        rig = apply_depth_stage(found, bench.rig)
+        scans = []
+        for step in plain:
+            with naming(step):
+                scans.append(diffuser_lines(_scan(bench, step), rig, progress))
+        progress.report("chain", 0, 1)
+        return chain_correction(rig, scans, reflectance=self.reflectance)
+
+
+def _plain_step(position_mm: float) -> Step:
+    return Step(
+        f"position-{position_mm:g}",
+        f"Plane at {position_mm:g} mm",
+        f"Mount the film before the projector and put the flat white target on the stage at {position_mm:g}"
+        " mm, facing the camera and filling its view. No filter before the camera.",
+        Placement(target="spectralon", film=True, options={"depth_mm": position_mm}),
+    )
+
+
+def _filtered(position_mm: float, filters_nm: list[float]) -> list[Step]:
+    return [
+        Step(
+            f"position-{position_mm:g}-filter-{nm:g}",
+            f"Plane at {position_mm:g} mm, filter of {nm:g} nm",
+            f"Put the bandpass filter of {nm:g} nm flat before the camera's lens. Move nothing else.",
+            Placement(target="spectralon", film=True, filter_nm=nm, options={"depth_mm": position_mm}),
+        )
+        for nm in filters_nm
+    ]
+
+
+def _scan(bench: Bench, step: Step) -> SessionReader:
+    return scan_of(bench.step_folder(step))
+
+
+def _note_of(bench: Bench, step: Step) -> StageNote:
+    return read_record(bench.step_folder(step) / NOTE_NAME, StageNote)
+
+
+def _filter_of(note: StageNote) -> StageFilter:
+    assert note.filter_nm is not None
+    assert note.transmission is not None
+    return StageFilter(note.filter_nm, note.transmission, note.measured)

@@ -1,0 +1,1 @@
+"""The calibration of lenses and pose, step by step."""

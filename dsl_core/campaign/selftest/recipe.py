@@ -1,0 +1,146 @@
+"""The self-test: are camera, projector, timing, focus and room good enough to calibrate and scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dsl_core.calibration.selftest.figures import AMBIENT, selftest_figures
+from dsl_core.calibration.selftest.record import WANTED_MS, analyse
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.selftest.capture import SEED, SelfTestRun
+from dsl_core.campaign.selftest.eye import Eye
+from dsl_core.campaign.selftest.store import ARCHIVE_NAME, load_capture, save_capture
+from dsl_core.campaign.selftest.survey import survey
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError, DeviceError
+from dsl_core.model.base import Record
+from dsl_core.model.calibration.selftest import SelfTest
+from dsl_core.model.figure import Figure
+from dsl_core.model.placement import Placement
+from dsl_core.model.rig import Rig
+from dsl_core.progress import NoProgress, Progress
+
+#: Share of the camera's pixels that the picture should light well.
+_LIT_SHARE = 0.2
+_STEP = Step(
+    "light",
+    "Self-test",
+    "Take the film off, and put a white, matt, flat target (Spectralon, paper) before the camera so that it"
+    " fills the view. Darken the room as for a scan.",
+    Placement(target="spectralon", film=False),
+)
+
+
+@dataclass(frozen=True)
+class SelfTestRecipe:
+    """The self-test as a calibration; ``wanted_ms`` are the exposures that scans would like."""
+
+    wanted_ms: tuple[float, ...] = WANTED_MS
+
+    @property
+    def name(self) -> str:
+        """Name on the command line and of the folder."""
+        return "selftest"
+
+    @property
+    def title(self) -> str:
+        """Title of the wizard."""
+        return "Self-test"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Nothing has to be calibrated before."""
+        return ()
+
+    @property
+    def record_type(self) -> type[Record]:
+        """What `fit` makes."""
+        return SelfTest
+
+    def steps(self, bench: Bench) -> tuple[Step, ...]:
+        """One step, film off, on a white target."""
+        return (_STEP,)
+
+    def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
+        """Share of the picture that is well lit, and ambient light; raises what the survey raises."""
+        # The next attempt number keeps the noise of a simulated camera apart from that of the captures.
+        eye = Eye(bench.devices, attempt=1)
+        try:
+            seen = survey(eye, np.random.default_rng(SEED))
+        except (CalibrationError, DeviceError) as error:
+            raise type(error)(f"Step {step.title}: {error}") from error
+        return (
+            Figure(
+                name="well lit share of the picture",
+                value=seen.lit_share,
+                unit="1",
+                low=_LIT_SHARE,
+                advice="Let a white target fill the view of the camera, and light all of it.",
+            ),
+            Figure(
+                name="ambient light, of white",
+                value=seen.ambient_share,
+                std=seen.ambient_std,
+                unit="1",
+                high=AMBIENT + 3 * seen.ambient_std,
+                advice="Switch lamps off and keep daylight out.",
+            ),
+        )
+
+    def is_captured(self, bench: Bench, step: Step) -> bool:
+        """Whether the archive of readings is there; it is written whole."""
+        return (bench.step_folder(step) / ARCHIVE_NAME).exists()
+
+    def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Take all frames and keep their readings; an interrupted self-test begins anew."""
+        save_capture(SelfTestRun(bench.devices, progress, self.wanted_ms).capture(), bench.step_folder(step))
+
+    def fit(self, bench: Bench, progress: Progress) -> SelfTest:
+        """Analyse the readings on disk; raises `CalibrationError` that names what is wrong."""
+        progress.report("self-test", 0, 1)
+        try:
+            found = analyse(load_capture(bench.step_folder(_STEP)))
+        except (CalibrationError, DeviceError) as error:
+            raise CalibrationError(f"Step {_STEP.title}: {error}") from error
+        progress.report("self-test", 1, 1)
+        return found
+
+    def figures(self, record: Record) -> tuple[Figure, ...]:
+        """Everything measured, against its limits."""
+        assert isinstance(record, SelfTest)
+        return selftest_figures(record)
+
+    def apply(self, record: Record, rig: Rig) -> Rig:
+        """Sensor, gamma and black of the projector, and the period of its colour cycle."""
+        assert isinstance(record, SelfTest)
+        camera, projector = record.camera, record.projector
+        sensor = {
+            "bit_depth": camera.bit_depth,
+            "black_level_dn": camera.black_level_dn.value,
+            "electrons_per_dn": camera.electrons_per_dn.value,
+            "read_noise_dn": camera.read_noise_dn.value,
+        }
+        response = {"gamma": projector.gamma.value, "black_fraction": projector.black_fraction.value}
+        changes: dict[str, object] = {
+            "sensor": rig.sensor.model_copy(update=sensor),
+            "projector_response": rig.projector_response.model_copy(update=response),
+        }
+        if record.cycle.period_ms is not None:
+            changes["frame_period_ms"] = record.cycle.period_ms.value
+        return rig.model_copy(update=changes)
+
+
+def run_selftest(
+    devices: DeviceRig, progress: Progress | None = None, recipe: SelfTestRecipe | None = None
+) -> tuple[SelfTest, tuple[Figure, ...]]:
+    """The self-test alone, with what stands before the camera or what the rig can place; nothing is kept.
+
+    Returns what was found and its figures; raises `CalibrationError` and `DeviceError`.
+    """
+    recipe, progress = recipe or SelfTestRecipe(), progress or NoProgress()
+    if devices.place is not None:
+        devices.place(_STEP.placement)
+    found = analyse(SelfTestRun(devices, progress, recipe.wanted_ms).capture())
+    return found, recipe.figures(found)

@@ -1,0 +1,206 @@
+"""The first look of a self-test: is there light, how much, where; and can camera and projector be driven."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.calibration.selftest.readings import RegionSizes
+from dsl_core.campaign.selftest.eye import BLACK, Eye, Region, grey
+from dsl_core.errors import CalibrationError, DeviceError
+from dsl_core.optics.sensor import bayer_channels
+
+#: White is exposed until it reaches this share of the scale, or this long.
+_AIM, _LONGEST_MS = 0.4, 200.0
+#: So many times that exposure, at most so long, shows where signals end.
+_BRIGHTER, _LONG_MS = 40.0, 2000.0
+#: Frames that catch every LED of a colour cycle at least once, and their random waits.
+_GLANCES, _MAP_FRAMES, _MAX_GAP_MS = 6, 16, 40.0
+#: A difference between white and black that is no light.
+_NO_LIGHT_DN = 10.0
+#: The region: pixels brighter than this share of the brightest ones of their channel.
+_LIT = 0.6
+#: Pixels beside the picture get less than this share, and keep this distance from brighter ones, px.
+_BESIDE, _DISTANCE_PX = 0.01, 6
+_FEWEST_PIXELS, _FEWEST_BESIDE = 200, 60
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What the first look found: a short exposure of white, the black level (DN), region and sizes.
+
+    ``ambient_share`` is the light of a black picture as a share of white, for a target as bright as most,
+    and ``ambient_std`` its standard deviation; ``lit_share`` is the region's share of all pixels.
+    """
+
+    white_ms: float
+    black_dn: float
+    region: Region
+    sizes: RegionSizes
+    lit_share: float
+    ambient_share: float
+    ambient_std: float
+
+
+def survey(eye: Eye, rng: np.random.Generator) -> Survey:
+    """Find exposure and region under white.
+
+    Raises `CalibrationError` when there is no light, too much of it, or too little of the picture in view,
+    and `DeviceError` when the projector does not follow or the camera ignores its exposure.
+    """
+    from scipy.ndimage import uniform_filter
+
+    info = eye.devices.camera.info
+    shortest = info.exposure_range_ms[0]
+    eye.show(BLACK)
+    black_dn = float(np.median(eye.snap(shortest).pixels))
+    if black_dn > 0.9 * eye.full_scale_dn:
+        raise CalibrationError(
+            f"The picture is saturated at the shortest exposure ({shortest:g} ms) although the projector"
+            " shows black. Darken the room, and check the camera's black level and gain."
+        )
+    eye.show(grey(1.0))
+    white_ms = _expose(eye, black_dn, rng)
+    _require_obedience(eye, white_ms, black_dn, rng)
+    eye.ceiling_dn = _ceiling(eye, white_ms)
+    _require_fresh_frames(eye, white_ms)
+    eye.show(grey(1.0))
+    white = _mean(eye, white_ms, rng)
+    eye.show(BLACK)
+    dark = _mean(eye, white_ms, rng)
+    # Means over neighbours, so that the noise of bright ambient light is no light of the projector.
+    if float(np.percentile(uniform_filter(white - dark, 9), 99)) < _NO_LIGHT_DN:
+        raise _no_light(float(np.percentile(dark, 99)) - black_dn, white_ms)
+    region, lit_share = _find_region(white, dark, bayer_channels(info.bayer, *white.shape))
+    sizes = RegionSizes(
+        np.array([len(each) for each in region.lit]),
+        np.array([len(each) for each in region.beside]),
+        info.bit_depth,
+    )
+    lit = np.concatenate(region.lit)
+    light = float((white - dark).ravel()[lit].mean())
+    # The black level is a median of whole numbers, so half a number off.
+    return Survey(
+        white_ms,
+        black_dn,
+        region,
+        sizes,
+        lit_share,
+        ambient_share=(float(dark.ravel()[lit].mean()) - black_dn) / light,
+        ambient_std=0.5 / light,
+    )
+
+
+def _expose(eye: Eye, black_dn: float, rng: np.random.Generator) -> float:
+    """The exposure at which the brightest moment of white reaches the aim, ms."""
+    shortest, longest = eye.devices.camera.info.exposure_range_ms
+    exposure = shortest
+    while True:
+        bright = float(np.percentile(_glance(eye, exposure, rng), 99))
+        if exposure == shortest and bright > 0.9 * eye.full_scale_dn:
+            raise CalibrationError(
+                f"White is saturated at the shortest exposure ({shortest:g} ms). Close the camera's aperture,"
+                " use a grey filter or lower the gain; if the camera keeps an exposure of its own, switch its"
+                " automatic exposure off."
+            )
+        if bright - black_dn > _AIM * eye.full_scale_dn or 2 * exposure > min(longest, _LONGEST_MS):
+            return exposure
+        exposure *= 2
+
+
+def _require_obedience(eye: Eye, white_ms: float, black_dn: float, rng: np.random.Generator) -> None:
+    """Raise `DeviceError` when a quarter or four times the exposure gives the same light."""
+    low, high = eye.devices.camera.info.exposure_range_ms
+    other_ms = white_ms / 4 if white_ms / 4 >= low else min(4 * white_ms, high)
+    pairs = sorted((white_ms, other_ms))
+    faint, bright = (float(_mean(eye, ms, rng).mean()) - black_dn for ms in pairs)
+    if bright > _NO_LIGHT_DN and bright < 1.5 * faint:
+        raise DeviceError(
+            f"The camera gives {faint:.0f} DN at {pairs[0]:.3g} ms and {bright:.0f} DN at {pairs[1]:.3g} ms"
+            " above black, so it ignores the exposure it is told. Switch off its automatic exposure and gain."
+        )
+
+
+def _ceiling(eye: Eye, white_ms: float) -> float:
+    """Where signals end, DN: twice the light gives no more; infinite where the scale ends first."""
+    longest = min(eye.devices.camera.info.exposure_range_ms[1], _LONG_MS)
+    exposure_ms = min(_BRIGHTER * white_ms, longest / 2)
+    once, twice = (float(np.median(eye.snap(k * exposure_ms).pixels)) for k in (1, 2))
+    return twice if twice < 1.1 * once and exposure_ms > 2 * white_ms else float("inf")
+
+
+def _require_fresh_frames(eye: Eye, white_ms: float) -> None:
+    """Raise `DeviceError` when the frame after a change of the picture still shows the picture before."""
+    for _ in range(2):
+        eye.show(grey(1.0))
+        bright = max(float(eye.snap(white_ms).pixels.mean()) for _ in range(_GLANCES))
+        eye.show(BLACK)
+        first, second = (float(eye.snap(white_ms).pixels.mean()) for _ in range(2))
+        if first - second < 0.2 * (bright - second) or bright - second < 0.1 * _NO_LIGHT_DN:
+            return
+    raise DeviceError(
+        "The camera delivers stale frames: after a new picture its first frame shows the one before, the next"
+        " one does not. Have its driver expose on request, or empty its buffer before each frame."
+    )
+
+
+def _glance(eye: Eye, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """The brightest value of each pixel over a few frames at random times."""
+    brightest = eye.snap(exposure_ms).pixels
+    for _ in range(_GLANCES - 1):
+        eye.wait(rng.uniform(0, _MAX_GAP_MS))
+        brightest = np.maximum(brightest, eye.snap(exposure_ms).pixels)
+    return np.asarray(brightest, float)
+
+
+def _mean(eye: Eye, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """The mean of frames at random times."""
+    total = np.zeros(())
+    for _ in range(_MAP_FRAMES):
+        eye.wait(rng.uniform(0, _MAX_GAP_MS))
+        total = total + eye.snap(exposure_ms).pixels
+    return np.asarray(total / _MAP_FRAMES)
+
+
+def _no_light(ambient_dn: float, exposure_ms: float) -> CalibrationError | DeviceError:
+    if ambient_dn > _NO_LIGHT_DN:
+        return DeviceError(
+            f"The camera sees light ({ambient_dn:.0f} DN at {exposure_ms:.3g} ms), but white and black of the"
+            " projector look the same. Check that the projector is on, connected, and shines on the target."
+        )
+    return CalibrationError(
+        f"The camera sees nothing, not even at {exposure_ms:.3g} ms with the projector white. Take off the"
+        " lens cap, open the aperture, switch the projector on and put a white target in view."
+    )
+
+
+def _find_region(
+    bright: NDArray[np.float64], black: NDArray[np.float64], channels: NDArray[np.int64]
+) -> tuple[Region, float]:
+    """Lit pixels and pixels beside the picture of each channel, without hot ones; the share of lit ones."""
+    from scipy.ndimage import maximum_filter
+
+    white = bright - black
+    sound = np.abs(black - np.median(black)) < max(_NO_LIGHT_DN, 0.1 * float(np.percentile(white, 99)))
+    lit, beside = [], []
+    noise = np.median(np.abs(np.diff(white[::2], axis=0))) + 0.1
+    brightest = np.array([np.percentile(white[channels == c], 99) for c in range(3)])
+    share = white / np.maximum(brightest, _NO_LIGHT_DN)[channels]
+    # The brightest neighbour decides, so that the soft edge of the picture belongs to neither.
+    near = maximum_filter(share, 2 * _DISTANCE_PX + 1)
+    dark = (near < _BESIDE + 6 * noise / np.maximum(brightest.min(), _NO_LIGHT_DN)) & (share < _BESIDE * 2)
+    for c in range(3):
+        own = (channels == c) & sound
+        lit.append(np.flatnonzero(own & (share > _LIT)))
+        beside.append(np.flatnonzero(own & dark))
+    if min(len(each) for each in lit) < _FEWEST_PIXELS:
+        raise CalibrationError(
+            "Too few pixels see the projected picture brightly in red, green and blue. Put a white target in"
+            " view that fills the picture, and check that all three LEDs of the projector light."
+        )
+    if min(len(each) for each in beside) < _FEWEST_BESIDE:
+        beside = [np.empty(0, np.int64)] * 3
+    total = sum(len(each) for each in lit) / white.size
+    return Region((lit[0], lit[1], lit[2]), (beside[0], beside[1], beside[2])), total

@@ -1,0 +1,1 @@
+"""The Spectralon calibration, step by step."""

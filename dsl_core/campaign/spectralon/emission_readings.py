@@ -1,0 +1,94 @@
+"""Spectra of the uniform pictures: read from an instrument or from files, kept in the folder of a step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError
+from dsl_core.io.atomic import store_error, write_atomic
+from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.spectra.spectrum_file import read_spectrum
+from dsl_core.model.calibration.spectralon import COLOURS, EmissionReadings, LightColour
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.progress import Progress
+
+READINGS_NAME = "readings.json"
+#: Drive of red, green and blue in each picture.
+DRIVE: dict[LightColour, tuple[int, int, int]] = {
+    "red": (255, 0, 0),
+    "green": (0, 255, 0),
+    "blue": (0, 0, 255),
+    "white": (255, 255, 255),
+    "black": (0, 0, 0),
+}
+_ENDINGS = {".csv", ".txt", ".tsv", ".dat"}
+
+
+def is_read(folder: Path) -> bool:
+    """Whether the spectra of all pictures are kept."""
+    path = folder / READINGS_NAME
+    return path.exists() and set(load_readings(folder).readings) == set(COLOURS)
+
+
+def load_readings(folder: Path) -> EmissionReadings:
+    """The spectra of a step; raises `StoreError`."""
+    return read_record(folder / READINGS_NAME, EmissionReadings)
+
+
+def read_emission(
+    devices: DeviceRig, folder: Path, count: int, files: Path | None, progress: Progress
+) -> None:
+    """Read all spectra and keep them: ``count`` of each picture, or those of a folder of ``files``.
+
+    What an earlier call has read stays. Raises `CalibrationError` without an instrument and files, or for a
+    file that is missing or wrong.
+    """
+    if files is not None:
+        _keep(folder, EmissionReadings(source=str(files.name), readings=_from_files(files)))
+        return
+    if devices.spectroradiometer is None:
+        raise CalibrationError(
+            f"The rig {devices.name!r} has no spectroradiometer. Measure the Spectralon under red, green,"
+            " blue, white and black pictures with your own, save each spectrum as text (red.csv, green.csv,"
+            " ...), and name their folder in the setting emission_folder."
+        )
+    readings = load_readings(folder).readings if (folder / READINGS_NAME).exists() else {}
+    for done, colour in enumerate(COLOURS):
+        progress.report("spectra", done, len(COLOURS))
+        if colour not in readings:
+            readings = {**readings, colour: _measure(devices, colour, count)}
+            _keep(folder, EmissionReadings(source="spectroradiometer", readings=readings))
+    progress.report("spectra", len(COLOURS), len(COLOURS))
+
+
+def _measure(devices: DeviceRig, colour: LightColour, count: int) -> tuple[SpectralCurve, ...]:
+    assert devices.spectroradiometer is not None
+    info = devices.projector.info
+    devices.projector.show(np.full((info.height_px, info.width_px, 3), DRIVE[colour], np.uint8))
+    return tuple(devices.spectroradiometer.measure() for _ in range(max(count, 1)))
+
+
+def _from_files(folder: Path) -> dict[LightColour, tuple[SpectralCurve, ...]]:
+    """Spectra of all files whose names begin with a colour."""
+    if not folder.is_dir():
+        raise CalibrationError(f"The folder of spectra {folder} does not exist. Correct emission_folder.")
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _ENDINGS)
+    named = {c: [path for path in paths if path.name.lower().startswith(c)] for c in COLOURS}
+    missing = [colour for colour, found in named.items() if not found]
+    if missing:
+        raise CalibrationError(
+            f"{folder} holds no spectrum of {', '.join(missing)}. Name the files red*, green*, blue*, white*"
+            f" and black*, with {', '.join(sorted(_ENDINGS))} at the end."
+        )
+    return {colour: tuple(read_spectrum(path) for path in found) for colour, found in named.items()}
+
+
+def _keep(folder: Path, readings: EmissionReadings) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise store_error(folder, error) from error
+    write_atomic(folder / READINGS_NAME, (readings.model_dump_json() + "\n").encode())

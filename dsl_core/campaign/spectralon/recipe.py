@@ -1,0 +1,158 @@
+"""Spectralon: emission of the LEDs, the white that all reflectance refers to, and the flat field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsl_core.calibration.light.emission import measured_emission
+from dsl_core.calibration.light.spectralon import UniformPictures, measure_white, spectralon_calibration
+from dsl_core.calibration.light.spectralon_figures import spectralon_figures, unevenness_of_middle
+from dsl_core.calibration.light.white_match import match_whites
+from dsl_core.campaign.common import exposures
+from dsl_core.campaign.common.flat_target import capture_flat_target, middle, read_flat_target
+from dsl_core.campaign.common.light_look import brightness, other_light
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.common.step_scan import is_complete
+from dsl_core.campaign.spectralon.emission_readings import is_read, load_readings, read_emission
+from dsl_core.errors import CalibrationError, DecodeError
+from dsl_core.io.spectra.spectrum_file import read_spectrum
+from dsl_core.model.base import Record
+from dsl_core.model.calibration.spectralon import MeasuredEmission, SpectralonCalibration
+from dsl_core.model.figure import Figure
+from dsl_core.model.placement import Placement
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.shading import plane_shading
+from dsl_core.progress import Progress
+
+EMISSION, PICTURES = "emission", "pictures"
+
+
+@dataclass(frozen=True)
+class SpectralonRecipe:
+    """The calibration with a Spectralon.
+
+    ``reflectance`` is its certified reflectance, or ``reflectance_file`` a text file of it over wavelength.
+    ``readings`` is how often the spectroradiometer reads each picture; ``emission_folder`` holds text files
+    ``red*``, ``green*``, ``blue*``, ``white*``, ``black*`` of an instrument that is not connected.
+    ``depth_mm`` is how far away the target stands.
+    """
+
+    reflectance: float = 0.99
+    reflectance_file: str = ""
+    readings: int = 16
+    emission_folder: str = ""
+    depth_mm: float = 700.0
+
+    @property
+    def name(self) -> str:
+        """Name on the command line."""
+        return "spectralon"
+
+    @property
+    def title(self) -> str:
+        """Title of the wizard."""
+        return "Spectralon"
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Geometry, for the shading of the target."""
+        return ("geometry",)
+
+    @property
+    def record_type(self) -> type[Record]:
+        """The record that `fit` makes."""
+        return SpectralonCalibration
+
+    def steps(self, bench: Bench) -> tuple[Step, ...]:
+        """Spectra of the LEDs, then pictures."""
+        place = Placement(target="spectralon", film=False, options={"depth_mm": self.depth_mm})
+        where = (
+            f"Take the film off. Place the Spectralon about {self.depth_mm / 10:g} cm from the camera, facing"
+            " it, so that it fills at least the middle half of the picture."
+        )
+        aim = " Aim the spectroradiometer at the middle of the Spectralon."
+        return (
+            Step(EMISSION, "Spectra of the LEDs", where + aim, place),
+            Step(PICTURES, "White, red, green and blue", where + " Keep the room dark.", place),
+        )
+
+    def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
+        """Whether the middle is bright, even and free of other light."""
+        white = exposures.measure_white(bench.devices, bench.rig)
+        return (
+            brightness(white, bench.rig, "lens cap, aperture and projector"),
+            unevenness_of_middle(white.picture, bench.rig),
+            other_light(white, "target"),
+        )
+
+    def is_captured(self, bench: Bench, step: Step) -> bool:
+        """Whether all spectra are read, or the scan is complete."""
+        folder = bench.step_folder(step)
+        return is_read(folder) if step.key == EMISSION else is_complete(folder)
+
+    def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Read spectra, or choose exposures by a test shot and capture."""
+        folder = bench.step_folder(step)
+        if step.key == EMISSION:
+            source = Path(self.emission_folder) if self.emission_folder else None
+            read_emission(bench.devices, folder, self.readings, source, progress)
+        else:
+            capture_flat_target(bench, folder, step.title, 1.0, progress)
+
+    def fit(self, bench: Bench, progress: Progress) -> SpectralonCalibration:
+        """Emission, white signals and flat field from the captures."""
+        spectra, pictures = self.steps(bench)
+        reflectance = self._reflectance()
+        try:
+            emission = measured_emission(load_readings(bench.step_folder(spectra)), reflectance)
+        except CalibrationError as error:
+            raise CalibrationError(f"Step {spectra.title}: {error}") from error
+        try:
+            return self._pictures(bench, pictures, emission, reflectance, progress)
+        except (CalibrationError, DecodeError) as error:
+            raise CalibrationError(f"Step {pictures.title}: {error}") from error
+
+    def figures(self, record: Record) -> tuple[Figure, ...]:
+        """What was measured, against its limits."""
+        assert isinstance(record, SpectralonCalibration)
+        return spectralon_figures(record)
+
+    def apply(self, record: Record, rig: Rig) -> Rig:
+        """Emission, flat field, and responses and white scale that reproduce the white signals."""
+        assert isinstance(record, SpectralonCalibration)
+        known = rig.model_copy(update={"emission": record.emission.curves, "flat_field": record.flat_field})
+        return match_whites(known, record.white, record.reflectance)
+
+    def _pictures(
+        self,
+        bench: Bench,
+        step: Step,
+        emission: MeasuredEmission,
+        reflectance: SpectralCurve,
+        progress: Progress,
+    ) -> SpectralonCalibration:
+        target = read_flat_target(bench.step_folder(step), bench.rig, progress)
+        found = target.plane(bench.rig, middle(target.lit.shape))
+        uniform = UniformPictures(
+            radiance=target.radiance,
+            saturated=target.saturated,
+            shading=plane_shading(bench.rig, found.plane),
+            usable=target.lit & found.on_plane,
+            sensor=bench.rig.sensor,
+        )
+        return spectralon_calibration(
+            reflectance, emission, uniform, measure_white(uniform), found, middle(target.lit.shape)
+        )
+
+    def _reflectance(self) -> SpectralCurve:
+        """The certified reflectance over wavelength; raises `CalibrationError`."""
+        if self.reflectance_file:
+            return read_spectrum(Path(self.reflectance_file), radiance=False)
+        if not 0.05 < self.reflectance <= 1.05:
+            raise CalibrationError(
+                f"The reflectance of the Spectralon cannot be {self.reflectance:g}; a share such as 0.99 is"
+                " wanted, from its certificate."
+            )
+        return SpectralCurve.of([400.0, 700.0], [self.reflectance] * 2)

@@ -1,0 +1,1 @@
+"""Results on disk, and the marks that belong to them."""

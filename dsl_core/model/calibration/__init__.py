@@ -1,0 +1,1 @@
+"""Records of what each calibration found."""

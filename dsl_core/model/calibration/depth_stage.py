@@ -1,0 +1,111 @@
+"""What a plane on a stage says of film and geometry, and how far to trust it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from dsl_core.model.base import Record
+from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
+from dsl_core.model.column_residual import ColumnResidual
+from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
+
+
+class StagePosition(Record):
+    """The plane at one position of the stage.
+
+    ``plane_rms_mm`` is the scatter of the points about it, ``column_rms_px`` the same in projector columns;
+    ``step_error_mm`` is how far the plane stands from where the stage says, relative to the other positions.
+    """
+
+    position_mm: float
+    tilt_deg: float
+    distance_mm: float
+    plane_rms_mm: float
+    column_rms_px: float
+    step_error_mm: float
+    step_std_mm: float
+
+
+class FilterSeen(Record):
+    """First orders through one filter: effective wavelength, and how far they lie from the fitted film.
+
+    ``shift_px`` is the median over the image, one number a position; ``tiles`` counts those that were used.
+    """
+
+    filter_nm: float
+    effective_nm: float
+    measured: bool
+    shift_px: tuple[float, ...]
+    tiles: int
+
+
+class HeldOutError(Record):
+    """Root mean square error (px) of first-order columns that a fit never saw.
+
+    ``grating_px`` is that of the film alone, ``hybrid_px`` with the smooth residual. The noise of the samples
+    themselves, ``noise_px``, is part of both.
+    """
+
+    kept_out: str
+    grating_px: float
+    hybrid_px: float
+    noise_px: float
+
+
+class DepthStageCalibration(Record):
+    """Refined lenses and pose, the film with its smooth residual, and what a diffuser says of the chain.
+
+    ``geometry_covariance`` is that of the 24 parameters of lenses and pose (None where it was not known
+    before, and the geometry is as it was); ``column_std_px`` and ``depth_std_mm`` are what it leaves open in
+    columns of the zero order and in depth; ``geometry_pull`` is how far it moved, in its deviations before.
+    ``bow_mm`` is by how much the target seems to bulge towards the camera over 300 mm, alike at all positions
+    (None in older records).
+    ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
+    is that of single samples of first orders. ``frames`` counts the exposures.
+    """
+
+    schema_version: Literal[1] = 1
+    camera: Lens
+    projector: Lens
+    pose: Pose
+    geometry_covariance: tuple[float, ...] | None = None
+    column_std_px: float
+    depth_std_mm: float
+    geometry_pull: float
+    bow_mm: float | None = None
+    bow_std_mm: float = 0.0
+    positions: tuple[StagePosition, ...]
+    film: Film
+    film_std: dict[str, float]
+    scatter_px: float
+    filters: tuple[FilterSeen, ...]
+    residual: ColumnResidual
+    held_out: tuple[HeldOutError, ...]
+    correspondence: CorrespondenceGrid | None = None
+    chain: ChainCorrection | None = None
+    frames: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def held_out_px(self) -> float:
+        """Error of the model with residual over everything that was left out, rms, px."""
+        squares = [error.hybrid_px**2 for error in self.held_out]
+        return float((sum(squares) / len(squares)) ** 0.5)
+
+
+def apply_depth_stage(record: DepthStageCalibration, rig: Rig) -> Rig:
+    """The rig with refined geometry, film, residual, data-driven grid and chain as far as they were found."""
+    known = rig.model_copy(
+        update={
+            "camera": record.camera,
+            "projector": record.projector,
+            "pose": record.pose,
+            "geometry_covariance": record.geometry_covariance,
+            "column_std_px": record.column_std_px,
+            "film": record.film,
+            "residual": record.residual,
+            "correspondence": record.correspondence,
+        }
+    )
+    return known if record.chain is None else apply_chain(record.chain, known)

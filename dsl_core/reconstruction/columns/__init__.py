@@ -1,0 +1,1 @@
+"""The projector column that lights each pixel, and its deviation."""

@@ -1,0 +1,153 @@
+"""Columns and depths of chosen pixels, in chunks and threads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.rig import Rig
+from dsl_core.optics.unlit import unlit_px
+from dsl_core.progress import NoProgress, Progress
+from dsl_core.reconstruction.columns.column import Column, dark_offset, refine
+from dsl_core.reconstruction.columns.first_orders import first_order_share
+from dsl_core.reconstruction.columns.pattern_column import one_if_grey, refine_by_profiles
+from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.reconstruction.merge import LineStack
+from dsl_core.solve.many import Check, work_through
+
+CHUNK = 16384
+Floats = NDArray[np.float32]
+Indices = NDArray[np.intp]
+#: Deviation of a column that only a whole pixel is known of.
+WHOLE_PX_STD = 12**-0.5
+#: A dark offset that unlit frames measure to this share of the black frames' own noise counts as known.
+OFFSET_KNOWN = 1 / 3
+
+
+@dataclass(frozen=True)
+class ColumnMaps:
+    """What is found of some pixels, each (P,).
+
+    Column and deviation (px), zero-order amplitude and its deviation, dark offset (DN per ms) and how far all
+    frames may still be off it, whether lines refined the column, depth (mm) and its slope (mm per px).
+    """
+
+    column_px: Floats
+    column_std_px: Floats
+    amplitude: Floats
+    amplitude_std: Floats
+    offset: Floats
+    offset_std: Floats
+    refined: NDArray[np.bool_]
+    depth_mm: NDArray[np.float64]
+    slope_mm_per_px: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls, count: int) -> ColumnMaps:
+        """Room for so many pixels."""
+        q, dq, a, da, dark, dark_std = (np.empty(count, np.float32) for _ in range(6))
+        return cls(q, dq, a, da, dark, dark_std, np.zeros(count, bool), np.empty(count), np.empty(count))
+
+    def put(self, where: Indices | slice, other: ColumnMaps) -> None:
+        """Replace some pixels by those of other maps."""
+        for field in fields(self):
+            getattr(self, field.name)[where] = getattr(other, field.name)
+
+    def of(self, where: Indices | NDArray[np.bool_]) -> ColumnMaps:
+        """Some of the pixels."""
+        return ColumnMaps(**{field.name: getattr(self, field.name)[where] for field in fields(self)})
+
+
+@dataclass(frozen=True)
+class ColumnFinder:
+    """Refines decoded columns on the frames of the spectral patterns, if there are any, and triangulates."""
+
+    rig: Rig
+    white: MergedFrame
+    stack: LineStack
+    lines: LineSet | None
+    profiles: NDArray[np.float64] | None
+    device: str = "cpu"
+
+    def find(
+        self,
+        pixels: Indices,
+        start_px: Floats,
+        start_std_px: Floats | None = None,
+        progress: Progress | None = None,
+    ) -> ColumnMaps:
+        """Columns of pixels (P,), flat indices, from decoded ones (P,) and what those are sure to."""
+        maps = ColumnMaps.empty(len(pixels))
+
+        def work(start: int, _: Check) -> None:
+            part = slice(start, min(start + CHUNK, len(pixels)))
+            std = None if start_std_px is None else start_std_px[part]
+            maps.put(part, self._chunk(pixels[part], start_px[part], std))
+
+        before = torch.get_num_threads()
+        torch.set_num_threads(1)
+        try:
+            work_through(work, range(0, len(pixels), CHUNK), 2, "columns", progress or NoProgress())
+        finally:
+            torch.set_num_threads(before)
+        return maps
+
+    def _chunk(self, pixels: Indices, start_px: Floats, std_px: Floats | None) -> ColumnMaps:
+        # A slice is a view; picking single pixels copies.
+        whole = len(pixels) > 0 and pixels[-1] - pixels[0] == len(pixels) - 1
+        where = slice(int(pixels[0]), int(pixels[-1]) + 1) if whole else pixels
+        column, offset, open_offset = self._columns(where, torch.as_tensor(start_px, device=self.device))
+        spread = column.std_px.cpu().numpy()
+        refined = column.refined.cpu().numpy()
+        if std_px is not None:
+            spread = np.where(refined, spread, std_px)
+        at = torch.as_tensor(pixels, device=self.device)
+        depth, slope = triangulate(self.rig, at, column.column_px.double())
+        a, da = (v.cpu().numpy() for v in (column.amplitude, column.amplitude_std))
+        dark, dark_std = (v.cpu().numpy() for v in (offset, open_offset))
+        q, z, dz = (v.cpu().numpy() for v in (column.column_px, depth, slope))
+        return ColumnMaps(q, spread, a, da, dark, dark_std, refined, z, dz)
+
+    def _columns(self, where: Indices | slice, start: Tensor) -> tuple[Column, Tensor, Tensor]:
+        """Columns, dark offset, and how far all frames of a pixel may be off it."""
+        black_std = torch.as_tensor(self.stack.black_std.ravel()[where], device=self.device)
+        if self.profiles is None:
+            return self._of_white(where, start), torch.zeros_like(start), black_std
+        stack = self.stack
+        y = torch.as_tensor(stack.radiance.reshape(len(stack.radiance), -1)[:, where], device=self.device)
+        std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, where], device=self.device)
+        if self.lines is None:
+            return self._of_patterns(where, start, y, std), torch.zeros_like(start), black_std
+        column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig)
+        known = offset_std < OFFSET_KNOWN * black_std
+        return column, offset, torch.where(known, 0.0, torch.minimum(offset_std, black_std))
+
+    def _of_patterns(self, where: Indices | slice, start: Tensor, y: Tensor, std: Tensor) -> Column:
+        """Columns from any pattern set, with what the first orders of a grey surface add to its frames."""
+        assert self.profiles is not None
+        profiles = one_if_grey(self.profiles)
+        index = np.arange(where.start, where.stop) if isinstance(where, slice) else where
+        light = first_order_share(self.rig, profiles, torch.as_tensor(index, device=self.device), start)
+        return refine_by_profiles(start, y, std, profiles, self.rig.projector_response, light)
+
+    def _of_white(self, where: Indices | slice, start: Tensor) -> Column:
+        """What is known without any pattern but white."""
+        amplitude = torch.as_tensor(self.white.radiance.ravel()[where], device=self.device)
+        spread = torch.as_tensor(self.white.variance.ravel()[where], device=self.device).sqrt()
+        none = torch.zeros_like(start, dtype=torch.bool)
+        return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none)
+
+
+def _on_lines(
+    start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig
+) -> tuple[Column, Tensor, Tensor]:
+    response = rig.projector_response
+    column = refine(start, y, std, lines, response)
+    unlit = unlit_px(rig, lines.width_px)
+    return column, *dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

@@ -1,0 +1,1 @@
+"""The spectrum of each pixel, by our solver and by those it is compared with."""

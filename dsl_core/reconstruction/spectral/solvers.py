@@ -1,0 +1,54 @@
+"""The spectral solvers by name."""
+
+from __future__ import annotations
+
+from dsl_core.errors import PlanError
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.model.spectral_choices import SOLVERS, names
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.progress import Progress
+from dsl_core.reconstruction.merge import LineStack
+from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
+from dsl_core.reconstruction.spectral.published_objective import PublishedReconstruction, require_single_lines
+from dsl_core.reconstruction.spectral.spectra import Pixels, SpectralMaps, SpectralReconstruction
+
+_KINDS = {"published": PublishedReconstruction, "nearest-line": NearestLine}
+
+
+def check_solver(solver: str, rig: Rig, plan: CapturePlan, model: str) -> None:
+    """Raise what `solve_spectra` would, before frames are read for it."""
+    if solver not in names(SOLVERS):
+        raise PlanError(f"There is no spectral solver {solver!r}; choose {', '.join(names(SOLVERS))}.")
+    if solver == "colour-basis":
+        return
+    correspondence(rig, model)
+    if solver in _KINDS:
+        require_single_lines(plan)
+
+
+def solve_spectra(
+    solver: str,
+    rig: Rig,
+    plan: CapturePlan,
+    grid: WavelengthGrid,
+    model: str,
+    stack: LineStack,
+    pixels: Pixels,
+    *,
+    device: str = "cpu",
+    progress: Progress | None = None,
+) -> SpectralMaps:
+    """Spectra of known pixels; raises `PlanError` for an unknown solver or patterns that it cannot read.
+
+    Raises `CalibrationError` for a model that the calibration does not hold.
+    """
+    check_solver(solver, rig, plan, model)
+    if solver == "colour-basis":
+        return ColourBasis(rig, grid, pixels).run(progress)
+    kind = _KINDS.get(solver)
+    data = (rig, plan, grid, correspondence(rig, model), stack.radiance, stack.std, pixels)
+    if kind is None:
+        return SpectralReconstruction(*data, device=device).run(progress)
+    return kind(*data, device=device).run(progress)

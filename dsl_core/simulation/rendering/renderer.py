@@ -1,0 +1,203 @@
+"""What the twin's camera sees of a scene for any pattern: expected signal, without noise.
+
+A pattern that consists of a few white lines is rendered from cumulative spectra: a line lights, through
+each order, the wavelengths between its two edges, so each edge is one look-up. Any other pattern is
+summed over spectral slices. Both use the same correspondence and response as the solver.
+"""
+
+from __future__ import annotations
+
+import copy
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.correspondence import zero_order
+from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.simulation.rendering.line_light import Runs, add_band, white_runs
+from dsl_core.simulation.rendering.order_tables import OrderTables
+from dsl_core.simulation.rendering.pattern_table import PatternTable
+from dsl_core.simulation.rendering.slice_light import order_light
+from dsl_core.simulation.rendering.spectral_tables import BROAD, NARROW, NM, SpectralTables, zero_table
+from dsl_core.simulation.rendering.surface_light import surface_shading
+from dsl_core.simulation.scenes.truth import Parts, SceneTruth
+
+ORDERS = (1, -1, 2, -2)
+THREADS = 2
+#: Patterns with more runs of lit columns than this are summed over slices; behind a filter, slices would blur
+#: the narrow images of the lines.
+MAX_RUNS, MAX_RUNS_FILTERED = 8, 64
+
+
+class Renderer:
+    """Expected signal of one scene on one rig, in DN per ms above black.
+
+    ``parts`` are what light comes from as `SceneTruth.parts` lists it, which is what they are if not given;
+    ``orders`` those of the film beside the zero order.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        truth: SceneTruth,
+        *,
+        film: bool = True,
+        device: str = "cpu",
+        orders: tuple[int, ...] = ORDERS,
+        shaded: bool = True,
+        parts: Parts | None = None,
+    ) -> None:
+        self.rig = self._bare = rig
+        self.device = torch.device(device)
+        self.shape = truth.depth_mm.shape
+        pixel, material, share = truth.parts() if parts is None else parts
+        self.pixels = self._tensor(pixel, torch.int64)
+        depth = self._tensor(truth.depth_mm.ravel()[pixel])
+        channel = bayer_channels(rig.sensor.bayer, *self.shape).ravel()[pixel]
+        self.material_channel = self._tensor(material.astype(np.int64) * 3 + channel, torch.int64)
+        self.shading = self._tensor(surface_shading(rig, truth, shaded).ravel()[pixel] * share)
+        self.column, self.row = zero_order(rig, self.pixels, depth)
+        w, h = rig.projector.width_px, rig.projector.height_px
+        inside = (self.row > -0.5) & (self.row < h - 0.5) & (self.column > -1.5) & (self.column < w + 0.5)
+        self.shading = self.shading * inside
+        self._reflectance = truth.materials.at(NM)
+        self.slicing = BROAD
+        self.zero_table = zero_table(rig, self._reflectance, self.device)
+        self.orders = [
+            OrderTables.make(rig, m, self.pixels, depth, self.shading > 0, self._reflectance, BROAD)
+            for m in (orders if film else ())
+        ]
+        halo = (
+            rig.projector_response
+            if film
+            else rig.projector_response.model_copy(update={"halo_peak_per_px": 0.0})
+        )
+        self.response = halo
+        self._white: Tensor | None = None
+        self._colours: tuple[Renderer, ...] = ()
+
+    def through(self, transmission: SpectralCurve | None) -> Renderer:
+        """The same view through a filter before the camera (None: without); the geometry is shared."""
+        other = copy.copy(self)
+        other.rig, other.slicing, other._white, other._colours = self._bare, BROAD, None, ()
+        if transmission is not None:
+            passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
+            # On the renderer's own grid, as the rig's may be too coarse for a narrow band.
+            response = tuple(SpectralCurve.of(NM, curve.at(NM) * passed) for curve in self._bare.response)
+            other.rig, other.slicing = self._bare.model_copy(update={"response": response}), NARROW
+        other.zero_table = zero_table(other.rig, self._reflectance, self.device)
+        other.orders = [replace(tables, spectra=other._spectra(tables)) for tables in self.orders]
+        return other
+
+    def _spectra(self, tables: OrderTables) -> SpectralTables:
+        """An order's spectra through the filter of this view."""
+        return SpectralTables.make(
+            self.rig, tables.order, self._reflectance, tables.sigma_nm, self.slicing, self.device
+        )
+
+    def _tensor(self, array: NDArray[Any], dtype: torch.dtype = torch.float32) -> Tensor:
+        return torch.as_tensor(np.ascontiguousarray(array), device=self.device, dtype=dtype)
+
+    def expected(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Signal (rows, columns), DN per ms, of drive levels (height, width, 3) or (height, width)."""
+        return self._picture(self._light(as_colour(image)))
+
+    def planes(self, image: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """Signal as a camera without a mosaic would see it, DN per ms, shape (3, rows, columns)."""
+        if not self._colours:
+            self._colours = tuple(self._of_colour(channel) for channel in range(3))
+        light = self._light(as_colour(image))
+        return np.stack([colour._picture(light) for colour in self._colours])
+
+    def of_parts(self, image: NDArray[np.uint8]) -> Tensor:
+        """Signal of every part, (parts,), DN per ms, of the same drive levels as `expected`."""
+        return self._signal(self._light(as_colour(image)))
+
+    def _of_colour(self, channel: int) -> Renderer:
+        """The same view, every pixel of which sees one colour; the geometry is shared."""
+        other = copy.copy(self)
+        other.material_channel = self.material_channel.div(3, rounding_mode="floor") * 3 + channel
+        other._white, other._colours = None, ()
+        return other
+
+    def _light(self, colour: NDArray[np.uint8]) -> Runs | PatternTable:
+        """A few bands of white, or any other pattern as a table."""
+        runs = white_runs(colour)
+        most = MAX_RUNS if self.slicing is BROAD else MAX_RUNS_FILTERED
+        return self._table(colour) if runs is None or len(runs) > most else runs
+
+    def _signal(self, light: Runs | PatternTable) -> Tensor:
+        if isinstance(light, PatternTable):
+            return (self._sliced(light) + self._black()) * self.shading
+        return self._lines(light) * self.shading
+
+    def _picture(self, light: Runs | PatternTable) -> NDArray[np.float32]:
+        out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
+        out.index_add_(0, self.pixels, self._signal(light))
+        return out.reshape(self.shape).cpu().numpy()
+
+    def _black(self) -> Tensor | float:
+        """Light of a dark projector: its black level times the signal of white."""
+        black = self.rig.projector_response.black_fraction
+        if black == 0:
+            return 0.0
+        if self._white is None:
+            h, w = self.rig.projector.height_px, self.rig.projector.width_px
+            if self.slicing is BROAD:
+                self._white = self._sliced(PatternTable.of(np.ones((h, w, 1)), self.response, self.device))
+            else:
+                self._white = torch.zeros_like(self.column)
+                self._add_band(self._white, -0.5, w - 0.5, 1.0)
+        return black * self._white
+
+    def _lines(self, runs: Runs) -> Tensor:
+        signal = torch.zeros_like(self.column) + self._black()
+        response = self.rig.projector_response
+        for start, stop, level in runs:
+            self._add_band(signal, start, stop, float(response.radiance(level)) - response.black_fraction)
+        return signal
+
+    def _add_band(self, signal: Tensor, start: float, stop: float, radiance: float) -> None:
+        """Add the light of white columns between two edges (px)."""
+        zero = self.zero_table.sum(0)[self.material_channel]
+        signal += radiance * zero * zero_order_profile(self.column, start, stop, self.response)
+        for tables in self.orders:
+            add_band(signal, tables, self.material_channel, start, stop, radiance)
+
+    def _table(self, colour: NDArray[np.uint8]) -> PatternTable:
+        response = self.rig.projector_response
+        radiance = response.radiance(np.arange(256) / 255)[colour] - response.black_fraction
+        grey = np.array_equal(colour[..., 0], colour[..., 1]) and np.array_equal(
+            colour[..., 0], colour[..., 2]
+        )
+        return PatternTable.of(radiance[..., :1] if grey else radiance, self.response, self.device)
+
+    def _sliced(self, table: PatternTable) -> Tensor:
+        leds = [slice(0, 3)] if table.leds == 1 else [slice(i, i + 1) for i in range(3)]
+        signal = torch.zeros_like(self.column)
+        tasks: list[tuple[OrderTables, PatternTable, int, slice]] = []
+        for led, of_led in enumerate(leds):
+            zero = self.zero_table[of_led].sum(0)[self.material_channel]
+            signal += zero * table.at(led, self.column, self.row)
+            tasks += [(tables, table, led, of_led) for tables in self.orders if len(tables.active)]
+        # Orders are independent, so each core takes its share of them.
+        with ThreadPoolExecutor(THREADS) as pool:
+            parts = pool.map(
+                lambda t: order_light(t[0], t[1], t[2], t[3], self.material_channel, self.slicing), tasks
+            )
+            for (tables, *_), part in zip(tasks, parts, strict=True):
+                signal[tables.active] += part
+        return signal
+
+
+def as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Drive levels (height, width, 3) of an image that may be grey."""
+    return image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)

@@ -1,0 +1,1 @@
+"""What the twin looks at, with its true shape and reflectance."""

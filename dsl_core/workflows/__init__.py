@@ -1,0 +1,1 @@
+"""What callers do with scans on disk; each function combines stages of the pipeline."""

@@ -1,0 +1,139 @@
+"""Scans and calibrations in the published layout, to and from this project's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from dsl_core.errors import DslError, StoreError
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.pipeline import calibration_of, scan
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    from dsl_core.io.published import FileRecord
+
+#: Note of a session that says from which files it was made.
+_FINGERPRINT = "imported_fingerprint"
+
+
+def export_scan(
+    folder: Path, target: Path, overwrite: bool = False, progress: Progress | None = None
+) -> list[Path]:
+    """Write a complete session in the published dataset layout and return the files; raises `StoreError`."""
+    from dsl_core.io.published import export_dataset
+    from dsl_core.io.scan.check import require_complete
+    from dsl_core.io.scan.session import SessionReader
+
+    reader = SessionReader(folder)
+    require_complete(reader)
+    sensor = calibration_of(reader).sensor
+    return export_dataset(
+        reader, target, bayer=sensor.bayer, bit_depth=sensor.bit_depth, overwrite=overwrite, progress=progress
+    )
+
+
+@dataclass(frozen=True)
+class FolderLook:
+    """What a folder of another program holds: its table of files, and what keeps it from being imported."""
+
+    kind: Literal["scan", "calibration"]
+    table: Sequence[FileRecord]
+    obstacle: str = ""
+
+
+def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None) -> FolderLook:
+    """Look at a folder in the published layout, or one that should be, without writing anything.
+
+    ``base`` as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder.
+    """
+    from dsl_core.io.published import check_calibration, holds_calibration
+
+    if not root.is_dir():
+        raise StoreError(f"{root} is not a folder. Choose the folder of a published dataset or calibration.")
+    if not holds_calibration(root):
+        return _look_at_scan(root, base)
+    try:
+        import_calibration(root, base, camera_size_px)
+    except DslError as error:
+        return FolderLook("calibration", check_calibration(root), str(error))
+    return FolderLook("calibration", check_calibration(root))
+
+
+def _look_at_scan(root: Path, base: Rig) -> FolderLook:
+    from dsl_core.capture.preflight import require_possible
+    from dsl_core.devices.replay import replay_rig
+    from dsl_core.io.published import PUBLISHED_SETTINGS, check_dataset, open_dataset
+
+    try:
+        source = open_dataset(root, bayer=base.sensor.bayer, bit_depth=base.sensor.bit_depth)
+    except DslError as error:
+        # All that the layout wants is then missing, which the table says.
+        plan = CapturePlan(name=root.name, settings=PUBLISHED_SETTINGS)
+        return FolderLook("scan", check_dataset(root, plan), f"{error}{_poses_hint(root)}")
+    try:
+        source.require_frames()
+        require_possible(replay_rig(source, base), source.plan)
+    except DslError as error:
+        return FolderLook("scan", source.table, str(error))
+    return FolderLook("scan", source.table)
+
+
+def _poses_hint(root: Path) -> str:
+    """What to do with a folder of calibration pictures, which is easily taken for a dataset."""
+    if not any(root.glob("*/graycode_*.*")):
+        return ""
+    return (
+        f" Its folders may be poses of a board: 'dsl-scan calibrate geometry {root} --pictures' reads them."
+    )
+
+
+def import_scan(
+    root: Path, target: Path | None, calibration: Rig, progress: Progress | None = None
+) -> Sequence[FileRecord]:
+    """Check a published dataset, make a session of it if a target is given; return the table of files.
+
+    An interrupted import goes on. Raises `StoreError` naming the first file that is needed but of no use,
+    or when the target holds another scan; then nothing is written.
+    """
+    from dsl_core.devices.replay import replay_rig
+    from dsl_core.io.published import open_dataset
+
+    source = open_dataset(root, bayer=calibration.sensor.bayer, bit_depth=calibration.sensor.bit_depth)
+    if target is not None:
+        source.require_frames()
+        notes = {"imported_from": root.absolute().name, _FINGERPRINT: source.fingerprint()}
+        _refuse_other_scan(target, notes[_FINGERPRINT], calibration, root)
+        scan(replay_rig(source, calibration), source.plan, target, progress, notes)
+    return source.table
+
+
+def _refuse_other_scan(target: Path, fingerprint: str, calibration: Rig, root: Path) -> None:
+    """Raise `StoreError` when the target is a scan, but not of this dataset with this calibration."""
+    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io.scan.manifest import read_manifest
+
+    if not (target / MANIFEST_NAME).exists():
+        return
+    stored = read_manifest(target)
+    if stored.notes.get(_FINGERPRINT) != fingerprint:
+        why = f"that does not come from the files of {root}"
+    elif stored.calibration != calibration:
+        why = "that was imported with another calibration"
+    else:
+        return
+    raise StoreError(f"{target} holds a scan {why}. A scan is never replaced: choose another name.")
+
+
+def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int] | None) -> Rig:
+    """A rig from published lenses, pose and curves on the film, sensor and scales of ``base``.
+
+    Without a size of the camera's images, that of the file is taken.
+    """
+    from dsl_core.io.published import load_calibration
+
+    size = (base.projector.width_px, base.projector.height_px)
+    return load_calibration(root, size, camera_size_px).rig(base)

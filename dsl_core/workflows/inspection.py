@@ -1,0 +1,239 @@
+"""The intensity graph of a pixel: what it saw while the lines went by, and what the model expects.
+
+Along the lines a pixel lights up three times: through the zero order, in its own colour, and through the
+two first orders, each wavelength at its own line (section 3 of the paper). Measured against model, the
+graph shows at a glance what is wrong with a pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import CalibrationError, DecodeError, StoreError
+from dsl_core.model.rig import Rig
+from dsl_core.progress import NoProgress, Progress
+
+if TYPE_CHECKING:
+    from dsl_core.io.result.result_arrays import ResultArrays
+    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.model.plan import CapturePlan, Shot
+
+Floats = NDArray[np.float64]
+#: Half size of the neighbourhood that is read at once, so that nearby pixels need no second look at the disk.
+HALF_PX = 24
+
+
+@dataclass(frozen=True)
+class IntensityGraph:
+    """One pixel over the frames of its pattern set.
+
+    ``measured``, ``std`` and ``model`` have shape (3, frames), DN per ms; the model is None where the pixel
+    has no spectrum. ``zero`` is the frame of the zero order, ``orders`` the frame of each wavelength through
+    +1 and -1 (NaN where the light would start outside the projector's frame); both are empty for pattern
+    sets in which a frame shows several lines.
+    """
+
+    pixel: tuple[int, int]
+    measured: Floats
+    std: Floats
+    model: Floats | None
+    zero: float | None
+    orders: dict[int, Floats]
+    wavelengths_nm: Floats
+
+
+def find_session(result: ResultArrays) -> Path:
+    """The scan beside a result that it was made of; raises `StoreError` when it is not there."""
+    return session_of(result.path, result.attributes)
+
+
+def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
+    """The scan beside a result with these attributes; raises `StoreError` when it is not there."""
+    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io.scan.manifest import read_manifest
+
+    captured = attributes.get("captured")
+    for folder in sorted(path.parent.glob("*.dsl")):
+        if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
+            return folder
+    raise StoreError(
+        f"The scan of {path.name} is not beside it, so that its frames cannot be read."
+        f" Move the scan of {captured or 'this result'} to {path.parent}."
+    )
+
+
+class _Cropped:
+    """A frame source of a part of the picture."""
+
+    def __init__(self, reader: SessionReader, rows: slice, columns: slice) -> None:
+        self.reader, self.rows, self.columns = reader, rows, columns
+
+    @property
+    def plan(self) -> CapturePlan:
+        return self.reader.plan
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        return np.ascontiguousarray(self.reader.read(shot, verify=False)[self.rows, self.columns])
+
+
+@dataclass(frozen=True)
+class FrameBlock:
+    """Merged line frames (frames, rows, columns) of a part of the picture from ``origin`` (x, y) on."""
+
+    radiance: NDArray[np.float32]
+    variance: NDArray[np.float32]
+    origin: tuple[int, int]
+    rig: Rig
+    plan: CapturePlan
+
+    def holds(self, pixel: tuple[int, int]) -> bool:
+        """Whether a pixel (x, y) lies in the block with the neighbours that demosaicing needs."""
+        count = self.radiance.shape[:0:-1]
+        for at, first, many, size in zip(pixel, self.origin, count, self.plan.camera_size_px, strict=True):
+            low = first + (2 if first > 0 else 0)
+            high = first + many - (2 if first + many < size else 0)
+            if not low <= at < high:
+                return False
+        return True
+
+
+def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
+    """Read the frames around a pixel (x, y) of a result's scan; raises `StoreError`, `CalibrationError`."""
+    from dsl_core.io.scan.check import require_complete
+    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.reconstruction.merge import MergedScan
+
+    progress, reader = progress or NoProgress(), SessionReader(find_session(result))
+    require_complete(reader)
+    rig, plan = _calibration(reader, result), reader.plan
+    width, height = plan.camera_size_px
+    # Even corners keep the phase of the Bayer mosaic.
+    left, top = (max(at - HALF_PX, 0) // 2 * 2 for at in pixel)
+    rows = slice(top, min(pixel[1] + HALF_PX, height))
+    columns = slice(left, min(pixel[0] + HALF_PX, width))
+    scan = MergedScan(_Cropped(reader, rows, columns), rig)
+    shape = (plan.spectral_count, rows.stop - rows.start, columns.stop - columns.start)
+    radiance, variance = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    for k in range(shape[0]):
+        progress.report("read the frames of a pixel", k, shape[0])
+        merged = scan.merge("spectral", k)
+        radiance[k], variance[k] = merged.radiance, merged.variance
+    return FrameBlock(radiance, variance, (left, top), rig, plan)
+
+
+def _calibration(reader: SessionReader, result: ResultArrays) -> Rig:
+    """The calibration that a result was made with: the scan's own, or one of the library."""
+    from dsl_core.io.calibration_library import CalibrationLibrary
+    from dsl_core.io.scan.origin import calibration_digest, model_of_notes
+    from dsl_core.pipeline import calibration_of
+
+    digest, _ = model_of_notes(result.attributes)
+    own = reader.calibration
+    # Results of older versions do not say; most were made with the scan's own calibration.
+    if digest is None or (own is not None and calibration_digest(own) == digest):
+        return calibration_of(reader)
+    for line in CalibrationLibrary().lines():
+        if line.entry is not None and calibration_digest(line.entry.rig) == digest:
+            return line.entry.rig
+    raise CalibrationError(
+        f"{result.path.name} was made with another calibration than its scan holds, and the library does not"
+        " have it, so that nothing can be expected of a pixel. Import that calibration into the library, or"
+        " reconstruct the scan with its own."
+    )
+
+
+def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, int]) -> IntensityGraph:
+    """What a pixel (x, y) of a block saw; raises `DecodeError` when it lies outside."""
+    from dsl_core.optics.demosaic import demosaic, demosaic_variance
+
+    if not block.holds(pixel):
+        raise DecodeError(
+            f"Pixel {pixel[0]}, {pixel[1]} lies outside the frames that were read. Read its own."
+        )
+    x, y = pixel[0] - block.origin[0], pixel[1] - block.origin[1]
+    # A neighbourhood with an even corner, large enough for bilinear demosaicing.
+    left, top = max(x - 2, 0) // 2 * 2, max(y - 2, 0) // 2 * 2
+    part = np.s_[:, top : y + 3, left : x + 3]
+    bayer = block.rig.sensor.bayer
+    measured = demosaic(block.radiance[part], bayer)[:, :, y - top, x - left].T
+    variance = demosaic_variance(block.variance[part], bayer)[:, :, y - top, x - left].T
+    model, zero, orders = _expected(block, result, pixel)
+    return IntensityGraph(
+        pixel,
+        np.asarray(measured, np.float64),
+        np.sqrt(np.asarray(variance, np.float64)),
+        model,
+        zero,
+        orders,
+        result.wavelengths_nm,
+    )
+
+
+def _expected(
+    block: FrameBlock, result: ResultArrays, pixel: tuple[int, int]
+) -> tuple[Floats | None, float | None, dict[int, Floats]]:
+    """The model's signals and where in the frames each order falls, as far as the result knows."""
+    import torch
+
+    from dsl_core.io.scan.origin import model_of_notes
+    from dsl_core.model.spectral import WavelengthGrid
+    from dsl_core.optics.correspondence import correspondence
+    from dsl_core.optics.image_formation import ImageFormation, OrderPath
+    from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
+    from dsl_core.reconstruction.line_set import LineSet
+    from dsl_core.reconstruction.spectral.spectra import EDGE_PX
+    from dsl_core.reconstruction.spectral.system import ORDERS, Bands, band_halfwidth_px
+
+    depth, column = (float(result.at(name, pixel)) for name in ("depth_mm", "column_px"))
+    if not (np.isfinite(depth) and np.isfinite(column)):
+        return None, None, {}
+    rig, nm = block.rig, result.wavelengths_nm
+    step = float(nm[1] - nm[0]) if len(nm) > 1 else 5.0
+    grid = WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=step) if len(nm) > 1 else WavelengthGrid()
+    bands, lines = Bands.of(rig, grid), LineSet.of(block.plan)
+    single = lines is not None and lines.frames == lines.lines
+    size = block.plan.projector_size_px
+    flat = torch.tensor([pixel[1] * result.shape[1] + pixel[0]])
+    distance, column_px = torch.tensor([depth]), torch.tensor([[column]])
+    model, orders = correspondence(rig, model_of_notes(result.attributes)[1]), {}
+    paths = [OrderPath(column_px, torch.ones_like(column_px, dtype=torch.bool), bands.moments[0], 0.0)]
+    for order in ORDERS:
+        seen = model.trace(flat, distance, order, bands.centroids_nm[order])
+        half = band_halfwidth_px(seen.columns, step, bands.centres_nm)
+        paths.append(
+            OrderPath(seen.columns, seen.inside(*size, margin_px=EDGE_PX), bands.moments[order], half)
+        )
+        if single and lines is not None:
+            shown = model.trace(flat, distance, order, grid.centres_nm)
+            frame = (shown.columns - lines.first_px) / lines.step_px
+            orders[order] = np.where(shown.inside(*size), frame, np.nan)[:, 0].astype(np.float64)
+    zero = (column - lines.first_px) / lines.step_px if single and lines is not None else None
+    spectrum = result.at("reflectance", pixel) if result.has_spectra else np.array([np.nan])
+    shading = float(result.at("shading", pixel)) if "shading" in result.arrays else np.nan
+    if not np.isfinite(spectrum).all() or not np.isfinite(shading):
+        return None, zero, orders
+    # Demosaicing averages neighbours, which widens every line a little more.
+    blur_px = float(np.hypot(rig.projector_response.blur_px, _demosaic_blur_px(result, pixel)))
+    response = rig.projector_response.model_copy(update={"blur_px": blur_px})
+    profiles = radiance_profiles(rig, block.plan)
+    formation = ImageFormation(response, profiles, paths, torch.tensor([shading]))
+    reflectance = np.interp(bands.centres_nm, nm, spectrum).astype(np.float32)
+    signals = formation.forward(torch.as_tensor(reflectance)[:, None])[..., 0]
+    return signals.double().numpy(), zero, orders
+
+
+def _demosaic_blur_px(result: ResultArrays, pixel: tuple[int, int]) -> float:
+    """Spread of the projector columns that demosaicing averages around a pixel, px."""
+    from dsl_core.reconstruction.spectral.spectra import DEMOSAIC_SPREAD
+
+    x, y = pixel
+    near = result["column_px"][max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3]
+    change = np.abs(np.diff(near, axis=1))
+    finite = change[np.isfinite(change)]
+    return float(np.sqrt(DEMOSAIC_SPREAD) * np.median(finite)) if finite.size else 0.0

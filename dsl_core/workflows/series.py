@@ -1,0 +1,229 @@
+"""Results as a series: a flat target at positions of a stage, or scans of one scene over their seconds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from dsl_core.errors import DecodeError
+from dsl_core.progress import NoProgress, Progress
+
+if TYPE_CHECKING:
+    from dsl_core.evaluation.flat_target import FlatTarget, Region
+    from dsl_core.evaluation.summary import Truth
+    from dsl_core.evaluation.time_sweep import SweepPoint
+
+#: A number of mm in the name of a result, as in ``stage 695.2 mm.zarr``.
+_MM = re.compile(r"(?<![\d.])(\d+(?:\.\d+)?)\s?mm(?![a-z])", re.IGNORECASE)
+#: Options of the twin that say where it puts a flat target.
+_PLACES = ("position_mm", "depth_mm")
+#: Truths that differ by less are of one scene, mm.
+_SAME_MM = 1e-3
+
+
+def position_of(path: Path, attributes: Mapping[str, Any]) -> float | None:
+    """Where the stage stood, mm: from the name of the result, else from the twin that took it.
+
+    >>> position_of(Path("stage 695.2 mm.zarr"), {})
+    695.2
+    """
+    from dsl_core.io.scan.origin import rig_of_notes
+
+    named = _MM.findall(path.stem)
+    if len(named) == 1:
+        return float(named[0])
+    origin = rig_of_notes(attributes)
+    options = {} if origin is None else origin[1]
+    for text in (options[key] for key in _PLACES if key in options):
+        try:
+            return float(text)
+        except ValueError:
+            continue
+    return None
+
+
+def seconds_of(attributes: Mapping[str, Any]) -> float | None:
+    """What the capture took: exposures and, where the scan knows it, the projector's latency."""
+    from dsl_core.model.plan import CapturePlan
+
+    if "capture_seconds" in attributes:
+        return float(attributes["capture_seconds"])
+    plan = attributes.get("capture_plan")
+    return CapturePlan.model_validate_json(plan).duration_s() if plan else None
+
+
+# Depth test ----------------------------------------------------------------------------------------
+
+
+def read_target(path: Path, region: Region | None = None) -> tuple[FlatTarget, float | None]:
+    """The flat target that a result shows, and its position if that is known.
+
+    Raises `DecodeError` when it shows none, `StoreError` when it cannot be read.
+    """
+    from dsl_core.evaluation.flat_target import flat_target
+    from dsl_core.io.result.result_file import load_result
+
+    result = load_result(path)
+    if "points_mm" not in result:
+        raise DecodeError(f"{path.name} holds no points in space. Reconstruct its scan anew.")
+    flags = result["flags"].values if "flags" in result else None
+    try:
+        return flat_target(result["points_mm"].values, flags, region), position_of(path, result.attrs)
+    except DecodeError as error:
+        raise DecodeError(f"{path.name}: {error}") from error
+
+
+def read_targets(
+    paths: Sequence[Path],
+    positions_mm: Sequence[float] | None = None,
+    region: Region | None = None,
+    progress: Progress | None = None,
+) -> tuple[list[FlatTarget], list[float]]:
+    """Targets and positions of results; without ``positions_mm`` each result must know its own."""
+    if positions_mm is not None and len(positions_mm) != len(paths):
+        raise DecodeError(
+            f"{len(paths)} results and {len(positions_mm)} positions were given; give one for each."
+        )
+    progress = progress or NoProgress()
+    targets, found = [], []
+    for i, path in enumerate(paths):
+        progress.report("find planes", i, len(paths))
+        target, known = read_target(path, region)
+        if positions_mm is not None:
+            known = positions_mm[i]
+        if known is None:
+            raise DecodeError(
+                f"{path.name} does not say where the stage stood. Give the positions of all results in mm,"
+                " or write them into their names, like 'stage 695.2 mm.zarr'."
+            )
+        targets.append(target)
+        found.append(known)
+    return targets, found
+
+
+# Sweep ---------------------------------------------------------------------------------------------
+
+
+class Reference(Protocol):
+    """What the scans of a sweep are compared with."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+
+    def judge(self, path: Path, progress: Progress) -> SweepPoint:
+        """Seconds and errors of a result; raises `DecodeError` when it does not fit."""
+
+
+class TruthReference:
+    """What the twin knows of the scene; all results must show the same one."""
+
+    name = "the truth of the twin"
+
+    def __init__(self) -> None:
+        self._known: dict[object, Truth] = {}
+
+    def judge(self, path: Path, progress: Progress) -> SweepPoint:
+        """Seconds and errors against the truth."""
+        from dsl_core.evaluation.summary import evaluate
+        from dsl_core.evaluation.time_sweep import point_against_truth
+        from dsl_core.io.result.result_file import load_result
+
+        result = load_result(path)
+        progress.report("compare with the truth", 0, 1)
+        truth = self._truth(path, result)
+        return point_against_truth(path.stem, _seconds(path, result.attrs), evaluate(result, truth))
+
+    def _truth(self, path: Path, result: Any) -> Truth:
+        from dsl_core.io.scan.origin import rig_of_notes
+        from dsl_core.workflows.sessions import truth_of
+
+        bands = result["wavelength_nm"].values if "wavelength_nm" in result.coords else ()
+        key = repr((rig_of_notes(result.attrs), tuple(bands)))
+        if key not in self._known:
+            truth = truth_of(result)
+            if self._known:
+                _require_same_scene(path, next(iter(self._known.values())), truth)
+            self._known[key] = truth
+        return self._known[key]
+
+
+class ResultReference:
+    """One result that is taken for the best, such as that of the longest scan."""
+
+    def __init__(self, path: Path, progress: Progress | None = None) -> None:
+        from dsl_core.io.result.result_arrays import load_arrays
+
+        self.path, self.name = path, path.stem
+        self._arrays = load_arrays(path, progress)
+
+    def judge(self, path: Path, progress: Progress) -> SweepPoint:
+        """Seconds and differences from the reference."""
+        from dsl_core.evaluation.difference import compare_results, shared_bands
+        from dsl_core.evaluation.time_sweep import point_against_result
+        from dsl_core.io.result.result_arrays import load_arrays
+
+        if path.resolve() == self.path.resolve():
+            raise DecodeError(f"{path.name} is what the others are compared with. Name other results.")
+        mine, other = self._arrays, load_arrays(path, progress)
+        both = mine.has_spectra and other.has_spectra
+        bands = shared_bands(mine.wavelengths_nm, other.wavelengths_nm) if both else []
+        cubes = [side["reflectance"] if both else None for side in (mine, other)]
+        found = compare_results(mine["depth_mm"], other["depth_mm"], cubes[0], cubes[1], bands, progress)
+        return point_against_result(path.stem, _seconds(path, other.attributes), found)
+
+
+def read_sweep(
+    paths: Sequence[Path], against: Path | None = None, progress: Progress | None = None
+) -> tuple[list[SweepPoint], Reference]:
+    """Points of results of one scene against its truth, or against one result."""
+    from dsl_core.evaluation.time_sweep import require_sweep
+
+    progress = progress or NoProgress()
+    reference: Reference = TruthReference() if against is None else ResultReference(against, progress)
+    points = []
+    for i, path in enumerate(paths):
+        progress.report("compare results", i, len(paths))
+        points.append(reference.judge(path, progress))
+    require_sweep(points)
+    return points, reference
+
+
+def _seconds(path: Path, attributes: Mapping[str, Any]) -> float:
+    seconds = seconds_of(attributes)
+    if seconds is None:
+        raise DecodeError(
+            f"{path.name} does not say what its capture took. Reconstruct its scan anew, with its plan."
+        )
+    return seconds
+
+
+def _require_same_scene(path: Path, known: Truth, truth: Truth) -> None:
+    if known.depth_mm is None or truth.depth_mm is None:
+        return
+    if known.depth_mm.shape == truth.depth_mm.shape and np.allclose(
+        known.depth_mm, truth.depth_mm, atol=_SAME_MM, rtol=0, equal_nan=True
+    ):
+        return
+    raise DecodeError(
+        f"{path.name} shows another scene, or by another camera, than the results before it."
+        " A sweep compares scans of one scene."
+    )
+
+
+# Report --------------------------------------------------------------------------------------------
+
+
+def write_page(render: Callable[[], str], target: Path, overwrite: bool = False) -> Path:
+    """Write the page of a series whole or not at all; raises `StoreError`."""
+    from dsl_core.io.staging import check_targets, staged
+
+    check_targets([target], overwrite=overwrite)
+    page = render()
+    with staged([target], overwrite=overwrite) as (draft,):
+        draft.write_text(page, encoding="utf-8")
+    return target

@@ -1,0 +1,143 @@
+"""Scans and results that know where they come from: reopened, reconstructed and compared with their truth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.errors import CalibrationError, DecodeError, StoreError
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.pipeline import Options, calibration_of, reconstruct
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.devices.base import DeviceRig
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.evaluation.summary import Truth
+    from dsl_core.io.scan.manifest import Manifest
+
+
+def reopen_rig(folder: Path) -> DeviceRig:
+    """The rig that a session was started with; raises `StoreError` when the session does not say which."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.scan.manifest import read_manifest
+    from dsl_core.io.scan.origin import rig_of_notes
+
+    origin = rig_of_notes(read_manifest(folder).notes)
+    if origin is None:
+        raise StoreError(
+            f"{folder} does not say with which rig it was taken. Name it with --rig and --option."
+        )
+    return open_rig(*origin)
+
+
+def reconstruct_session(
+    folder: Path,
+    calibration: Rig | None = None,
+    options: Options | None = None,
+    progress: Progress | None = None,
+    timer: StageTimer | None = None,
+    override_calibration: bool = False,
+) -> xr.Dataset:
+    """The result of a complete session, with its origin and the cost of each stage among its attributes.
+
+    Raises `CalibrationError` when the scan was taken with other settings than the calibration given, unless
+    that is overridden.
+    """
+    from dsl_core.evaluation.cost import StageTimer
+    from dsl_core.io.scan.check import require_complete
+    from dsl_core.io.scan.origin import model_notes
+    from dsl_core.io.scan.session import SessionReader
+
+    reader, timer = SessionReader(folder), timer or StageTimer()
+    require_complete(reader)
+    if calibration is not None and not override_calibration:
+        _require_conditions(folder, reader.manifest, calibration)
+    rig, options = calibration_of(reader, calibration), options or Options()
+    result = reconstruct(reader, rig, options, progress, timer)
+    return result.assign_attrs(
+        {
+            **reader.manifest.notes,
+            **model_notes(rig, options.correspondence),
+            "captured": reader.manifest.created,
+            "captured_with": reader.manifest.rig_name,
+            "capture_plan": reader.plan.model_dump_json(),
+            "capture_seconds": _capture_seconds(reader.manifest),
+            "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
+        }
+    )
+
+
+def _capture_seconds(manifest: Manifest) -> float:
+    """Exposures and, where the projector is known, its latencies; pauses and retries are not counted."""
+    latency_ms = 0.0 if manifest.projector is None else manifest.projector.latency_ms
+    return round(manifest.plan.duration_s(latency_ms), 3)
+
+
+def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
+    from dsl_core.devices.conditions import conditions_of
+    from dsl_core.model.conditions import differences
+
+    if rig.conditions is None or manifest.camera is None or manifest.projector is None:
+        return
+    found = differences(rig.conditions, conditions_of(manifest.camera, manifest.projector))
+    if found:
+        raise CalibrationError(
+            f"The calibration {rig.name!r} is not for the scan {folder}: {'; '.join(found)} in the scan."
+            " Name the calibration of its rig, or use this one all the same with --override-calibration."
+        )
+
+
+def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
+    """What the twin knows of its scene; None for a real rig."""
+    from dsl_core.evaluation.summary import Truth
+    from dsl_core.simulation.sim_devices import SimCamera
+
+    if not isinstance(rig.camera, SimCamera):
+        return None
+    truth = rig.camera.world.truth
+    materials = truth.materials
+    return Truth(
+        truth.depth_mm,
+        truth.lit,
+        truth.material,
+        materials.names,
+        materials.at(grid.centres_nm),
+        materials.targets,
+    )
+
+
+def truth_of(
+    result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
+) -> Truth:
+    """Truth from the rig that took the scan, or the one named; raises `DecodeError` if there is none."""
+    from dsl_core.devices.registry import open_rig
+    from dsl_core.io.scan.origin import rig_of_notes
+
+    origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
+    if origin is None:
+        raise DecodeError(
+            "The result does not say with which rig it was taken, so that there is no truth to compare with."
+            " Name a twin of the scene with --truth-rig twin and --option."
+        )
+    with open_rig(*origin) as rig:
+        truth = twin_truth(rig, _grid_of(result))
+    if truth is None:
+        raise DecodeError(
+            f"The rig {origin[0]!r} knows no truth of its scene."
+            " Name a twin of it with --truth-rig twin and --option."
+        )
+    return truth
+
+
+def _grid_of(result: xr.Dataset) -> WavelengthGrid:
+    if "wavelength_nm" not in result.coords:
+        return WavelengthGrid()
+    nm = result["wavelength_nm"].values
+    return WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=nm[1] - nm[0])

@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.calibrate.page import CalibratePage
+from dsl_app.calibrate.wizard.window import CalibrationWizard
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.connection.state import RigChoice
+from dsl_app.rig.page import RigPage
+from dsl_app.scan.page import ScanPage
+from dsl_app.shell.application import make_window
+from dsl_app.shell.main_window import MainWindow
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from dsl_core.devices.conditions import current_conditions
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.simulation.published_rig import published_rig
+
+OPTIONS = {"scene": "plane", "size": "64x48"}
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
+    composition = Composition(Wish(RigChoice("twin", tuple(OPTIONS.items()))))
+    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    qtbot.addWidget(made)
+    made.show()
+    rig = composition.rig(made)
+    rig.connect(rig.state.choice.value)
+    qtbot.waitUntil(lambda: rig.state.devices.value is not None, timeout=60_000)
+    return made
+
+
+def idle(qtbot: QtBot, window: MainWindow) -> None:
+    qtbot.waitUntil(lambda: window.parts.runner.active == (), timeout=60_000)
+
+
+def test_the_self_test_opens_from_the_rig_page_on_the_real_twin(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    campaign = CampaignFolder.begin(tmp_path / "room", "twin", OPTIONS)
+    window.open_path(campaign.path)
+    assert window.page == "calibrate"
+    idle(qtbot, window)
+    page = window.open_page("rig")
+    assert isinstance(page, RigPage)
+    QTest.mouseClick(page.selftest, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: window.findChild(CalibrationWizard) is not None, timeout=60_000)
+    wizard = window.findChild(CalibrationWizard)
+    assert isinstance(wizard, CalibrationWizard)
+    assert wizard.windowTitle() == "Calibrate: Self-test"
+    QTest.mouseClick(wizard.buttons.all, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: wizard.fit.figures.rowCount() > 10, timeout=60_000)
+    qtbot.waitUntil(wizard.buttons.leave.isEnabled, timeout=60_000)
+    wizard.fit.allow.setChecked(True)
+    QTest.mouseClick(wizard.buttons.accept, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil((tmp_path / "room" / "report.html").is_file, timeout=60_000)
+    idle(qtbot, window)
+    wizard.reject()
+    idle(qtbot, window)
+    calibrate = window.open_page("calibrate")
+    assert isinstance(calibrate, CalibratePage)
+    assert calibrate.rows["selftest"].run.text() == "Open…"
+    assert window.parts.settings.campaign == str(tmp_path / "room")
+
+
+def test_scans_use_the_calibration_that_was_chosen(qtbot: QtBot, window: MainWindow) -> None:
+    library = CalibrationLibrary()
+    rig = published_rig()
+    library.store("room 12", rig)
+    calibrate = window.open_page("calibrate")
+    assert isinstance(calibrate, CalibratePage)
+    qtbot.waitUntil(lambda: calibrate.library.table.rowCount() == 1, timeout=60_000)
+    QTest.mouseClick(calibrate.library.use, Qt.MouseButton.LeftButton)
+    assert window.parts.settings.calibration == "room 12"
+    scan = window.open_page("scan")
+    assert isinstance(scan, ScanPage)
+    qtbot.waitUntil(lambda: scan._state.calibration.value.key == "room 12", timeout=60_000)
+    assert "--calibration 'room 12'" in scan.command_line()
+    idle(qtbot, window)
+    # An older version, once another one is current.
+    old = library.stamps("room 12")[0]
+    library.store("room 12", rig)
+    window.open_page("calibrate")
+    qtbot.waitUntil(lambda: calibrate.library.table.rowCount() == 2, timeout=60_000)
+    calibrate.library.table.selectRow(1)
+    QTest.mouseClick(calibrate.library.use, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: scan._state.calibration.value.key == f"room 12@{old}", timeout=60_000)
+    window.open_page("scan")
+    idle(qtbot, window)
+    assert scan.calibration.choice.currentData() == f"room 12@{old}"
+    scan.calibration.choice.setCurrentIndex(0)
+    scan.calibration.choice.activated.emit(0)
+    assert window.parts.settings.calibration == ""
+
+
+def test_a_scan_with_other_settings_is_refused_unless_overridden(qtbot: QtBot, window: MainWindow) -> None:
+    page = window.open_page("rig")
+    assert isinstance(page, RigPage)
+    devices = page._state.devices.value
+    assert devices is not None
+    conditions = current_conditions(devices)
+    camera = conditions.camera.model_copy(update={"binning": 2, "gain_db": 6.0})
+    other = conditions.model_copy(update={"camera": camera})
+    assert devices.calibration is not None
+    CalibrationLibrary().store("other", devices.calibration.model_copy(update={"conditions": other}))
+    window.parts.settings.calibration = "other"
+    scan = window.open_page("scan")
+    assert isinstance(scan, ScanPage)
+    qtbot.waitUntil(lambda: not scan.run.start.isEnabled(), timeout=60_000)
+    facts = scan._state.facts.value
+    assert facts is not None
+    text = " ".join(facts.obstacles)
+    assert "the camera's binning was 2 and is 1" in text.lower()
+    assert scan.calibration.override.isVisible()
+    scan.calibration.override.click()
+    assert scan.run.start.isEnabled()
+
+
+def test_a_calibration_that_is_gone_is_forgotten(qtbot: QtBot, window: MainWindow) -> None:
+    window.parts.settings.calibration = "gone"
+    scan = window.open_page("scan")
+    assert isinstance(scan, ScanPage)
+    idle(qtbot, window)
+    assert scan._state.calibration.value.key == ""
+    assert window.toasts.shown == ()

@@ -1,0 +1,162 @@
+"""Everything that can be operated has a name and says what it does, for eyes and for screen readers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from dsl_app.calibrate.campaign_box import NewCampaignDialog
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.results.export_dialog import ExportDialog
+from dsl_app.results.page import ResultsPage
+from dsl_app.shared.widgets.late import Late
+from dsl_app.shell.actions import PAGES
+from dsl_app.shell.application import make_window
+from dsl_app.shell.main_window import MainWindow
+from dsl_app.shell.toasts import Toast
+from PySide6.QtGui import QAccessible
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractItemView,
+    QAbstractSlider,
+    QAbstractSpinBox,
+    QApplication,
+    QComboBox,
+    QDialogButtonBox,
+    QDockWidget,
+    QHeaderView,
+    QLineEdit,
+    QPlainTextEdit,
+    QScrollBar,
+    QTabBar,
+    QTextBrowser,
+    QWidget,
+)
+from pytestqt.qtbot import QtBot
+
+from tests.app.small_result import write_small_result
+
+INTERACTIVE = (
+    QAbstractButton,
+    QAbstractItemView,
+    QAbstractSlider,
+    QAbstractSpinBox,
+    QComboBox,
+    QLineEdit,
+    QPlainTextEdit,
+    QTextBrowser,
+)
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> Iterator[MainWindow]:
+    composition = Composition(Wish())
+    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    qtbot.addWidget(made)
+    made.show()
+    yield made
+    made.close()
+
+
+def operable(root: QWidget) -> Iterator[QWidget]:
+    """What a person can operate below a widget, without the parts that Qt makes of its own."""
+    for widget in root.findChildren(QWidget):
+        if not isinstance(widget, INTERACTIVE) or isinstance(widget, QScrollBar | QHeaderView):
+            continue
+        if widget.objectName().startswith("qt_") or is_part(widget):
+            continue
+        yield widget
+
+
+def is_part(widget: QWidget) -> bool:
+    """Whether a widget is the inside of another one, such as the line of a spin box."""
+    parent = widget.parentWidget()
+    while parent is not None:
+        if isinstance(parent, QAbstractSpinBox | QComboBox | QLineEdit | QAbstractItemView | QTabBar):
+            return True
+        if isinstance(parent, QDockWidget) and widget.parentWidget() is parent:
+            return isinstance(widget, QAbstractButton)
+        parent = parent.parentWidget()
+    return False
+
+
+def is_standard(widget: QWidget) -> bool:
+    """Whether a button is one that every dialog of every program has, such as Cancel."""
+    box = widget.parentWidget()
+    if not isinstance(box, QDialogButtonBox) or not isinstance(widget, QAbstractButton):
+        return False
+    return box.standardButton(widget) is not QDialogButtonBox.StandardButton.NoButton
+
+
+def complaints(root: QWidget) -> list[str]:
+    found = []
+    for room in root.findChildren(Late):
+        _ = room.part
+    for widget in operable(root):
+        interface = QAccessible.queryAccessibleInterface(widget)
+        name = interface.text(QAccessible.Text.Name) if interface is not None else ""
+        what = f"{type(widget).__name__} {name or where(widget)!r}"
+        if not name:
+            found.append(f"{what} has no name")
+        if not widget.toolTip() and not is_standard(widget):
+            found.append(f"{what} has no tooltip")
+    return found
+
+
+def where(widget: QWidget) -> str:
+    parts = []
+    at: QWidget | None = widget
+    while at is not None:
+        parts.append(at.objectName() or type(at).__name__)
+        at = at.parentWidget()
+    return " < ".join(parts[:5])
+
+
+@pytest.mark.parametrize("key", [page.key for page in PAGES])
+def test_every_control_of_a_page_has_a_name_and_a_tooltip(window: MainWindow, key: str) -> None:
+    assert complaints(window.open_page(key)) == []
+
+
+def test_every_control_around_the_pages_has_a_name_and_a_tooltip(window: MainWindow) -> None:
+    window.toasts.tell("error", "A sentence", "Details")
+    window.toasts.offer("An offer", {"Take it": lambda: None})
+    window.do("tour")
+    window.do("show_log")
+    pages = [window.page_of(page.key) for page in PAGES]
+    found = [
+        each
+        for widget in window.findChildren(QWidget)
+        if widget.parentWidget() is window or isinstance(widget, Toast)
+        for each in complaints(widget)
+        if not any(page.isAncestorOf(widget) for page in pages)
+    ]
+    assert found == []
+
+
+def test_every_control_of_the_results_has_a_name_and_a_tooltip(
+    qtbot: QtBot, window: MainWindow, tmp_path: Path
+) -> None:
+    window.open_path(write_small_result(tmp_path))
+    qtbot.waitUntil(lambda: not window.parts.runner.active, timeout=20_000)
+    page = window.open_page("results")
+    assert isinstance(page, ResultsPage)
+    page.export()
+    (dialog,) = page.findChildren(ExportDialog)
+    assert complaints(dialog) == []
+    dialog.reject()
+    assert complaints(page.graph) == []
+    assert complaints(NewCampaignDialog(tmp_path, "twin", page)) == []
+    assert complaints(page) == []
+
+
+@pytest.mark.parametrize("action", ["help_page", "shortcuts", "about", "show_command"])
+def test_every_control_of_a_window_beside_has_a_name_and_a_tooltip(window: MainWindow, action: str) -> None:
+    before = set(QApplication.topLevelWidgets())
+    window.open_page("rig")
+    window.do(action)
+    opened = [each for each in QApplication.topLevelWidgets() if each not in before and each.isVisible()]
+    assert opened
+    for each in opened:
+        assert complaints(each) == []
+        each.close()

@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.scan.page import ScanPage
+from dsl_app.shell.application import make_window
+from dsl_app.shell.main_window import MainWindow
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+from shiboken6 import isValid
+
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from tests.app.scan_bench import foreseen
+
+TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
+
+
+@pytest.fixture
+def composed(qtbot: QtBot, tmp_path: Path) -> tuple[Composition, MainWindow]:
+    composition = Composition(Wish(TWIN))
+    window = make_window(composition.pages, tmp_path)
+    qtbot.addWidget(window)
+    window.show()
+    return composition, window
+
+
+def test_the_rig_is_connected_once_the_window_is_there(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow]
+) -> None:
+    composition, window = composed
+    composition.start(window)
+    rig = composition.rig(window)
+    assert rig.state.link.value is Link.CLOSED
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
+
+
+def test_every_page_opens_in_both_themes(composed: tuple[Composition, MainWindow]) -> None:
+    composition, window = composed
+    for theme in ("light", "dark"):
+        window.do(f"theme_{theme}")
+        for key in composition.pages:
+            window.do(f"page_{key}")
+            assert window.page == key
+
+
+def test_the_rig_is_remembered(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow], tmp_path: Path
+) -> None:
+    composition, window = composed
+    rig = composition.rig(window)
+    rig.connect(RigChoice("twin", (("scene", "box"), ("size", "64x48"))))
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
+    window.close()
+    assert '"scene": "box"' in (tmp_path / "settings.json").read_text()
+
+
+def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from dsl_core.planning import prediction
+
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
+
+    def predict(rig: Rig, plan: CapturePlan, view: object, latency_ms: float) -> prediction.Prediction:
+        time.sleep(0.05)
+        return foreseen(rig, plan, latency_ms)
+
+    monkeypatch.setattr(prediction, "predict", predict)
+    composition = Composition(Wish(TWIN, predicts=True))
+    window = make_window(composition.pages, tmp_path)
+    qtbot.addWidget(window)
+    window.show()
+    page = window.open_page("scan")
+    assert isinstance(page, ScanPage)
+    composition.start(window)
+    qtbot.waitUntil(lambda: len(page.forecast._state.points.value) > 3, timeout=60_000)
+    assert page.curve.marker.isVisible()
+    window.close()
+    assert list((tmp_path / "forecasts").glob("*.json"))
+
+
+def test_starting_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, dsl_app.shell.application, dsl_app.composition.window;"
+        "print([m for m in ('torch', 'scipy', 'cv2', 'xarray', 'zarr', 'pyvista') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_program_says_how_it_is_called() -> None:
+    done = subprocess.run([sys.executable, "-m", "dsl_app", "--help"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "--rig" in done.stdout
+
+
+def test_nothing_stays_on_any_screen_when_the_window_closes(
+    qtbot: QtBot, composed: tuple[Composition, MainWindow], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    composition, window = composed
+    composition.rig(window)
+    screens = composition._screens
+    assert screens is not None
+    screens.beam.show()
+    screens.identify()
+    (name,) = screens._labels
+    for shown in (screens.beam, name):
+        assert not shown.testAttribute(Qt.WidgetAttribute.WA_QuitOnClose)
+    monkeypatch.setattr(window, "_may_stop", lambda: False)
+    assert not window.close()
+    assert screens.beam.isVisible()
+    assert name.isVisible()
+    monkeypatch.undo()
+    assert window.close()
+    assert not screens.beam.isVisible()
+    assert not screens._labels
+
+
+def test_names_of_screens_leave_before_a_scan(composed: tuple[Composition, MainWindow]) -> None:
+    composition, window = composed
+    state, screens = composition.rig(window).state, composition._screens
+    assert screens is not None
+    screens.identify()
+    (name,) = screens._labels
+    state.used_by.set("Scan first")
+    assert not screens._labels
+    assert not isValid(name) or not name.isVisible()

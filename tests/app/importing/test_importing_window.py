@@ -1,0 +1,117 @@
+"""Import by mouse: a folder is dropped, looked at, taken in and opened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.importing.dialog import TakeInDialog
+from dsl_app.shell.application import make_window
+from dsl_app.shell.main_window import MainWindow
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit
+from pytestqt.qtbot import QtBot
+
+from dsl_core.io.calibration_library import CalibrationLibrary
+from tests.app.composition.test_names import complaints
+from tests.app.published_folders import Folders, make_folders
+from tests.app.shared.test_drops import drop
+
+PATIENCE_MS = 60_000
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Folders:
+    """To be read only."""
+    return make_folders(tmp_path_factory.mktemp("published"))
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MainWindow]:
+    monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
+    # What is still read when the window closes is not asked about.
+    monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
+    composition = Composition(Wish())
+    made = make_window(
+        composition.pages, tmp_path / "home", commands=composition.commands, takers=composition.takers
+    )
+    made.parts.settings.output_folder = str(tmp_path / "scans")
+    qtbot.addWidget(made)
+    made.show()
+    yield made
+    made.parts.runner.cancel_all()
+    qtbot.waitUntil(lambda: not made.parts.runner.active, timeout=PATIENCE_MS)
+    made.close()
+
+
+def opened(qtbot: QtBot, window: MainWindow) -> TakeInDialog:
+    found: list[TakeInDialog] = []
+
+    def look() -> bool:
+        found[:] = [each for each in window.findChildren(TakeInDialog) if each.isVisible()]
+        return bool(found)
+
+    qtbot.waitUntil(look, timeout=PATIENCE_MS)
+    return found[0]
+
+
+def texts(dialog: TakeInDialog, column: int) -> list[str]:
+    items = [dialog.table.item(row, column) for row in range(dialog.table.rowCount())]
+    return [item.text().replace(chr(0x200B), "") for item in items if item is not None]
+
+
+def test_a_dropped_scan_is_taken_in_and_offered(
+    qtbot: QtBot, window: MainWindow, made: Folders, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert drop(window, made.scene)
+    dialog = opened(qtbot, window)
+    assert complaints(dialog) == []
+    assert "entries are as published" in dialog._summary.text()
+    assert "optional" in texts(dialog, 2)
+    assert not dialog._size.isVisible()
+    assert not dialog.go.isEnabled()
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(made.own), ""))
+    dialog.file.click()
+    qtbot.waitUntil(lambda: dialog.go.isEnabled(), timeout=PATIENCE_MS)
+    dialog.name.selectAll()
+    QTest.keyClicks(dialog.name, "chart")
+    assert dialog.text.text() == "Makes chart.dsl."
+    QTest.mouseClick(dialog.go, Qt.MouseButton.LeftButton)
+    target = tmp_path / "scans" / "chart.dsl"
+    qtbot.waitUntil(lambda: window.page_of("results").subject() == target, timeout=PATIENCE_MS)
+    assert window.page == "results"
+    assert window.parts.settings.recent == [str(target)]
+
+
+def test_a_calibration_ends_in_the_library(
+    qtbot: QtBot, window: MainWindow, made: Folders, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(made.rig))
+    window.do("import")
+    dialog = opened(qtbot, window)
+    assert dialog._size.isVisible()
+    dialog.command.click()
+    (text,) = dialog.findChildren(QPlainTextEdit)
+    assert text.toPlainText().startswith(f"dsl-scan import {made.rig} -o ")
+    QApplication.activeModalWidget().close()  # type: ignore[union-attr]
+    QTest.mouseClick(dialog.go, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: CalibrationLibrary().names() != (), timeout=PATIENCE_MS)
+    assert window.page == "calibrate"
+
+
+def test_another_folder_is_shown_in_the_same_dialog(
+    qtbot: QtBot, window: MainWindow, made: Folders, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    window.open_path(made.rig)
+    dialog = opened(qtbot, window)
+    (tmp_path / "empty").mkdir()
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "empty"))
+    dialog.other.click()
+    qtbot.waitUntil(lambda: "is not a published dataset" in dialog.text.text(), timeout=PATIENCE_MS)
+    assert "ldr_exposure1/" in texts(dialog, 0)
+    assert dialog.name.text() == "empty"
+    assert not dialog.go.isEnabled()
+    dialog.reject()

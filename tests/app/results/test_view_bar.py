@@ -1,0 +1,145 @@
+"""The controls above the picture say what is shown, also where a result or a light comes late."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.results.controller import ResultsController
+from dsl_app.results.state import ResultsState
+from dsl_app.results.view_bar import ViewBar
+from dsl_app.session.parts import come_back_to_result, results_part
+from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.undo import UndoStack
+from pytestqt.qtbot import QtBot
+
+from dsl_core.io.result.result_file import load_result, save_result
+from tests.app.small_result import write_small_result
+from tests.app.waiting_runner import WaitingRunner
+
+
+class Bench:
+    """The bar with a controller whose jobs that compute light wait."""
+
+    def __init__(self, qtbot: QtBot) -> None:
+        self.state, self.runner, self.notifier = ResultsState(), WaitingRunner("Light"), RecordingNotifier()
+        self.control = ResultsController(self.state, self.runner, self.notifier, UndoStack())
+        self.bar = ViewBar(self.state, self.control)
+        qtbot.addWidget(self.bar)
+
+    def choose(self, light: str) -> None:
+        self.bar.light.setCurrentIndex(self.bar.light.findData(light))
+        self.bar.light.activated.emit(self.bar.light.currentIndex())
+
+    @property
+    def shown(self) -> tuple[str, bool]:
+        return self.bar.light.currentData(), self.bar.adapted.isChecked()
+
+    @property
+    def band(self) -> tuple[int, int, str]:
+        return self.bar.slider.maximum(), self.bar.slider.value(), self.bar.nm.text()
+
+    @property
+    def picture(self) -> bytes:
+        assert self.state.picture.value is not None
+        return self.state.picture.value.tobytes()
+
+
+@pytest.fixture
+def bench(qtbot: QtBot, tmp_path: Path) -> Bench:
+    made = Bench(qtbot)
+    made.control.open(write_small_result(tmp_path))
+    return made
+
+
+@pytest.fixture
+def few(bench: Bench, tmp_path: Path) -> Path:
+    """A result of twelve bands, 430 to 485 nm."""
+    path = tmp_path / "small.zarr"
+    return save_result(load_result(path).load().isel(wavelength_nm=slice(12)), tmp_path / "few.zarr")
+
+
+def test_results_with_other_numbers_of_bands_open_at_their_middle(bench: Bench, few: Path) -> None:
+    small = few.with_name("small.zarr")
+    assert bench.band == (46, 23, "545 nm")
+    bench.control.step_band(99)
+    bench.control.open(few)
+    assert (bench.state.band.value, *bench.band) == (6, 11, 6, "460 nm")
+    bench.control.step_band(99)
+    assert bench.band == (11, 11, "485 nm")
+    bench.control.open(small)
+    assert (bench.state.band.value, *bench.band) == (23, 46, 23, "545 nm")
+
+
+def test_no_band_is_asked_of_a_result_that_lacks_it(bench: Bench, few: Path) -> None:
+    def look(_: object) -> None:
+        result = bench.state.result.value
+        assert result is not None
+        result.wavelengths_nm[bench.state.band.value]
+
+    for value in (bench.state.band, bench.state.result, bench.state.picture, bench.state.search):
+        value.changed.connect(look)
+    for path in (few, few.with_name("small.zarr"), few):
+        bench.control.step_band(99)
+        bench.control.open(path)
+        assert bench.state.busy.value == ""
+
+
+def test_of_two_quick_lights_the_last_is_shown(bench: Bench) -> None:
+    bench.choose("A")
+    bench.choose("D50")
+    assert bench.shown == ("D50", True)
+    bench.runner.run(1)
+    last = bench.picture
+    bench.runner.run(0)
+    assert bench.picture == last
+    assert bench.state.light.value == "D50"
+
+
+def test_a_light_that_comes_after_another_result_is_left_out(bench: Bench, few: Path) -> None:
+    bench.choose("A")
+    bench.control.open(few)
+    before = bench.picture
+    bench.runner.run()
+    assert bench.picture == before
+    assert bench.shown == ("D65", True)
+
+
+@pytest.mark.parametrize("way", ["cancelled", "failed"])
+def test_a_light_that_does_not_come_is_not_claimed(
+    bench: Bench, way: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.choose("D50")
+    bench.runner.run()
+    before = bench.picture
+    bench.bar.adapted.click()
+    bench.choose("A")
+    if way == "cancelled":
+        for job in bench.runner.waiting:
+            job.cancel()
+    else:
+        monkeypatch.setattr("dsl_app.results.controller.picture_of", _no_memory)
+    bench.runner.run()
+    assert bench.shown == ("A", False)
+    bench.runner.run()
+    assert bench.shown == (bench.state.light.value, bench.state.adapted.value) == ("D50", True)
+    assert bench.picture == before
+
+
+def _no_memory(_: object) -> None:
+    raise MemoryError("no memory is left")
+
+
+def test_what_eyes_were_adapted_to_comes_back_with_its_tick(
+    bench: Bench, qtbot: QtBot, few: Path, tmp_path: Path
+) -> None:
+    bench.bar.adapted.click()
+    bench.control.step_band(3)
+    part = results_part(bench.state)
+    assert part is not None
+    again = Bench(qtbot)
+    come_back_to_result(part, again.control)
+    assert again.shown == ("D65", False)
+    assert again.bar.nm.text() == "560 nm"
+    again.control.open(few)
+    assert again.bar.nm.text() == "460 nm"

@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from dsl_app.connection.controller import RigController
+from dsl_app.connection.state import Link, RigChoice, RigState
+from dsl_app.rig.page import RigPage, cycles_text, parse_options
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.theme import LIGHT
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QPushButton
+from pytestqt.qtbot import QtBot
+
+Bench = tuple[RigPage, RigState, QtRunner, RecordingNotifier]
+
+
+@pytest.fixture
+def bench(qtbot: QtBot) -> Iterator[Bench]:
+    state = RigState(RigChoice("twin", (("scene", "plane"), ("size", "64x48"))))
+    runner, notifier = QtRunner(), RecordingNotifier()
+    page = RigPage(state, RigController(state, runner, notifier), ["replay", "twin"])
+    qtbot.addWidget(page)
+    page.apply_theme(LIGHT)
+    page.show()
+    yield page, state, runner, notifier
+    page.release()
+    runner.shut_down()
+
+
+def click(button: QPushButton) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)
+
+
+def connect(qtbot: QtBot, page: RigPage, state: RigState) -> None:
+    click(page._connect_button)
+    qtbot.waitUntil(lambda: state.link.value is Link.OPEN, timeout=20_000)
+
+
+def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
+    page, state, runner, _ = bench
+    assert not page._live_button.isEnabled()
+    connect(qtbot, page, state)
+    assert "64 × 48" in page._camera_text.text()
+    click(page._live_button)
+    qtbot.waitUntil(lambda: page.live.frames_per_second > 0, timeout=20_000)
+    assert page._live_button.text() == "Stop live view"
+    click(page._live_button)
+    qtbot.waitUntil(lambda: not state.live.value)
+    click(page._connect_button)
+    qtbot.waitUntil(lambda: runner.active == ())
+    assert page._camera_text.text() == "–"
+
+
+def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
+    page, _, _, notifier = bench
+    page._options.setText("scene=moon")
+    click(page._connect_button)
+    qtbot.waitUntil(lambda: bool(notifier.told))
+    assert "moon" in page._trouble.text()
+    assert page._trouble.isVisible()
+    assert page._connect_button.text() == "Connect"
+
+
+def test_pictures_reach_the_projector(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    panel = page.projector
+    panel._kind.setCurrentIndex(panel._kind.findData("line"))
+    panel._column.setValue(100)
+    devices = state.devices.value
+    assert devices is not None
+    shown = devices.projector.world.image  # type: ignore[attr-defined]
+    assert shown[0, 99:106, 0].tolist() == [0, 204, 204, 204, 204, 204, 0]
+
+
+def test_the_line_wanders_and_stops(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    page.projector._column.setValue(page.projector._column.maximum())
+    page.projector._step()
+    assert page.projector._column.value() == 0
+
+
+def test_the_wheel_changes_nothing_without_focus(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    before = page._exposure.value()
+    page._options.setFocus()
+    spot = QPointF(5, 5)
+    wheel = QWheelEvent(
+        spot, page._exposure.mapToGlobal(spot), QPoint(0, 0), QPoint(0, 120), Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    QApplication.sendEvent(page._exposure, wheel)
+    assert page._exposure.value() == before
+
+
+def test_the_page_names_its_command(bench: Bench) -> None:
+    page, _, _, _ = bench
+    assert page.command_line() == "dsl-scan selftest --rig twin --option scene=plane --option size=64x48"
+
+
+def test_options_as_people_type_them() -> None:
+    assert parse_options(" scene=box  film=off noise ") == (
+        ("scene", "box"),
+        ("film", "off"),
+        ("noise", "on"),
+    )
+
+
+def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, notifier = bench
+    connect(qtbot, page, state)
+    assert not page.live.rectangle.isVisible()
+    click(page._live_button)
+    qtbot.waitUntil(lambda: state.frame.value is not None, timeout=20_000)
+    page.live.region_box.click()
+    region = page.live.region
+    assert region is not None
+    x, y, width, height = region
+    assert (x % 2, y % 2, width % 2, height % 2) == (0, 0, 0, 0)
+    assert 0 < width < 64
+    assert 0 < height < 48
+    page.live.rectangle.setPos(-20, -20)
+    moved = page.live.region
+    assert moved is not None
+    assert moved[:2] == (0, 0)
+    page.live.rectangle.setPos(0, 0)
+    click(page.auto)
+    qtbot.waitUntil(lambda: bool(notifier.told), timeout=30_000)
+    assert "LED cycle" in page._cycles.text()
+    assert "vary" not in page._cycles.text()
+    assert page.auto.isEnabled()
+
+
+def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, _ = bench
+    connect(qtbot, page, state)
+    click(page._live_button)
+    qtbot.waitUntil(lambda: state.frame.value is not None, timeout=20_000)
+    click(page._live_button)
+    qtbot.waitUntil(lambda: not state.live.value)
+    QTest.keyClick(page.live, Qt.Key.Key_Right)
+    QTest.keyClick(page.live, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+    frame = state.frame.value
+    assert frame is not None
+    assert page.live._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN"
+    QTest.keyClick(page.live, Qt.Key.Key_F)
+
+
+def test_parts_of_a_cycle_are_named() -> None:
+    assert cycles_text(1000 / 6, 1000 / 60) == "10 LED cycles"
+    assert cycles_text(160.0, 1000 / 60) == "9.60 LED cycles: colours vary"
+    assert cycles_text(160.0, None) == ""
+
+
+def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
+    page, state, _, _ = bench
+    assert page._options.text() == "scene=plane size=64x48"
+    state.choice.set(RigChoice("replay", (("session", "first.dsl"),)))
+    assert page._rig.currentText() == "replay"
+    assert page._options.text() == "session=first.dsl"
+
+
+def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, notifier = bench
+    connect(qtbot, page, state)
+    panel = page.projector
+    panel._loop.click()
+    assert panel._timer.isActive()
+    devices = state.devices.value
+    assert devices is not None
+    state.used_by.set("Scan first")
+    assert not panel._timer.isActive()
+    assert not panel._loop.isChecked()
+    controls = (
+        panel._kind, panel._level, panel._column, panel._slider, panel._loop, panel._screen, panel._identify,
+    )  # fmt: skip
+    assert not any(widget.isEnabled() for widget in controls)
+    assert panel._note.text() == "Scan first has the projector. Pictures can be shown when it has ended."
+    state.used_by.set("")
+    assert all(widget.isEnabled() for widget in controls)
+    assert "640 × 360" in panel._note.text()
+    assert not notifier.told

@@ -1,0 +1,244 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.connection.state import RigChoice
+from dsl_app.scan.forecast.controller import NO_CALIBRATION, ForecastController
+from dsl_app.scan.forecast.job import ForecastJob, Rigging
+from dsl_app.scan.forecast.state import ForecastState, Foreseen, identity, plan_title
+from dsl_app.scan.forecast.store import ForecastStore
+from dsl_app.scan.state import Phase
+from dsl_app.shared.jobs.base import InlineRunner, Job
+
+from dsl_core.errors import PlanError
+from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
+from dsl_core.model.presets import PRESETS
+from dsl_core.model.rig import Rig
+from dsl_core.planning import prediction, views
+from tests.app.scan_bench import COMB, TWIN, ScanBench, foreseen, make_bench, make_forecast, planned_bench
+from tests.app.small_result import write_small_result
+
+
+def forecast(bench: ScanBench, folder: Path, automatic: bool = True) -> ForecastController:
+    return make_forecast(bench, ForecastState(), folder / "forecasts", automatic=automatic)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> ScanBench:
+    return planned_bench(tmp_path)
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of plans that were predicted, by a prediction that takes no time."""
+    seen = list[str]()
+
+    def predict(rig: Rig, plan: CapturePlan, *_: object, latency_ms: float) -> prediction.Prediction:
+        seen.append(plan.name)
+        if isinstance(plan.spectral, NoSpectral):
+            raise PlanError(f"The plan {plan.name!r} has no spectral patterns.")
+        return foreseen(rig, plan, latency_ms)
+
+    monkeypatch.setattr(prediction, "predict", predict)
+    return seen
+
+
+def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
+    work = ForecastJob(Rigging(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False)
+    found = work._of(COMB, ForecastStore(tmp_path, bench.calibration, 50.0), "")
+    assert isinstance(found, Foreseen)
+    assert found.expected.spectral_frames == 32
+    assert 0 < found.expected.rmse < found.expected.pixel_rmse < 1
+
+
+def test_presets_and_candidates_are_predicted_once_and_remembered(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    points = control.state.points.value
+    # The published candidate is the reference preset.
+    assert len(points) == len(PRESETS) + 1
+    assert control.state.published is not None
+    assert control.state.published.expected.frames == 716
+    assert control.state.current.value is not None
+    assert control.state.current.value.preset == "preview"
+    assert control.state.progress.value == (0, 0)
+    done = len(counted)
+    again = forecast(bench, tmp_path)
+    assert len(again.state.points.value) == len(points)
+    assert len(counted) == done
+    again.close()
+    control.close()
+
+
+def test_an_own_plan_is_predicted_when_it_is_made(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    bench.scans.plans.change_plan(COMB.model_copy(update={"spectral": LineComb(period_px=70), "name": "own"}))
+    assert counted[-1] == "own"
+    current = control.state.current.value
+    assert current is not None
+    assert current.expected.spectral_frames == 35
+
+
+def test_an_impossible_plan_says_why_until_it_is_left(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    bench.scans.plans.change_plan(COMB.model_copy(update={"spectral": NoSpectral()}))
+    assert control.state.current.value is None
+    assert "no spectral patterns" in control.state.refusal.value
+    bench.undo.undo()
+    assert [control.state.refusal.value] == [""]
+
+
+def test_wishes_choose_a_plan_or_say_what_could_be_had(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+    control.answer(budget_s=60)
+    assert "Nothing is predicted yet" in control.state.answer.value
+    control.begin()
+    control.answer(budget_s=20)
+    assert bench.state.preset is PRESETS[0]
+    assert "Preview" in control.state.answer.value
+    best = min(control.state.points.value, key=lambda each: each.expected.pixel_rmse)
+    control.answer(error=best.expected.pixel_rmse)
+    assert identity(bench.state.plan.value) == identity(best.plan)
+    control.answer(budget_s=1)
+    assert "No plan takes at most 1 s" in control.state.answer.value
+    control.answer(error=1e-6)
+    assert "the best" in control.state.answer.value
+
+
+def test_a_wish_during_a_scan_does_not_claim_a_choice(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path)
+    bench.state.phase.set(Phase.RUNNING)
+    control.answer(error=min(each.expected.pixel_rmse for each in control.state.points.value))
+    assert bench.state.preset is PRESETS[0]
+    assert "Chosen" not in control.state.answer.value
+    assert control.state.answer.value.startswith("Best would be ")
+    assert "keeps its plan" in control.state.answer.value
+
+
+def test_without_calibration_nothing_is_predicted_and_the_reason_said(
+    tmp_path: Path, counted: list[str]
+) -> None:
+    bench = make_bench(tmp_path)
+    control = forecast(bench, tmp_path)
+    assert control.state.trouble.value == ""
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("truth", "4"))))
+    assert control.state.trouble.value == NO_CALIBRATION
+    assert (control.state.points.value, counted) == ((), [])
+    bench.rig.connect(TWIN)
+    assert control.state.trouble.value == ""
+    assert control.state.points.value
+
+
+def test_another_rig_is_predicted_anew(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
+    control = forecast(bench, tmp_path)
+    first = control.state.published
+    bench.rig.connect(RigChoice("twin", (*TWIN.options, ("sigma", "0.01"))))
+    second = control.state.published
+    assert first is not None
+    assert second is not None
+    assert second.expected.pixel_rmse > 1.2 * first.expected.pixel_rmse
+
+
+def test_who_stops_it_gets_only_the_plan_at_hand(
+    bench: ScanBench, tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+    submit = control._runner.submit
+
+    def cancelled(job: Job[None]) -> Job[None]:
+        job.cancel()
+        return submit(job)
+
+    with monkeypatch.context() as stopping:
+        stopping.setattr(control._runner, "submit", cancelled)
+        control.begin()
+    assert not control.state.points.value
+    control.begin()
+    assert [point.title for point in control.state.points.value] == ["Preview"]
+
+
+def test_other_work_goes_first(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+
+    class Busy(InlineRunner):
+        @property
+        def active(self) -> tuple[Job[object], ...]:
+            return (Job("Reconstruct", lambda progress: None),)
+
+    control._runner = Busy()
+    assert control._must_wait()
+
+
+def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
+    bench: ScanBench, tmp_path: Path, counted: list[str]
+) -> None:
+    control = forecast(bench, tmp_path, automatic=False)
+    bench.scans.plans.choose_preset("quick")
+    bench.state.then_reconstruct.set(True)
+    bench.scans.start()
+    found = control.state.measured.value
+    assert found is not None
+    assert (found.name, found.frames, found.seconds) == ("first", 150, None)
+    assert found.raw_bytes == bench.state.plan.value.raw_bytes
+    assert found.computing_s is not None
+    assert found.depth_rmse_mm is not None
+    assert found.coverage is not None
+    assert found.coverage > 0.5
+
+
+def test_a_damaged_store_is_made_anew(bench: ScanBench, tmp_path: Path) -> None:
+    store = ForecastStore(tmp_path, bench.calibration, 50.0)
+    store._path.write_text("[1")
+    assert ForecastStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
+    store._path.write_text('{"a": {"frames": 1}}')
+    assert ForecastStore(tmp_path, bench.calibration, 50.0).find(COMB) is None
+
+
+def test_titles_have_typographic_signs() -> None:
+    assert plan_title(COMB) == "comb 5×2×64"
+    assert plan_title(COMB.model_copy(update={"name": "max box"})) == "max box"
+
+
+def test_the_scene_of_a_result_can_be_planned_for(
+    bench: ScanBench, tmp_path: Path, counted: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[object] = []
+
+    def scene_view(rig: Rig, result: object) -> str:
+        seen.append(result)
+        return "the scene"
+
+    monkeypatch.setattr(views, "scene_view", scene_view)
+    control = forecast(bench, tmp_path)
+    state, done = control.state, len(counted)
+    look = save_result(load_result(write_small_result(tmp_path)).load(), tmp_path / "first.zarr")
+    bench.state.result.emit(look)
+    assert state.last_look.value == look
+    control.look(look)
+    assert len(seen) == 1
+    assert len(counted) == 2 * done
+    assert len(state.points.value) == done
+    control.look(None)
+    assert len(counted) == 2 * done
+    control.look(look)
+    assert (len(seen), len(counted)) == (1, 2 * done)
+
+
+def test_a_look_of_another_size_says_so(bench: ScanBench, tmp_path: Path, counted: list[str]) -> None:
+    control = forecast(bench, tmp_path)
+    control.look(write_small_result(tmp_path))
+    assert control.state.points.value == ()
+    assert "A quick look must hold spectra at 64 x 48 pixels" in control.state.trouble.value
+    control.look(None)
+    assert [control.state.trouble.value] == [""]

@@ -1,0 +1,550 @@
+from __future__ import annotations
+
+import shutil
+import threading
+from collections import namedtuple
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from dsl_app.connection.state import Link
+from dsl_app.scan.job import ScanJob
+from dsl_app.scan.plan import connect_first
+from dsl_app.scan.rescue import ATTEMPTS, RETRY_S
+from dsl_app.scan.state import CalibrationChoice, Phase, Rescue
+
+from dsl_core.capture.status import State, Status
+from dsl_core.cli.options import PlanChoice
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import Cancelled, DecodeError, DeviceError, DslError, StoreError
+from dsl_core.io.calibration_library import LibraryEntry
+from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import LineComb, Shot
+from dsl_core.model.presets import PRESETS
+from dsl_core.simulation.sim_devices import SimCamera
+from dsl_core.workflows import sessions
+from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, SMALL, TWIN, ScanBench, make_bench, planned_bench
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> ScanBench:
+    return planned_bench(tmp_path)
+
+
+def phase(bench: ScanBench) -> Phase:
+    return bench.state.phase.value
+
+
+def fail_from(monkeypatch: pytest.MonkeyPatch, shot: int) -> None:
+    snap = SimCamera.snap
+
+    def failing(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        if self._shot >= shot:
+            raise DeviceError("The camera sent no frame. Check its cable.")
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", failing)
+
+
+def test_without_a_rig_nothing_starts_and_the_reason_is_told(tmp_path: Path) -> None:
+    bench = make_bench(tmp_path)
+    bench.scans.start()
+    assert phase(bench) is Phase.PLANNING
+    assert "Connect one on the Rig page" in bench.notifier.told[-1][1]
+
+
+def test_a_plan_is_fitted_to_the_rig_and_its_cost_is_known(bench: ScanBench) -> None:
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert bench.state.plan.value.camera_size_px == (64, 48)
+    assert (facts.frames, facts.obstacles, facts.remarks) == (FRAMES, (), ())
+    assert facts.seconds == pytest.approx(SHORT.duration_s(50.0))
+    assert 0 < facts.needed_bytes < facts.free_bytes
+
+
+def test_presets_can_be_chosen_and_taken_back(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    assert bench.state.preset is PRESETS[-1]
+    bench.undo.undo()
+    assert bench.state.preset is PRESETS[0]
+
+
+def test_the_plan_of_a_scan_at_hand_is_not_taken_back(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    bench.state.phase.set(Phase.RUNNING)
+    assert "keeps its plan" in bench.undo.undo()
+    assert bench.state.preset is PRESETS[-1]
+    bench.state.phase.set(Phase.DONE)
+    assert bench.undo.undo() == ""
+    assert bench.state.preset is PRESETS[0]
+
+
+def test_a_plan_that_comes_back_suits_the_rig_that_is_connected_now(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    bench.rig.connect(SMALL)
+    bench.undo.undo()
+    facts = bench.state.facts.value
+    assert bench.state.preset is PRESETS[0]
+    assert bench.state.plan.value.camera_size_px == (32, 24)
+    assert facts is not None
+    assert facts.obstacles == ()
+
+
+def test_a_plan_that_comes_back_has_whole_cycles_of_the_projector_of_now(bench: ScanBench) -> None:
+    bench.scans.plans.choose_preset("reference")
+    bench.state.period_ms.set(20.0)
+    bench.undo.undo()
+    assert bench.state.preset is PRESETS[0]
+    assert all(setting.exposure_ms % 20 == 0 for setting in bench.state.plan.value.settings)
+
+
+def test_an_impossible_plan_says_why(bench: ScanBench) -> None:
+    plan = SHORT.model_copy(update={"spectral": LineComb(period_px=700)})
+    bench.scans.plans.change_plan(plan)
+    bench.scans.start()
+    assert phase(bench) is Phase.PLANNING
+    assert "at most one line" in bench.notifier.told[-1][1]
+
+
+def test_a_scan_is_stored_and_the_next_has_another_name(bench: ScanBench, tmp_path: Path) -> None:
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert bench.state.status.value.done == FRAMES
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert bench.state.target.value == tmp_path / "scan-20260301-1020.dsl"
+    assert bench.state.picture.value is not None
+
+
+def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -> None:
+    bench.scans.point_at((30, 20))
+    bench.scans.start()
+    graph = bench.state.graph.value
+    assert graph is not None
+    assert graph.mean_dn.shape == (len(SHORT.settings), PATTERNS, 3)
+    brightest = graph.mean_dn[-1]
+    assert (brightest.max(0) > brightest.min(0) + 20).all()
+
+
+def test_a_result_follows_and_is_told(bench: ScanBench, tmp_path: Path) -> None:
+    results: list[Path] = []
+    bench.state.result.connect(results.append)
+    bench.scans.plans.choose_preset("quick")
+    bench.state.then_reconstruct.set(True)
+    bench.scans.start()
+    assert results == [tmp_path / "first.zarr"]
+    assert results[0].is_dir()
+
+
+@pytest.mark.parametrize(
+    ("error", "how"), [(Cancelled("Stopped."), "was cancelled"), (DecodeError("No light."), "failed")]
+)
+def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, error: DslError, how: str
+) -> None:
+    def ending(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr(sessions, "reconstruct_session", ending)
+    bench.state.then_reconstruct.set(True)
+    bench.scans.start()
+    note = bench.state.note.value
+    assert note.startswith(f"All {FRAMES} frames are stored in ")
+    assert "Reconstructing…" not in note
+    assert f"The reconstruction {how}. Open first.dsl on the Results page" in note
+
+
+def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 30)
+        bench.scans.start()
+    session = bench.state.interrupted.value
+    assert phase(bench) is Phase.LOST
+    assert session is not None
+    assert (session.done, session.total) == (30, FRAMES)
+    assert "Check its cable" in bench.state.trouble.value
+    assert f"30 of {FRAMES} frames are safe" in bench.state.trouble.value
+    assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert bench.state.trouble.value == ""
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+
+
+def test_a_scan_goes_on_over_a_damaged_frame(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, FRAMES - 3)
+        bench.scans.start()
+    reader = SessionReader(tmp_path / "first.dsl")
+    damaged = next(shot for shot in reader.plan.shots() if shot.role == "spectral")
+    path = reader.store.path(damaged.index)
+    path.write_bytes(path.read_bytes()[:-5])
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert len(SessionReader(tmp_path / "first.dsl").sound()) == FRAMES
+
+
+def test_a_scene_that_moved_meanwhile_is_refused(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 30)
+        bench.scans.start()
+    told = len(bench.notifier.told)
+    bench.rig.connect(TWIN.__class__("twin", (("scene", "box"), ("size", "64x48"))))
+    bench.scans.start()
+    assert phase(bench) is Phase.LOST
+    assert "changed since the scan stopped" in bench.state.trouble.value
+    # Its devices answer, and connecting them again would move nothing back.
+    assert (bench.rig.state.link.value, bench.state.rescue.value) == (Link.OPEN, Rescue.NONE)
+    assert len(bench.notifier.told) == told + 1
+    assert "--no-drift-check" not in bench.scans.command_line()
+    # Who knows better goes on all the same.
+    bench.state.check_drift.set(False)
+    assert bench.scans.command_line().endswith("first.dsl --no-drift-check")
+    bench.scans.start()
+    assert [phase(bench)] == [Phase.DONE]
+    assert bench.state.check_drift.value
+
+
+def test_an_interrupted_session_is_offered_and_a_complete_one_is_not(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    other = make_bench(tmp_path)
+    assert other.scans.open(tmp_path / "first.dsl")
+    facts, session = other.state.facts.value, other.state.interrupted.value
+    assert session is not None
+    assert facts is not None
+    assert facts.obstacles == (connect_first(session),)
+    assert "--option scene=color-checker" in facts.obstacles[0]
+    other.rig.connect(TWIN)
+    other.state.then_reconstruct.set(False)
+    other.scans.start()
+    assert phase(other) is Phase.DONE
+    assert not other.scans.open(tmp_path / "first.dsl")
+    assert not other.scans.open(tmp_path)
+
+
+def test_a_damaged_session_is_told(bench: ScanBench, tmp_path: Path) -> None:
+    (tmp_path / "odd.dsl").mkdir()
+    (tmp_path / "odd.dsl" / "manifest.json").write_text("{")
+    assert bench.scans.open(tmp_path / "odd.dsl")
+    assert "damaged" in bench.notifier.told[-1][1]
+
+
+def test_leaving_a_session_plans_a_new_one(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    with monkeypatch.context() as lost:
+        fail_from(lost, 10)
+        bench.scans.start()
+    bench.scans.leave_session()
+    assert bench.state.interrupted.value is None
+    assert phase(bench) is Phase.PLANNING
+    assert bench.state.target.value != tmp_path / "first.dsl"
+    assert (tmp_path / "first.dsl").is_dir()
+
+
+def test_a_full_disk_is_said_before_the_start(bench: ScanBench, monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))
+    bench.scans.start()
+    assert phase(bench) is Phase.PLANNING
+    assert "too little room" in bench.notifier.told[-1][1]
+
+
+def test_a_place_that_is_taken_is_refused(bench: ScanBench, tmp_path: Path) -> None:
+    (tmp_path / "taken.dsl").mkdir()
+    bench.scans.plans.set_target(tmp_path / "taken")
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert "exists and is no scan" in facts.obstacles[0]
+
+
+def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp_path: Path) -> None:
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    assert devices.calibration is not None
+    from dsl_core.devices.conditions import current_conditions
+
+    now = current_conditions(devices)
+    other = now.model_copy(update={"camera": now.camera.model_copy(update={"gain_db": 6.0})})
+    bench.library.store("bench", devices.calibration.model_copy(update={"conditions": other}))
+    bench.scans.plans.load_library()
+    choice = bench.state.calibrations.value[1]
+    assert choice.name == "bench"
+    bench.scans.plans.choose_calibration(choice)
+    facts = bench.state.facts.value
+    assert facts is not None
+    assert facts.settings_differ
+    assert "gain" in facts.obstacles[0]
+    bench.scans.plans.set_override(True)
+    assert "--calibration bench --override-calibration" in bench.scans.command_line()
+    bench.scans.start()
+    assert phase(bench) is Phase.DONE
+    assert "gain" in SessionReader(tmp_path / "first.dsl").manifest.notes["calibration_overridden"]
+    assert devices.calibration.conditions is None
+
+
+def test_a_calibration_chosen_during_a_scan_is_for_the_next(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    own, snap = bench.calibration, SimCamera.snap
+    bench.library.store("bench", own.model_copy(update={"name": "bench"}))
+
+    def choosing(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        bench.scans.plans.choose_calibration(CalibrationChoice("bench", "bench"))
+        return snap(self, timeout_ms)
+
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(SimCamera, "snap", choosing)
+        bench.scans.start()
+    assert [text for _, text in bench.notifier.told] == [
+        "The scan under way keeps its calibration. Scans after it use bench."
+    ]
+    taken = SessionReader(tmp_path / "first.dsl").calibration
+    assert taken is not None
+    assert taken.name == own.name
+    assert bench.state.calibration.value.key == "bench"
+    assert bench.scans.plans.calibration is not None
+    assert bench.scans.plans.calibration.name == "bench"
+
+
+def test_a_calibration_that_is_read_when_a_scan_starts_waits_for_its_end(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.library.store("bench", bench.calibration)
+    find = bench.library.find
+
+    def slow(key: str) -> LibraryEntry:
+        bench.state.phase.set(Phase.STARTING)
+        return find(key)
+
+    with monkeypatch.context() as reading:
+        reading.setattr(bench.library, "find", slow)
+        bench.scans.plans.choose_calibration(CalibrationChoice("bench", "bench"))
+    assert bench.state.calibration.value.key == ""
+    bench.state.phase.set(Phase.DONE)
+    assert bench.state.calibration.value.key == "bench"
+
+
+def test_of_two_calibrations_that_are_read_at_once_the_one_chosen_last_counts(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.library.store("slow", bench.calibration)
+    bench.library.store("quick", bench.calibration)
+    find, plans = bench.library.find, bench.scans.plans
+
+    def overtaken(key: str) -> LibraryEntry:
+        if key == "slow":
+            plans.choose_calibration(CalibrationChoice("quick", "quick"))
+        return find(key)
+
+    with monkeypatch.context() as reading:
+        reading.setattr(bench.library, "find", overtaken)
+        plans.choose_calibration(CalibrationChoice("slow", "slow"))
+    assert bench.state.calibration.value.key == "quick"
+
+
+@pytest.mark.parametrize("preset", PRESETS, ids=lambda preset: preset.key)
+def test_the_command_line_makes_the_same_plan(bench: ScanBench, preset: object, tmp_path: Path) -> None:
+    bench.scans.plans.choose_preset(preset.key)  # type: ignore[attr-defined]
+    words = bench.scans.command_line().split()
+    assert words[:3] == ["dsl-scan", "scan", str(tmp_path / "first.dsl")]
+    options = dict(zip(words[3::2], words[4::2], strict=False))
+    settings = [words[i + 1] for i, word in enumerate(words) if word == "--setting"]
+    made = PlanChoice(
+        None, options.get("--code"), options.get("--lines"), options.get("--comb"), settings
+    ).build()
+    wanted = bench.state.plan.value
+    assert (made.code, made.spectral, made.code_settings) == (
+        wanted.code,
+        wanted.spectral,
+        wanted.code_settings,
+    )
+    assert [s.exposure_ms for s in made.settings] == pytest.approx(
+        [s.exposure_ms for s in wanted.settings], rel=1e-11
+    )
+
+
+def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    write = SessionWriter.write
+
+    def full(self: SessionWriter, shot: Shot, frame: Frame) -> None:
+        if shot.index >= 20:
+            raise StoreError("The disk is full. Free some space.")
+        write(self, shot, frame)
+
+    with monkeypatch.context() as filling:
+        filling.setattr(SessionWriter, "write", full)
+        bench.scans.start()
+    assert phase(bench) is Phase.LOST
+    assert "The disk is full" in bench.state.trouble.value
+    assert (bench.rig.state.link.value, bench.state.rescue.value) == (Link.OPEN, Rescue.NONE)
+    assert f"20 of {FRAMES} frames are safe" in bench.state.trouble.value
+    bench.scans.start()
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+
+
+@dataclass
+class Outage:
+    """A scan whose camera is gone after two frames, and stays so until it is plugged in."""
+
+    bench: ScanBench
+    now_s: float = 0.0
+    is_gone: bool = True
+    links: list[Link] = field(default_factory=list)
+
+    @property
+    def rescue(self) -> Rescue:
+        return self.bench.state.rescue.value
+
+    @property
+    def link(self) -> Link:
+        return self.bench.rig.state.link.value
+
+    @property
+    def told(self) -> str:
+        return self.bench.state.trouble.value
+
+    def wait(self, seconds: float) -> None:
+        self.now_s += seconds
+        self.bench.scans.take_news()
+
+
+@pytest.fixture
+def outage(bench: ScanBench, monkeypatch: pytest.MonkeyPatch) -> Outage:
+    made, snap = Outage(bench), SimCamera.snap
+
+    def failing(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        if made.is_gone and not 0 <= self._shot < 2:
+            raise DeviceError("The camera sent no frame. Check its cable.")
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", failing)
+    monkeypatch.setattr(bench.scans._rescuer, "_clock", lambda: made.now_s)
+    bench.rig.state.link.changed.connect(made.links.append)
+    bench.scans.start()
+    return made
+
+
+def test_a_lost_rig_is_connected_again_a_few_times_and_no_more(outage: Outage) -> None:
+    bench = outage.bench
+    devices = bench.rig.state.devices
+    assert outage.links == [Link.LOST, Link.OPENING, Link.LOST]
+    assert (outage.rescue, devices.value) == (Rescue.TRYING, None)
+    assert "Check its cable" in bench.rig.state.trouble.value
+    assert outage.told.endswith(f"Connecting the rig again, attempt 1 of {ATTEMPTS}.")
+    outage.wait(RETRY_S / 2)
+    assert "attempt 1" in outage.told
+    for attempt in range(2, ATTEMPTS + 1):
+        outage.wait(RETRY_S)
+        assert (outage.link, f"attempt {attempt} of" in outage.told) == (Link.LOST, attempt < ATTEMPTS)
+    assert outage.rescue is Rescue.GIVEN_UP
+    assert outage.told.endswith("could not be connected again: The camera sent no frame. Check its cable.")
+    assert [level for level, _ in bench.notifier.told] == ["error", "error"]
+    outage.is_gone = False
+    outage.wait(10 * RETRY_S)
+    assert outage.rescue is Rescue.GIVEN_UP
+    bench.scans.resume()
+    assert (phase(bench), outage.rescue, outage.link) == (Phase.DONE, Rescue.NONE, Link.OPEN)
+
+
+def test_a_rig_that_comes_back_goes_on_only_when_asked(outage: Outage) -> None:
+    bench = outage.bench
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (phase(bench), outage.rescue, outage.link) == (Phase.LOST, Rescue.BACK, Link.OPEN)
+    assert f"2 of {FRAMES} frames are safe" in outage.told
+    assert outage.told.endswith("The rig is connected again.")
+    bench.scans.resume()
+    assert (phase(bench), outage.told) == (Phase.DONE, "")
+
+
+def test_who_wishes_so_finds_the_scan_gone_on(outage: Outage) -> None:
+    bench = outage.bench
+    bench.scans.resume()
+    assert outage.rescue is Rescue.RESUMING
+    assert "attempt 2 of" in outage.told
+    assert outage.told.endswith("The scan goes on by itself when it answers.")
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert phase(bench) is Phase.DONE
+    assert ("info", "The rig is connected again. The scan goes on.") in bench.notifier.told
+
+
+def test_no_attempt_follows_a_stop(outage: Outage) -> None:
+    outage.bench.scans.stop_reconnecting()
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (outage.rescue, outage.link) == (Rescue.GIVEN_UP, Link.LOST)
+    assert outage.told.endswith("The rig is no longer being connected.")
+
+
+def test_a_rig_that_a_person_connects_is_back_too(outage: Outage) -> None:
+    outage.bench.scans.resume()
+    outage.is_gone = False
+    outage.bench.rig.connect(TWIN)
+    # It may be another rig than the one that was wished for.
+    assert (phase(outage.bench), outage.rescue) == (Phase.LOST, Rescue.BACK)
+
+
+def test_a_rig_is_not_connected_again_for_a_scan_that_was_left(outage: Outage) -> None:
+    outage.bench.scans.leave_session()
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (outage.rescue, outage.link, outage.told) == (Rescue.NONE, Link.LOST, "")
+
+
+def test_who_stops_a_lost_scan_does_not_find_it_gone_on(outage: Outage) -> None:
+    bench = outage.bench
+    bench.scans.resume()
+    assert outage.rescue is Rescue.RESUMING
+    bench.scans.cancel()
+    outage.is_gone = False
+    outage.wait(10 * RETRY_S)
+    assert (phase(bench), outage.link) == (Phase.LOST, Link.LOST)
+    assert "No scan is under way." not in [text for _, text in bench.notifier.told]
+
+
+def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
+    bench: ScanBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states: list[State] = []
+    calibrate, listen = ScanJob._calibrate, ScanJob._listen
+
+    def prepare(job: ScanJob, devices: DeviceRig) -> dict[str, str]:
+        job.pause()
+        threading.Timer(0.3, job.go_on).start()
+        return calibrate(job, devices)
+
+    def hear(job: ScanJob, status: Status) -> None:
+        states.append(status.state)
+        listen(job, status)
+
+    monkeypatch.setattr(ScanJob, "_calibrate", prepare)
+    monkeypatch.setattr(ScanJob, "_listen", hear)
+    bench.scans.start()
+    assert states.index(State.PAUSED) < states.index(State.RUNNING)
+    assert phase(bench) is Phase.DONE
+
+
+def test_another_scan_that_is_opened_does_not_go_on_by_itself(outage: Outage, tmp_path: Path) -> None:
+    bench = outage.bench
+    shutil.copytree(tmp_path / "first.dsl", tmp_path / "other.dsl")
+    bench.scans.resume()
+    assert not bench.scans.open(tmp_path)
+    assert outage.rescue is Rescue.RESUMING
+    assert bench.scans.open(tmp_path / "other.dsl")
+    outage.is_gone = False
+    outage.wait(RETRY_S)
+    assert (phase(bench), outage.rescue, outage.told) == (Phase.LOST, Rescue.NONE, "")

@@ -1,0 +1,397 @@
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.connection.state import Link
+from dsl_app.scan import rescue
+from dsl_app.scan.effects.controller import EffectsController
+from dsl_app.scan.effects.state import EffectsState
+from dsl_app.scan.forecast.controller import ForecastController
+from dsl_app.scan.forecast.panel import ForecastPanel
+from dsl_app.scan.forecast.state import ForecastState
+from dsl_app.scan.page import ScanPage
+from dsl_app.scan.state import LivePicture, Phase
+from dsl_app.scan.view import FramePicture
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.theme import DARK, LIGHT
+from dsl_app.shared.widgets.figure_file import save_figure
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QFileDialog
+from pytestqt.qtbot import QtBot
+
+from dsl_core.errors import DeviceError
+from dsl_core.io.scan.session import SessionReader
+from dsl_core.model.frames import Frame
+from dsl_core.model.plan import LineComb
+from dsl_core.model.presets import PRESETS
+from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.scan_bench import FRAMES, SHORT, TWIN, ScanBench, foreseen, make_bench, make_forecast
+
+Bench = tuple[ScanPage, ScanBench, list[Path]]
+
+
+@pytest.fixture
+def ready(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
+    runner = QtRunner()
+    bench = make_bench(tmp_path, runner)
+    opened: list[Path] = []
+    expected = ForecastState()
+    forecast = make_forecast(bench, expected, tmp_path / "forecasts", runner)
+    rendered = EffectsState()
+    effects = EffectsController(rendered, bench.state, bench.rig, runner, bench.notifier)
+    page = ScanPage(
+        bench.state,
+        bench.scans,
+        ForecastPanel(expected, forecast),
+        rendered,
+        effects,
+        opened.append,
+    )
+    qtbot.addWidget(page)
+    page.apply_theme(LIGHT)
+    page.resize(1200, 800)
+    page.show()
+    bench.rig.connect(TWIN)
+    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=60_000)
+    bench.plan()
+    qtbot.waitUntil(lambda: runner.active == ())
+    yield page, bench, opened
+    page.release()
+    runner.shut_down()
+
+
+def click(button: object) -> None:
+    QTest.mouseClick(button, Qt.MouseButton.LeftButton)  # type: ignore[call-overload]
+
+
+def in_phase(bench: ScanBench, phase: Phase) -> Callable[[], bool]:
+    return lambda: bench.state.phase.value is phase
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    snap = SimCamera.snap
+
+    def slowly(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        time.sleep(0.01)
+        return snap(self, timeout_ms)
+
+    monkeypatch.setattr(SimCamera, "snap", slowly)
+
+
+def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path: Path) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(page.run.pause.isEnabled, timeout=60_000)
+    assert not page.plan.isEnabled()
+    click(page.run.pause)
+    qtbot.waitUntil(in_phase(bench, Phase.PAUSED), timeout=60_000)
+    assert page.run.pause.text() == "&Go on"
+    click(page.run.pause)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert page.plan.isEnabled()
+    assert f"{FRAMES} of {FRAMES}" in page.run._what.text()
+
+
+def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(lambda: bench.state.status.value.done > 3, timeout=60_000)
+    click(page.run.cancel)
+    qtbot.waitUntil(in_phase(bench, Phase.STOPPED), timeout=2_000)
+    assert page.run.start.text() == "&Resume scan"
+    assert page.run.renew.isVisible()
+    assert page.run.drift.isVisible()
+    page.run.drift.setChecked(False)
+    assert not bench.state.check_drift.value
+    click(page.run.start)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert not page.run.drift.isVisible()
+    assert page.run.drift.isChecked()
+
+
+def test_a_second_scan_is_refused_in_a_sentence(qtbot: QtBot, ready: Bench, slow: None) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    assert page.middle.currentWidget() is page.view
+    assert not page.run.start.isEnabled()
+    bench.scans.start()
+    assert "A scan is running" in bench.notifier.told[-1][1]
+    assert bench.scans.open(Path("x.dsl")) is False
+
+
+def test_a_lost_camera_is_said_over_the_page(
+    qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, bench, _ = ready
+    monkeypatch.setattr(rescue, "RETRY_S", 0.0)
+    monkeypatch.setattr(rescue, "ATTEMPTS", 1000)
+
+    def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        raise DeviceError("The camera sent no frame. Check its cable.")
+
+    with monkeypatch.context() as lost:
+        lost.setattr(SimCamera, "snap", silent)
+        click(page.run.start)
+        qtbot.waitUntil(in_phase(bench, Phase.LOST), timeout=60_000)
+        assert page.banner.isVisible()
+        assert "Check its cable" in page.banner.text
+        # The page itself makes one attempt after another.
+        qtbot.waitUntil(lambda: "attempt 1 of" not in page.banner.text, timeout=60_000)
+        assert page.banner.action.text() == "Reconnect and resume"
+        assert page.stop.isVisible()
+        click(page.stop)
+        assert not page.stop.isVisible()
+        assert "no longer" in page.banner.text
+        qtbot.waitUntil(lambda: bench.rig.state.link.value is Link.LOST)
+    click(page.banner.action)
+    assert not page.banner.action.isEnabled()
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert not page.banner.isVisible()
+
+
+def test_closing_the_window_during_a_scan_loses_no_frame(qtbot: QtBot, tmp_path: Path, slow: None) -> None:
+    runner = QtRunner()
+    bench = make_bench(tmp_path, runner)
+    bench.rig.connect(TWIN)
+    qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=60_000)
+    bench.plan()
+    bench.scans.start()
+    seen = 0
+
+    def begun() -> bool:
+        nonlocal seen
+        bench.scans.take_news()
+        seen = bench.state.status.value.done
+        return seen > 2
+
+    qtbot.waitUntil(begun, timeout=60_000)
+    bench.scans.pause()
+    runner.shut_down()
+    reader = SessionReader(tmp_path / "first.dsl")
+    assert len(list(reader.plan.shots())) - len(reader.missing()) >= seen
+
+
+def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
+    page, bench, _ = ready
+    page.plan.step.setValue(3)
+    spectral = bench.state.plan.value.spectral
+    assert isinstance(spectral, LineComb)
+    # As near to the preset's period as whole steps come.
+    assert isinstance(SHORT.spectral, LineComb)
+    assert spectral.step_px == 3
+    assert spectral.period_px == 3 * round(SHORT.spectral.period_px / 3)
+    assert page.plan.period.value() == spectral.period_px
+    assert page.plan.preset.currentText() == "Own plan"
+
+
+def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
+    page, bench, _ = ready
+    exposure, _ = page.plan.settings._rows[0]
+    exposure.setValue(95.0)
+    assert bench.state.plan.value.settings[0].exposure_ms == pytest.approx(6 * 1000 / 60)
+    assert exposure.value() == pytest.approx(100.0)
+    page.plan.settings._add()
+    assert len(page.plan.settings._rows) == 3
+    assert bench.state.plan.value.code_settings == (0, 1, 2)
+    page.plan.settings._remove(0)
+    assert len(bench.state.plan.value.settings) == 2
+
+
+def test_an_override_is_shown_as_it_is(ready: Bench) -> None:
+    page, bench, _ = ready
+    bench.scans.plans.set_override(True)
+    assert page.calibration.override.isChecked()
+    assert page.calibration.override.isVisible()
+    page.calibration.override.click()
+    assert not bench.state.override.value
+
+
+def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> None:
+    page, _, _ = ready
+    page.plan.step.setValue(9)
+    assert not page.run.start.isEnabled()
+    assert "leave columns between them dark" in page.run._text.text()
+
+
+def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    QTest.keyClick(page.view.part.picture, Qt.Key.Key_Right)
+    QTest.keyClick(page.view.part.picture, Qt.Key.Key_Down)
+    assert bench.state.cursor.value == (36, 28)
+    assert "Intensity graph at 36, 28" in page.view.part.graph._title.text()
+
+
+@pytest.fixture
+def predicted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Predictions that take no time."""
+    from dsl_core.planning import prediction
+
+    monkeypatch.setattr(
+        prediction, "predict", lambda rig, plan, view, latency_ms: foreseen(rig, plan, latency_ms)
+    )
+
+
+def figures(page: ScanPage, column: int) -> dict[str, str]:
+    table = page.forecast.table
+    cells = [(table.item(row, 0), table.item(row, column)) for row in range(table.rowCount())]
+    return {name.text(): value.text() for name, value in cells if name is not None and value is not None}
+
+
+def begin(qtbot: QtBot, page: ScanPage) -> ForecastState:
+    control = page.forecast._commands
+    assert isinstance(control, ForecastController)
+    control.begin()
+    qtbot.waitUntil(lambda: control.state.progress.value == (0, 0), timeout=60_000)
+    return control.state
+
+
+def test_nothing_is_shown_before_it_is_predicted(ready: Bench) -> None:
+    page, _, _ = ready
+    assert set(figures(page, 1).values()) == {"–"}
+    assert "Nothing is predicted yet" in page.forecast._note.text()
+    assert not page.forecast.ask.isEnabled()
+
+
+def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
+    qtbot: QtBot, ready: Bench, predicted: None
+) -> None:
+    page, bench, _ = ready
+    state = begin(qtbot, page)
+    curve = page.curve
+    assert figures(page, 1)["Frames"] == str(FRAMES)
+    assert figures(page, 2)["Frames"] == "716"
+    assert figures(page, 2)["Capture"] == "3.6 min"
+    published = state.published
+    assert published is not None
+    at = curve.spot(published)
+    assert at is not None
+    # A drag moves the marker many times before it is dropped.
+    curve.marker.moving = True
+    curve.marker.setPos(at[0] - 0.004, at[1])
+    curve.marker.sigPositionChanged.emit(curve.marker)
+    assert figures(page, 1)["Frames"] == "716"
+    assert bench.state.preset is PRESETS[0]
+    curve.marker.sigPositionChangeFinished.emit(curve.marker)
+    assert bench.state.preset is PRESETS[-1]
+    assert page.plan.preset.currentData() == "reference"
+    assert curve.marker.pos() == QPointF(*at)
+
+
+def test_arrow_keys_walk_along_the_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, bench, _ = ready
+    state = begin(qtbot, page)
+    page.curve.plot.setFocus()
+    QTest.keyClick(page.curve.plot, Qt.Key.Key_Right)
+    current = state.current.value
+    assert current is not None
+    assert current in page.curve.front()
+    assert current.expected.seconds > SHORT.duration_s(50.0)
+    QTest.keyClick(page.curve.plot, Qt.Key.Key_Left)
+    assert bench.state.preset is PRESETS[0]
+
+
+def test_a_wish_for_time_is_answered(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, bench, _ = ready
+    begin(qtbot, page)
+    page.forecast.budget.setValue(100)
+    click(page.forecast.ask)
+    assert bench.state.preset is not None
+    assert bench.state.preset.key == "coarse"
+    assert "Chosen: Coarse, 90 s" in page.forecast._answer.text()
+    page.forecast.wish.setCurrentIndex(1)
+    assert page.forecast.error.isVisible()
+    page.forecast.error.setValue(0.001)
+    click(page.forecast.ask)
+    assert "No plan is expected to reach" in page.forecast._answer.text()
+
+
+def test_nothing_is_asked_for_while_a_scan_runs(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, bench, _ = ready
+    state = begin(qtbot, page)
+    bench.state.phase.set(Phase.RUNNING)
+    # News of predictions come while it runs.
+    state.progress.set((1, 7))
+    boxes = (page.forecast.ask, page.forecast.wish, page.forecast.budget, page.forecast.error)
+    assert not any(box.isEnabled() for box in boxes)
+    bench.state.phase.set(Phase.DONE)
+    assert all(box.isEnabled() for box in boxes)
+    state.progress.set((0, 0))
+
+
+def test_every_figure_has_its_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
+    page, _, _ = ready
+    begin(qtbot, page)
+    for index in range(page.curve.figure.count()):
+        page.curve.figure.setCurrentIndex(index)
+        assert len(page.curve.front()) >= 1
+        assert page.curve.marker.isVisible()
+
+
+def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> None:
+    page, bench, _ = ready
+    click(page.run.start)
+    qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
+    assert figures(page, 3)["Frames"] == str(FRAMES)
+    # The twin does not wait for exposures.
+    assert figures(page, 3)["Capture"] == "–"
+
+
+def test_a_plan_is_saved_and_opened_by_the_buttons(
+    qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    page, bench, _ = ready
+    path = str(tmp_path / "mine.json")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (path, ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (path, ""))
+    click(page.plan.save)
+    qtbot.waitUntil((tmp_path / "mine.json").is_file)
+    bench.scans.plans.choose_preset("quick")
+    click(page.plan.open)
+    qtbot.waitUntil(lambda: bench.state.preset is PRESETS[0])
+    assert page.plan.preset.currentData() == "preview"
+
+
+def test_a_scan_of_another_picture_size_fills_the_view(qtbot: QtBot) -> None:
+    picture = FramePicture()
+    qtbot.addWidget(picture)
+    picture.resize(600, 400)
+    picture.show()
+    shot = next(iter(SHORT.shots()))
+    for width, height, cell_px in ((48, 32, 2), (600, 400, 2), (600, 400, 4), (30, 20, 2)):
+        seen = LivePicture(shot, np.zeros((height, width, 3), np.uint8), cell_px)
+        picture.show_picture(seen, SHORT)
+        view = picture.box.viewRect()
+        assert view.contains(QRectF(0, 0, width * cell_px, height * cell_px))
+        assert view.height() < 1.2 * height * cell_px
+
+
+def test_arrow_keys_come_back_into_a_smaller_picture(qtbot: QtBot) -> None:
+    picture = FramePicture()
+    qtbot.addWidget(picture)
+    shot = next(iter(SHORT.shots()))
+    picture.show_picture(LivePicture(shot, np.zeros((20, 30, 3), np.uint8), 2), SHORT)
+    picture.show_cursor((500, 10))
+    with qtbot.waitSignal(picture.pointed) as pointed:
+        QTest.keyClick(picture, Qt.Key.Key_Left)
+    assert pointed.args == [(55, 10)]
+
+
+def test_the_curve_is_saved_as_a_figure(qtbot: QtBot, ready: Bench, predicted: None, tmp_path: Path) -> None:
+    page, _, _ = ready
+    plot = page.curve.plot
+    assert page.figure() is None
+    begin(qtbot, page)
+    figure = page.figure()
+    assert figure is not None
+    save_figure(figure, tmp_path / "curve.svg", DARK)
+    assert "Time on the rig" in (tmp_path / "curve.svg").read_text("utf-8")
+    assert plot.backgroundBrush().color().name() == DARK.base

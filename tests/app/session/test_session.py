@@ -1,0 +1,306 @@
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dsl_app.compare.page import ComparePage
+from dsl_app.compare.pair.controller import CompareController
+from dsl_app.compare.pair.state import CompareState
+from dsl_app.compare.series.controller import SeriesController
+from dsl_app.compare.series.state import Kind, SeriesState
+from dsl_app.composition.window import Composition, Wish
+from dsl_app.results.controller import ResultsController
+from dsl_app.results.state import Quality, ResultsState, View
+from dsl_app.session.keeper import SessionKeeper, is_running
+from dsl_app.session.parts import (
+    come_back_to_comparison,
+    come_back_to_result,
+    come_back_to_scan,
+    come_back_to_series,
+    compare_part,
+    results_part,
+    scan_part,
+    series_part,
+)
+from dsl_app.session.records import ResultsPart, ScanPart, SeriesPart, Session
+from dsl_app.shared.evented import Value
+from dsl_app.shared.jobs.base import InlineRunner
+from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.undo import UndoStack
+from dsl_app.shell.application import make_window
+from PySide6.QtWidgets import QApplication, QPushButton
+from pytestqt.qtbot import QtBot
+
+from dsl_core.errors import DeviceError
+from dsl_core.evaluation.time_sweep import FIGURES
+from dsl_core.model.frames import Frame
+from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.scan_bench import make_bench
+from tests.app.small_result import write_small_result
+from tests.cases.stage_series import write_stage, write_sweep
+
+#: A number that no process has.
+NOBODY = 2**30
+LEAF = Session(page="results", results=ResultsPart(path=Path("leaf.zarr")))
+
+
+@pytest.fixture
+def gone() -> int:
+    """The number of a process that ended."""
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    return ended.pid
+
+
+def test_a_session_is_written_only_after_a_change(tmp_path: Path) -> None:
+    keeper = SessionKeeper(tmp_path / "sessions", lambda: LEAF, process=7)
+    keeper.save()
+    assert not (tmp_path / "sessions").exists()
+    band = Value(1)
+    keeper.watch(band)
+    band.set(2)
+    assert keeper.save() == ""
+    (file,) = (tmp_path / "sessions").iterdir()
+    assert Session.model_validate_json(file.read_bytes()) == LEAF
+    keeper.end()
+    assert not file.exists()
+
+
+def test_what_a_crash_left_is_found_once(tmp_path: Path, gone: int) -> None:
+    crashed = SessionKeeper(tmp_path, lambda: LEAF, process=gone)
+    crashed.touch()
+    crashed.save()
+    keeper = SessionKeeper(tmp_path, Session)
+    assert keeper.left_behind() == (LEAF, "")
+    assert keeper.left_behind() == (None, "")
+
+
+def test_what_a_running_program_has_open_is_left_to_it(tmp_path: Path) -> None:
+    other = SessionKeeper(tmp_path, lambda: LEAF, process=os.getpid())
+    other.touch()
+    other.save()
+    assert is_running(os.getpid())
+    assert SessionKeeper(tmp_path, Session, process=NOBODY).left_behind() == (None, "")
+
+
+def test_a_damaged_session_is_put_aside_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / f"session-{NOBODY}.json").write_text('{"results": {"path": ')
+    found, trouble = SessionKeeper(tmp_path, Session).left_behind()
+    assert found is None
+    assert "could not be read" in trouble
+    assert (tmp_path / f"session-{NOBODY}.damaged.json").exists()
+    assert SessionKeeper(tmp_path, Session).left_behind() == (None, "")
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
+    (tmp_path / "sessions").write_text("a file in the way")
+    sessions = iter([LEAF, Session(page="scan")])
+    keeper = SessionKeeper(tmp_path / "sessions", lambda: next(sessions), process=7)
+    keeper.touch()
+    assert "cannot be kept" in keeper.save()
+    keeper.touch()
+    assert keeper.save() == ""
+
+
+def test_a_result_is_looked_at_as_before(tmp_path: Path) -> None:
+    path = write_small_result(tmp_path)
+
+    def opened() -> ResultsController:
+        return ResultsController(ResultsState(), InlineRunner(), RecordingNotifier(), UndoStack())
+
+    first = opened()
+    assert results_part(first.state) is None
+    first.open(path)
+    first.step_band(-5)
+    first.point_at((7, 8))
+    first.marks.pin((7, 8))
+    first.show(View.QUALITY)
+    first.state.quality.set(Quality.SHARE)
+    first.limit_depth((705.0, 710.0))
+    first.relight("A", adapted=False)
+    part = results_part(first.state)
+    assert part is not None
+    again = opened()
+    come_back_to_result(part, again)
+    assert results_part(again.state) == part
+    assert [mark.pixel for mark in again.state.marks.value] == [(7, 8)]
+
+
+def test_a_plan_comes_back(tmp_path: Path) -> None:
+    first = make_bench(tmp_path)
+    assert scan_part(first.state) is None
+    first.plan()
+    first.scans.plans.set_target(tmp_path / "leaf.dsl")
+    first.scans.plans.set_override(True)
+    part = scan_part(first.state)
+    assert part is not None
+    again = make_bench(tmp_path)
+    come_back_to_scan(part, again.scans)
+    assert again.state.plan.value == first.state.plan.value
+    assert again.state.target.value == tmp_path / "leaf.dsl"
+    assert not again.state.then_reconstruct.value
+    # Nobody overrides a check unasked.
+    assert not again.state.override.value
+
+
+def test_a_scan_that_the_crash_interrupted_can_be_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = make_bench(tmp_path)
+    first.rig.connect(first.rig.state.choice.value)
+    first.plan()
+    parts: list[ScanPart | None] = []
+
+    def crash(camera: SimCamera, timeout_ms: float = 5000.0) -> Frame:
+        parts.append(scan_part(first.state))
+        raise DeviceError("The power failed.")
+
+    monkeypatch.setattr(SimCamera, "snap", crash)
+    first.scans.start()
+    assert parts[0] is not None
+    again = make_bench(tmp_path)
+    come_back_to_scan(parts[0], again.scans)
+    session = again.state.interrupted.value
+    assert session is not None
+    assert session.folder == tmp_path / "first.dsl"
+
+
+def test_a_comparison_comes_back(tmp_path: Path) -> None:
+    (tmp_path / "b").mkdir()
+    a, b = write_small_result(tmp_path), write_small_result(tmp_path / "b")
+
+    def compared() -> CompareController:
+        return CompareController(CompareState(), InlineRunner(), RecordingNotifier())
+
+    first = compared()
+    assert compare_part(first.state) is None
+    first.open(a)
+    first.open(b)
+    part = compare_part(first.state)
+    assert part is not None
+    again = compared()
+    come_back_to_comparison(part, again)
+    assert again.state.pair.value is not None
+    assert compare_part(again.state) == part
+
+
+def several() -> SeriesController:
+    return SeriesController(SeriesState(), InlineRunner(), RecordingNotifier(), UndoStack())
+
+
+def test_a_depth_test_comes_back_with_its_positions_and_region(tmp_path: Path) -> None:
+    stage = [write_stage(tmp_path, position) for position in (700.0, 725.0, 750.0)]
+    first = several()
+    assert series_part(first.state) is None
+    first.add(stage)
+    first.set_position(stage[1], 726.0)
+    first.set_region((10, 6, 24, 20))
+    part = series_part(first.state)
+    assert part is not None
+    assert Session(series=part).names == ("a series of 3 results",)
+    assert Session(series=SeriesPart(rows=part.rows[:1])).names == ("a series of 1 result",)
+    again = several()
+    come_back_to_series(SeriesPart.model_validate_json(part.model_dump_json()), again)
+    assert series_part(again.state) == part
+    assert again.state.test.value == first.state.test.value is not None
+
+
+def test_a_sweep_comes_back_without_what_is_gone(tmp_path: Path) -> None:
+    reference, *scans = write_sweep(tmp_path)
+    first = several()
+    first.ask(Kind.SWEEP)
+    first.add([reference, *scans])
+    first.compare_with(reference)
+    first.show_figure(FIGURES[1])
+    part = series_part(first.state)
+    assert part is not None
+    shutil.rmtree(scans[0])
+    again = several()
+    come_back_to_series(part, again)
+    assert [row.path for row in again.state.rows.value] == [reference, *scans[1:]]
+    assert (again.state.against.value, again.state.figure.value) == (reference, FIGURES[1])
+    assert scans[0].name in again._notifier.told[-1][1]  # type: ignore[attr-defined]
+
+
+class Bench:
+    """A program that runs in a folder."""
+
+    def __init__(self, qtbot: QtBot, folder: Path) -> None:
+        self.composition = Composition(Wish())
+        self.window = make_window(self.composition.pages, folder, commands=self.composition.commands)
+        qtbot.addWidget(self.window)
+        self.window.show()
+        self.desk = self.composition.session(self.window)
+
+    def button(self, text: str) -> QPushButton:
+        found = [
+            button
+            for toast in self.window.toasts.shown
+            for button in toast.findChildren(QPushButton)
+            if button.text() == text
+        ]
+        (one,) = found
+        return one
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    for _ in range(1000):
+        if holds():
+            return
+        QApplication.processEvents()
+        time.sleep(0.02)
+    pytest.fail("It never came true.")
+
+
+def test_after_a_crash_the_window_offers_once_what_was_open(
+    qtbot: QtBot, tmp_path: Path, gone: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_small_result(tmp_path)
+    with monkeypatch.context() as crashing:
+        crashing.setattr(os, "getpid", lambda: gone)
+        crashed = Bench(qtbot, tmp_path)
+    crashed.desk.start()
+    crashed.window.open_path(path)
+    wait_until(lambda: not crashed.window.parts.runner.active)
+    crashed.window.do("view_depth")
+    crashed.desk.save()
+    again = Bench(qtbot, tmp_path)
+    again.desk.start()
+    again.button("Open again").click()
+    wait_until(lambda: not again.window.parts.runner.active)
+    assert again.desk.collect() == crashed.desk.collect()
+    again.desk.save()
+    again.window.close()
+    later = Bench(qtbot, tmp_path)
+    later.desk.start()
+    assert later.window.toasts.shown == ()
+    later.window.close()
+    crashed.window.close()
+
+
+def test_a_series_comes_back_where_it_is_seen(qtbot: QtBot, tmp_path: Path) -> None:
+    stage = [write_stage(tmp_path, position) for position in (700.0, 725.0, 750.0)]
+    part = SeriesPart(rows=tuple((path, None) for path in stage))
+    bench = Bench(qtbot, tmp_path)
+    bench.desk.come_back(Session(page="compare", series=part))
+    wait_until(lambda: not bench.window.parts.runner.active)
+    page = bench.window.page_of("compare")
+    assert isinstance(page, ComparePage)
+    assert page._shows_series
+    found = bench.desk.collect().series
+    assert found is not None
+    assert [path for path, _ in found.rows] == stage
+    bench.window.close()
+
+
+def test_a_result_that_is_gone_is_told(qtbot: QtBot, tmp_path: Path) -> None:
+    bench = Bench(qtbot, tmp_path)
+    bench.desk.come_back(LEAF)
+    assert "leaf.zarr is not there any more" in bench.window.toasts.shown[-1].text
+    bench.window.close()

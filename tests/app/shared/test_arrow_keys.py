@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import pytest
+from dsl_app.shared.widgets.arrow_keys import arrow_step, moved_within
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QKeyEvent, QWheelEvent
+from PySide6.QtWidgets import QWidget
+from pytestqt.qtbot import QtBot
+
+
+def _key(key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> QKeyEvent:
+    return QKeyEvent(QEvent.Type.KeyPress, key, modifier)
+
+
+def test_arrows_step_and_shift_steps_further() -> None:
+    assert arrow_step(_key(Qt.Key.Key_Up)) == (0, -1)
+    assert arrow_step(_key(Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)) == (10, 0)
+    assert arrow_step(_key(Qt.Key.Key_A)) is None
+
+
+def test_steps_end_at_the_edge() -> None:
+    assert moved_within((0, 5), (-1, 10), (8, 6)) == (0, 5)
+    assert moved_within((3, 2), (1, -1), (8, 6)) == (4, 1)
+
+
+def _boxes() -> list[NumberBox | WholeBox | ChoiceBox]:
+    choice = ChoiceBox("Choice")
+    choice.addItems(["a", "b", "c"])
+    choice.setCurrentIndex(1)
+    return [NumberBox("Number", 0, 10, 5), WholeBox("Whole", 0, 10, 5), choice]
+
+
+def _wheel(widget: QWidget) -> None:
+    at = QPointF(4, 4)
+    event = QWheelEvent(
+        at, at, QPoint(0, 0), QPoint(0, -120), Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase, False,
+    )  # fmt: skip
+    widget.wheelEvent(event)
+
+
+@pytest.mark.parametrize("i", range(3))
+def test_the_wheel_changes_only_what_has_the_focus(qtbot: QtBot, i: int) -> None:
+    box = _boxes()[i]
+    qtbot.addWidget(box)
+    box.show()
+    value = (lambda: box.currentIndex()) if isinstance(box, ChoiceBox) else box.value
+    before = value()
+    _wheel(box)
+    assert value() == before
+    box.setFocus()
+    qtbot.waitUntil(box.hasFocus)
+    _wheel(box)
+    assert value() != before

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+import weakref
+from collections.abc import Iterator
+
+import psutil
+import pytest
+from dsl_app.shared.jobs.housekeeping import ALL_S, Housekeeper, return_memory
+
+
+class Knot:
+    """Holds itself, so that only the collector finds it."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+class Day:
+    """Whether jobs run, and what time it is."""
+
+    def __init__(self) -> None:
+        self.is_busy, self.time_s = False, 0.0
+        self.keeper = Housekeeper(lambda: self.is_busy, lambda: self.time_s)
+
+
+@pytest.fixture
+def day() -> Iterator[Day]:
+    made = Day()
+    gc.collect()
+    made.keeper.take_charge()
+    yield made
+    made.keeper.leave()
+    assert gc.isenabled()
+
+
+def allocate() -> list[list[int]]:
+    """Make more objects than Python lets pass without a look for garbage."""
+    return [[i] for i in range(3 * gc.get_threshold()[0])]
+
+
+def test_a_thread_takes_nothing_apart_that_belongs_to_the_window(day: Day) -> None:
+    knot = weakref.ref(Knot())
+    thread = threading.Thread(target=allocate)
+    thread.start()
+    thread.join()
+    assert knot() is not None
+    kept = allocate()
+    day.keeper.look()
+    assert kept
+    assert knot() is None
+
+
+def test_little_garbage_may_wait_until_a_job_ends(day: Day) -> None:
+    day.is_busy = True
+    knot = weakref.ref(Knot())
+    day.keeper.look()
+    assert knot() is not None
+    day.is_busy = False
+    day.keeper.look()
+    assert knot() is None
+
+
+def test_what_grew_old_is_found_in_time_but_not_while_a_job_runs(day: Day) -> None:
+    held = Knot()
+    knot = weakref.ref(held)
+    gc.collect()
+    del held
+    day.is_busy, day.time_s = True, 10 * ALL_S
+    kept = allocate()
+    day.keeper.look()
+    assert kept
+    assert knot() is not None
+    day.is_busy = False
+    day.keeper.look()
+    assert knot() is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have other heaps")
+def test_freed_memory_goes_back_to_the_system() -> None:
+    process = psutil.Process()
+    blocks = [bytearray(20_000) for _ in range(5_000)]
+    last = bytearray(20_000)
+    full = process.memory_info().rss
+    del blocks
+    return_memory()
+    assert len(last) == 20_000
+    assert full - process.memory_info().rss > 60e6

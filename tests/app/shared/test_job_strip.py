@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.widgets.job_strip import JobStrip
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from dsl_core.progress import Progress
+
+
+class Bench:
+    """A strip, and jobs that run until they are cancelled or let go."""
+
+    def __init__(self, qtbot: QtBot) -> None:
+        self.runner, self._gate = QtRunner(), threading.Event()
+        self.strip = JobStrip(self.runner)
+        qtbot.addWidget(self.strip)
+        self.strip.show()
+
+    def run(self, title: str, is_minor: bool = False) -> Job[None]:
+        def work(progress: Progress) -> None:
+            while not self._gate.wait(0.01):
+                progress.report("wait", 0, 0)
+
+        return self.runner.submit(Job(title, work, is_minor=is_minor))
+
+    @property
+    def text(self) -> str:
+        return self.strip._text.text()
+
+    def click(self) -> None:
+        QTest.mouseClick(self.strip._cancel, Qt.MouseButton.LeftButton)
+
+    def end(self) -> None:
+        self._gate.set()
+        self.runner.shut_down()
+
+
+@pytest.fixture
+def bench(qtbot: QtBot) -> Iterator[Bench]:
+    made = Bench(qtbot)
+    yield made
+    made.end()
+
+
+def test_work_that_runs_by_itself_does_not_hide_what_was_asked_for(bench: Bench) -> None:
+    prediction = bench.run("Predict", is_minor=True)
+    assert bench.text.startswith("Predict")
+    export = bench.run("Export leaf")
+    assert bench.text.startswith("Export leaf")
+    assert bench.text.endswith("and 1 more")
+    bench.click()
+    assert export.token.is_cancelled
+    assert not prediction.token.is_cancelled
+
+
+def test_work_that_runs_by_itself_can_be_cancelled_where_it_is_alone(bench: Bench) -> None:
+    prediction = bench.run("Predict", is_minor=True)
+    bench.click()
+    assert prediction.token.is_cancelled
+    assert "stopping" in bench.text
+
+
+def test_of_several_jobs_the_one_to_cancel_is_chosen(qtbot: QtBot, bench: Bench) -> None:
+    bench.run("Predict", is_minor=True)
+    first, second = bench.run("Reconstruct A & B"), bench.run("Export leaf")
+    menu = bench.strip._cancel.menu()
+    bench.strip._cancel.click()
+    assert menu.isVisible()
+    assert not first.token.is_cancelled
+    assert [action.text() for action in menu.actions()] == ["Reconstruct A && B", "Export leaf"]
+    menu.actions()[1].trigger()
+    menu.hide()
+    assert (first.token.is_cancelled, second.token.is_cancelled) == (False, True)
+    qtbot.waitUntil(lambda: second not in bench.runner.active)
+    # One is left, which needs no choice.
+    qtbot.waitUntil(lambda: bench.strip._cancel.menu() is None)
+    bench.click()
+    assert first.token.is_cancelled
+
+
+def test_the_strip_is_hidden_while_nothing_runs(qtbot: QtBot, bench: Bench) -> None:
+    job = bench.run("Export leaf")
+    assert bench.strip.isVisible()
+    job.cancel()
+    qtbot.waitUntil(lambda: not bench.strip.isVisible())

@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
+from dsl_app.shared.recent import RecentFiles
+from dsl_app.shared.settings import Settings
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("manifest.json", Kind.SCAN),
+        ("zarr.json", Kind.RESULT),
+        ("campaign.json", Kind.CAMPAIGN),
+    ],
+)
+def test_folders_are_known_by_a_file_which_may_be_meant_instead(
+    tmp_path: Path, name: str, kind: Kind
+) -> None:
+    (tmp_path / name).write_text("{}")
+    assert kind_of(tmp_path) is kind
+    assert meant_by(tmp_path / name) == tmp_path
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (json.dumps({"film": {}, "name": "lab"}), Kind.CALIBRATION),
+        (json.dumps({"spectral": {}}), Kind.PLAN),
+        (json.dumps({"levels": "", "frames": 32}), Kind.PATTERNS),
+        (json.dumps([1, 2]), Kind.UNKNOWN),
+        ("{ cut off", Kind.UNKNOWN),
+    ],
+)
+def test_json_is_known_by_what_it_holds(tmp_path: Path, content: str, kind: Kind) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(content)
+    assert kind_of(path) is kind
+    assert path.name in refusal(path)
+
+
+def test_every_refusal_says_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "spectrum.csv").write_text("nm,r\n")
+    (tmp_path / "cat.jpeg").write_bytes(b"\xff\xd8")
+    assert "Open a result first" in refusal(tmp_path / "spectrum.csv")
+    assert "It opens scans" in refusal(tmp_path / "cat.jpeg")
+    assert "not there any more" in refusal(tmp_path / "gone.zarr")
+
+
+def test_marks_mean_the_result_beside_them(tmp_path: Path) -> None:
+    assert meant_by(tmp_path / "leaf.marks.json") == tmp_path / "leaf.zarr"
+
+
+def test_recent_files_are_kept_in_the_settings(tmp_path: Path) -> None:
+    settings = Settings()
+    recent = RecentFiles(settings)
+    seen: list[tuple[Path, ...]] = []
+    recent.paths.changed.connect(seen.append)
+    for name in ("a", "b", "a"):
+        recent.add(tmp_path / name)
+    assert recent.paths.value == (tmp_path / "a", tmp_path / "b")
+    recent.forget(tmp_path / "a")
+    assert settings.recent == [str(tmp_path / "b")]
+    assert seen[-1] == (tmp_path / "b",)

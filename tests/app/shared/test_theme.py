@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+import pytest
+from dsl_app.shared.theme import DARK, LIGHT, Theme
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of WCAG 2.2."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(a: str, b: str) -> float:
+    high, low = sorted((luminance(a), luminance(b)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+@pytest.mark.parametrize("role", ["text", "muted", "good", "warn", "bad"])
+def test_text_is_readable(theme: Theme, role: str) -> None:
+    for behind in (theme.window, theme.base):
+        assert contrast(getattr(theme, role), behind) >= 4.5
+
+
+@pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
+def test_accent_and_pins_stand_out(theme: Theme) -> None:
+    assert contrast(theme.on_accent, theme.accent) >= 4.5
+    assert all(contrast(pin, theme.base) >= 3 for pin in theme.pins)

@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+import logging
+import threading
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.undo import Change
+from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shell.actions import ACTIONS, PAGES
+from dsl_app.shell.application import ExceptionHook, make_window
+from dsl_app.shell.main_window import MainWindow
+from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QVBoxLayout
+from pytestqt.qtbot import QtBot
+
+
+class Page(PageWidget):
+    """A page that only says which one it is."""
+
+    def __init__(self, window: MainWindow, key: str) -> None:
+        super().__init__(window)
+        self.opened: list[Path] = []
+        self.released = False
+        QVBoxLayout(self).addWidget(QLabel(key))
+
+    def open_path(self, path: Path) -> bool:
+        self.opened.append(path)
+        return True
+
+    def command_line(self) -> str:
+        return "dsl-scan rigs"
+
+    def release(self) -> None:
+        self.released = True
+
+
+@pytest.fixture
+def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
+    pages: dict[str, Callable[[MainWindow], PageWidget]] = {
+        page.key: lambda window, key=page.key: Page(window, key)  # type: ignore[misc]
+        for page in PAGES
+    }
+    made = make_window(pages, tmp_path)
+    qtbot.addWidget(made)
+    made.show()
+    return made
+
+
+def test_what_nobody_does_is_not_offered(window: MainWindow) -> None:
+    assert not window.actions_by_key["demo"].isVisible()
+    assert window.actions_by_key["tour"].isVisible()
+
+
+def test_shortcuts_and_mnemonics_are_unique() -> None:
+    keys = [action.shortcut for action in ACTIONS if action.shortcut]
+    assert len(keys) == len(set(keys))
+    for menu in {action.menu for action in ACTIONS}:
+        letters = [a.text[a.text.index("&") + 1].lower() for a in ACTIONS if a.menu == menu and "&" in a.text]
+        assert len(letters) == len(set(letters)), menu
+
+
+def test_pages_are_made_when_first_opened(window: MainWindow) -> None:
+    assert window.stack.count() == 1
+    window.open_page("results")
+    window.open_page("results")
+    assert window.stack.count() == 2
+    assert window.windowTitle().startswith("Results")
+
+
+def test_the_open_page_is_remembered(window: MainWindow, tmp_path: Path) -> None:
+    window.open_page("scan")
+    window.close()
+    assert '"page": "scan"' in (tmp_path / "settings.json").read_text()
+
+
+def test_pages_let_go_when_the_window_closes(window: MainWindow) -> None:
+    page = window.open_page("rig")
+    window.close()
+    assert isinstance(page, Page)
+    assert page.released
+
+
+def test_a_file_that_nobody_knows_is_told(window: MainWindow, tmp_path: Path) -> None:
+    (tmp_path / "cat.jpeg").touch()
+    window.open_path(tmp_path / "cat.jpeg")
+    assert "cat.jpeg is no scan" in window.toasts.shown[-1].text
+
+
+def test_a_known_file_becomes_a_recent_one(window: MainWindow, tmp_path: Path) -> None:
+    (tmp_path / "zarr.json").touch()
+    window.open_path(tmp_path)
+    assert window.parts.settings.recent == [str(tmp_path)]
+
+
+def test_a_report_bundle_replaces_a_file_after_the_dialog_has_asked(
+    window: MainWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "report.zip"
+    path.write_text("old")
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path), ""))
+    window.actions_by_key["report_bundle"].trigger()
+    assert window.toasts.shown[-1].text == f"Saved as {path}."
+    assert set(zipfile.ZipFile(path).namelist()) == {"log.txt", "settings.json", "versions.json"}
+
+
+def test_the_log_shows_records_of_any_thread(window: MainWindow, qtbot: QtBot) -> None:
+    thread = threading.Thread(target=lambda: logging.getLogger("dsl_core.test").warning("far away"))
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: any("far away" in text for _, text in window.parts.records.lines))
+
+
+def test_an_uncaught_error_of_a_thread_is_told_in_the_window(qtbot: QtBot) -> None:
+    notifier = RecordingNotifier()
+    hook = ExceptionHook(notifier)
+    error = ValueError("odd")
+    thread = threading.Thread(target=lambda: hook.handle(ValueError, error, None))
+    thread.start()
+    thread.join()
+    qtbot.waitUntil(lambda: bool(notifier.told))
+    assert "ValueError: odd" in notifier.told[0][1]
+
+
+def test_themes_reach_the_whole_window(window: MainWindow) -> None:
+    window.do("theme_light")
+    assert window.theme.name == "light"
+    window.do("theme_dark")
+    assert window.theme.name == "dark"
+    assert window.palette().window().color().name() == window.theme.window
+
+
+def test_toasts_leave_when_closed_and_never_pile_up(window: MainWindow) -> None:
+    for i in range(6):
+        window.toasts.tell("error", f"trouble {i}")
+    assert [toast.text for toast in window.toasts.shown] == [f"trouble {i}" for i in range(2, 6)]
+    window.toasts.shown[0].dismiss()
+    assert len(window.toasts.shown) == 3
+
+
+@pytest.mark.parametrize(("is_minor", "asked"), [(True, 0), (False, 1)])
+def test_only_work_that_somebody_would_miss_keeps_the_window_open(
+    window: MainWindow, monkeypatch: pytest.MonkeyPatch, is_minor: bool, asked: int
+) -> None:
+    questions: list[str] = []
+
+    def answer(_parent: object, _title: str, text: str) -> QMessageBox.StandardButton:
+        questions.append(text)
+        return QMessageBox.StandardButton.Yes
+
+    monkeypatch.setattr(QMessageBox, "question", answer)
+    free = threading.Event()
+    window.parts.runner.submit(Job("Long work", lambda progress: free.wait(10), is_minor=is_minor))
+    threading.Timer(0.1, free.set).start()
+    window.close()
+    assert len(questions) == asked
+
+
+def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -> None:
+    imports = {"rig": ("json", "there.is.no.such.module")}
+    made = make_window({"rig": lambda window: Page(window, "rig")}, tmp_path, imports=imports)
+    qtbot.addWidget(made)
+    made.show()
+    assert made.stack.count() == 0
+    qtbot.waitUntil(lambda: made.stack.count() == 1)
+    assert made.windowTitle().startswith("Rig")
+    made.close()
+
+
+def test_a_change_that_cannot_be_undone_now_is_told(window: MainWindow) -> None:
+    window.parts.undo.push(Change("change of plan", int, int, lambda: "A scan keeps its plan."))
+    window.do("undo")
+    assert window.toasts.shown[-1].text == "A scan keeps its plan."
+    assert window.actions_by_key["undo"].isEnabled()

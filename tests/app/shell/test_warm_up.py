@@ -1,0 +1,37 @@
+from __future__ import annotations
+
+import gc
+import importlib.util
+import subprocess
+import sys
+
+from dsl_app.shell.warm_up import STEPS, WarmUp
+
+
+def test_everything_that_is_imported_early_exists() -> None:
+    # A name that went away would be no warning to anybody.
+    code = f"import importlib.util as u; print([n for n in {STEPS!r} if u.find_spec(n) is None])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=100)
+    assert done.stdout.strip() == "[]", done.stdout + done.stderr
+
+
+def test_modules_are_there_afterwards_and_garbage_is_collected_again() -> None:
+    sys.modules.pop("this_is_not_there", None)
+    assert importlib.util.find_spec("colorsys") is not None
+    sys.modules.pop("colorsys", None)
+    warm_up = WarmUp(["this_is_not_there", "colorsys"])
+    warm_up.start()
+    warm_up._thread.join(30)
+    assert warm_up.is_over
+    assert "colorsys" in sys.modules
+    assert gc.isenabled()
+
+
+def test_it_stops_between_two_steps_and_before_it_began() -> None:
+    WarmUp(["colorsys"]).stop()
+    sys.modules.pop("colorsys", None)
+    warm_up = WarmUp(["colorsys"] * 1000)
+    warm_up._stop.set()
+    warm_up.start()
+    warm_up.stop()
+    assert "colorsys" not in sys.modules

@@ -1,0 +1,191 @@
+"""Planes on a stage improve a geometry that a board left uncertain, and say when something is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.calibration.geometry.bundle import CAMERA
+from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
+from dsl_core.calibration.geometry.stage_planes import columns_at, plane_of, rays_through, shared_parameters
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import zero_order
+from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
+from tests.cases.board_calibrated import board_calibrated
+
+SIZE = (222, 145)
+POSITIONS_MM = (600.0, 750.0, 900.0)
+NOISE_PX, STAGE_STD_MM = 0.004, 0.02
+
+
+def small_rig() -> Rig:
+    rig = published_rig()
+    return rig.model_copy(update={"camera": rig.camera.resized(*SIZE)})
+
+
+def seen(
+    truth: Rig,
+    distance_mm: float,
+    rng: np.random.Generator,
+    bow_mm: float = 0.0,
+    tilt: float = 0.02,
+    rim_mm: float = 0.0,
+) -> ColumnSamples:
+    """Columns of a plane, bent by so much over the view, or domed over 300 mm, as tile means show them."""
+    x, y = np.meshgrid(np.linspace(2, SIZE[0] - 3, 30), np.linspace(2, SIZE[1] - 3, 20))
+    pixels = np.stack([x.ravel(), y.ravel()], 1)
+    shared = shared_parameters(truth)
+    rays = rays_through(shared[CAMERA], pixels)
+    depth = 1 / np.tensordot(plane_of(np.array([tilt, 0.0]), distance_mm).inverse, rays, 1)
+    bulge = bow_mm * ((x.ravel() - SIZE[0] / 2) / (SIZE[0] / 2)) ** 2
+    bulge = bulge + rim_mm * ((rays * depth)[:2] ** 2).sum(0) / 150.0**2
+    columns = columns_at(shared, rays * (depth + bulge))
+    inside = (columns > 0) & (columns < 639)
+    noisy = columns[inside] + NOISE_PX * rng.standard_normal(int(inside.sum()))
+    return ColumnSamples(pixels[inside], noisy, np.full(len(noisy), NOISE_PX))
+
+
+def distances_mm(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Of planes that a stage carries along the camera's axis, tilted by 0.02."""
+    steps = np.array(POSITIONS_MM) + STAGE_STD_MM * rng.standard_normal(3)
+    return np.asarray(steps / np.sqrt(1 + 0.02**2))
+
+
+def column_error_px(truth: Rig, rig: Rig) -> float:
+    rng = np.random.default_rng(1)
+    pixels = torch.as_tensor(rng.integers(0, SIZE[0] * SIZE[1], 4000))
+    depth = torch.as_tensor(rng.uniform(600, 900, 4000))
+    column, row = zero_order(truth, pixels, depth)
+    inside = (column > 0) & (column < 639) & (row > 0) & (row < 359)
+    return float((zero_order(rig, pixels, depth)[0] - column)[inside].square().mean().sqrt())
+
+
+def refined(seed: int) -> tuple[Rig, Rig, PlaneRefinement]:
+    """Truth, what the board said, and what the planes made of it."""
+    truth, rng = random_rig(seed, small_rig()), np.random.default_rng(seed)
+    board = board_calibrated(truth, small_rig(), seed)
+    samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
+    assert board.geometry_covariance is not None
+    covariance = np.array(board.geometry_covariance).reshape(24, 24)
+    return truth, board, refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
+
+
+@pytest.fixture(scope="module")
+def several() -> list[tuple[Rig, Rig, PlaneRefinement]]:
+    return [refined(seed) for seed in range(6, 11)]
+
+
+def test_columns_come_nearer_to_the_truth(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
+    before = [column_error_px(truth, board) for truth, board, _ in several]
+    after = [column_error_px(truth, found.rig) for truth, _, found in several]
+    assert np.sqrt(np.mean(np.square(after))) < 0.7 * np.sqrt(np.mean(np.square(before)))
+    assert max(after) < 0.04
+
+
+def test_stated_deviations_cover_the_errors(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
+    pulls = [column_error_px(truth, found.rig) / found.column_std_px for truth, _, found in several]
+    assert 0.4 < np.sqrt(np.mean(np.square(pulls))) < 1.7
+
+
+def test_a_bulge_at_all_positions_is_measured(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
+    for _, _, flat in several:
+        assert abs(flat.bow_mm) < 3 * flat.bow_std_mm < 0.3
+    truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)
+    board = board_calibrated(truth, small_rig(), 6)
+    samples = [seen(truth, distance, rng, rim_mm=0.4) for distance in distances_mm(rng)]
+    assert board.geometry_covariance is not None
+    covariance = np.array(board.geometry_covariance).reshape(24, 24)
+    found = refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
+    assert found.bow_mm == pytest.approx(0.4, abs=3 * found.bow_std_mm)
+    # The planes themselves look as flat as ever: lenses bend them straight.
+    assert found.plane_rms_mm.max() < 0.1
+
+
+def test_planes_are_as_flat_as_the_noise(several: list[tuple[Rig, Rig, PlaneRefinement]]) -> None:
+    for truth, _, found in several:
+        assert found.residual_rms_px.max() < 1.1 * NOISE_PX
+        assert found.pull < 1.8
+        assert np.abs(found.step_error_mm).max() < 4 * STAGE_STD_MM
+        middle = pixel_rays(truth.camera)[:, SIZE[1] // 2, SIZE[0] // 2]
+        depths = [1 / (plane.inverse @ middle) for plane in found.planes]
+        np.testing.assert_allclose(np.diff(depths), 150, atol=0.2)
+
+
+def test_without_covariance_the_geometry_stays() -> None:
+    truth, rng = small_rig(), np.random.default_rng(0)
+    samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
+    found = refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
+    np.testing.assert_allclose(shared_parameters(found.rig), shared_parameters(truth), atol=1e-9)
+    assert [plane.tilt_deg for plane in found.planes] == pytest.approx([np.degrees(0.02)] * 3, rel=0.01)
+
+
+def _samples(truth: Rig) -> list[ColumnSamples]:
+    rng = np.random.default_rng(2)
+    return [seen(truth, distance, rng) for distance in distances_mm(rng)]
+
+
+def test_a_bowed_plane_is_named() -> None:
+    truth, samples = small_rig(), _samples(small_rig())
+    samples[1] = seen(truth, 750.0, np.random.default_rng(0), bow_mm=3.0)
+    with pytest.raises(CalibrationError, match=r"750 mm lie .* mm rms off a plane"):
+        refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
+
+
+def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
+    truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)
+    board = board_calibrated(truth, small_rig(), 6)
+    samples = [seen(truth, distance, rng, bow_mm=1.5) for distance in distances_mm(rng)]
+    assert board.geometry_covariance is not None
+    covariance = np.array(board.geometry_covariance).reshape(24, 24)
+    with pytest.raises(
+        CalibrationError,
+        match=r"planes contradict the geometry .* bulged towards the camera by -?\d\.\d\d ± 0\.0\d mm",
+    ):
+        refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
+
+
+def test_a_step_that_was_not_made_is_named() -> None:
+    truth, samples = small_rig(), _samples(small_rig())
+    samples[2] = seen(truth, 896.0, np.random.default_rng(0))
+    with pytest.raises(CalibrationError, match=r"position \d+ mm stands .* mm from"):
+        refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
+
+
+def test_a_stage_of_another_scale_is_noticed() -> None:
+    samples = _samples(small_rig())
+    with pytest.raises(CalibrationError, match=r"1\.0[45]\d times as far apart"):
+        refine_planes(small_rig(), tuple(p / 1.05 for p in POSITIONS_MM), samples, None, STAGE_STD_MM)
+
+
+def test_steps_a_little_too_long_are_told_by_their_ratio() -> None:
+    truth, rng = random_rig(6, small_rig()), np.random.default_rng(6)
+    board = board_calibrated(truth, small_rig(), 6)
+    samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
+    assert board.geometry_covariance is not None
+    covariance = np.array(board.geometry_covariance).reshape(24, 24)
+    said = tuple(700 + (p - 700) / 1.01 for p in POSITIONS_MM)
+    with pytest.raises(CalibrationError, match=r"steps are 1\.0(09|10|11) times as long"):
+        refine_planes(board, said, samples, covariance, STAGE_STD_MM)
+
+
+def test_captures_of_another_rig_are_named() -> None:
+    samples = _samples(small_rig())
+    samples[0] = seen(random_rig(5, small_rig()), 600.0, np.random.default_rng(0))
+    with pytest.raises(CalibrationError, match="600 mm"):
+        refine_planes(small_rig(), POSITIONS_MM, samples, None, STAGE_STD_MM)
+
+
+def test_too_little_light_is_named() -> None:
+    samples = _samples(small_rig())
+    few = samples[1]
+    samples[1] = replace(few, camera_px=few.camera_px[:5], column_px=few.column_px[:5], std_px=few.std_px[:5])
+    with pytest.raises(CalibrationError, match="750 mm only 5 tiles"):
+        refine_planes(small_rig(), POSITIONS_MM, samples, None, STAGE_STD_MM)

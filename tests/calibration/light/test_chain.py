@@ -1,0 +1,129 @@
+"""A diffuser's line scan puts right what curves of response, emission and efficiency have wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.light.chain import LineScan, chain_correction
+from dsl_core.campaign.common.diffuser_lines import diffuser_lines
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.rig import Rgb, Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.spectra import chain_response
+from tests.cases.twin_scan import MemoryScan, twin_scan
+
+NM = np.arange(440.0, 651.0, 10.0)
+
+
+@pytest.fixture(scope="module")
+def scanned() -> tuple[Rig, MemoryScan]:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=2))
+    devices, scan = twin_scan(plan, size="112x72", scene="plane")
+    assert devices.calibration is not None
+    return devices.calibration, scan
+
+
+@pytest.fixture(scope="module")
+def lines(scanned: tuple[Rig, MemoryScan]) -> LineScan:
+    return diffuser_lines(scanned[1], scanned[0], pixels=2500)
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.004])
+def test_filters_that_are_all_off_alike_are_measured_by_the_leds(
+    scanned: tuple[Rig, MemoryScan], lines: LineScan, scale: float
+) -> None:
+    # A film of fewer lines sends light of longer wavelengths where it went.
+    rig = wrong(scanned[0])
+    film = rig.film.model_copy(update={"lines_per_mm": rig.film.lines_per_mm * (1 + scale)})
+    record = chain_correction(rig.model_copy(update={"film": film}), [lines])
+    assert record.wavelength_scale == pytest.approx(scale, abs=2e-4)
+    assert record.wavelength_scale_std < 2e-4
+
+
+def wrong(rig: Rig) -> Rig:
+    """Curves with smooth errors of a few percent, each its own."""
+
+    def bent(curve: SpectralCurve, phase: float) -> SpectralCurve:
+        nm = np.array(curve.wavelengths_nm)
+        return SpectralCurve.of(nm, np.array(curve.values) * (1 + 0.03 * np.sin(nm / 45.0 + phase)))
+
+    response: Rgb = (
+        bent(rig.response[0], 0.0),
+        bent(rig.response[1], 1.0),
+        bent(rig.response[2], 2.0),
+    )
+    efficiency = {m: bent(curve, 3.0 + m) for m, curve in rig.efficiency.items()}
+    return rig.model_copy(
+        update={"response": response, "efficiency": efficiency, "white_scale": 1.05 * rig.white_scale}
+    )
+
+
+def chain_error(rig: Rig, truth: Rig, order: int) -> np.ndarray:
+    """Relative error of the chain at `NM`, colours weighted by squared signal."""
+    signal, true = (chain_response(r, order, NM).sum(1) for r in (rig, truth))
+    weight = true**2 / (true**2).sum(0)
+    return np.asarray((weight * (signal / true - 1)).sum(0))
+
+
+@pytest.fixture(scope="module")
+def corrected(scanned: tuple[Rig, MemoryScan], lines: LineScan) -> tuple[Rig, Rig, ChainCorrection]:
+    before = wrong(scanned[0])
+    return scanned[0], before, chain_correction(before, [lines])
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_errors_of_percents_become_tenths(corrected: tuple[Rig, Rig, ChainCorrection], order: int) -> None:
+    truth, before, record = corrected
+    after = apply_chain(record, before)
+    assert np.abs(chain_error(before, truth, order)).max() > 0.05
+    left = chain_error(after, truth, order)
+    assert np.sqrt(np.mean(left**2)) < 2e-3
+    stated = np.hypot(record.chain_rel_std.at(NM), record.white_scale_rel_std)
+    assert np.sqrt(np.mean((left / stated) ** 2)) < 1.8
+    assert stated.max() < 0.01
+
+
+def test_zero_order_is_put_right_too(corrected: tuple[Rig, Rig, ChainCorrection]) -> None:
+    truth, before, record = corrected
+    nm = np.arange(400.0, 701.0)
+    white = [chain_response(r, 0, nm).sum((1, 2)) for r in (apply_chain(record, before), truth)]
+    np.testing.assert_allclose(white[0], white[1], rtol=2e-3)
+
+
+def test_record_goes_through_json_and_leaves_second_orders(
+    corrected: tuple[Rig, Rig, ChainCorrection],
+) -> None:
+    _, before, record = corrected
+    again = ChainCorrection.model_validate_json(record.model_dump_json())
+    after = apply_chain(again, before)
+    assert after.chain_rel_std == record.chain_rel_std
+    assert after.efficiency[2] == before.efficiency[2]
+
+
+def test_too_few_pixels_are_refused(scanned: tuple[Rig, MemoryScan], lines: LineScan) -> None:
+    with pytest.raises(CalibrationError, match="usable pixels"):
+        chain_correction(scanned[0], [lines.at(np.arange(20))])
+
+
+def test_saturated_values_do_not_count(scanned: tuple[Rig, MemoryScan], lines: LineScan) -> None:
+    rng = np.random.default_rng(0)
+    hit = rng.random(lines.radiance.shape) < 0.05
+    spoilt = replace(
+        lines,
+        radiance=np.where(hit, 1e3, lines.radiance),
+        std=np.where(hit, np.inf, lines.std),
+    )
+    record = chain_correction(scanned[0], [spoilt])
+    assert np.abs(chain_error(apply_chain(record, scanned[0]), scanned[0], 1)).max() < 0.01
+
+
+def test_scan_without_lines_is_refused(scanned: tuple[Rig, MemoryScan]) -> None:
+    rig, scan = scanned
+    comb = MemoryScan(scan.plan.model_copy(update={"spectral": LineComb()}), scan.frames)
+    with pytest.raises(CalibrationError, match="holds no scan lines"):
+        diffuser_lines(comb, rig)

@@ -1,0 +1,160 @@
+"""Response and emission from known surfaces: better than the start, with honest deviations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.colour.color_checker import LIGHTS
+from dsl_core.calibration.light.spectral_refinement import (
+    FINE_NM,
+    PUBLISHED_WEIGHT,
+    WEIGHTS,
+    SpectralModel,
+    SurfaceSignals,
+    refine,
+    refined_curves,
+    residuals,
+)
+from dsl_core.calibration.light.white_match import match_whites
+from dsl_core.errors import Cancelled
+from dsl_core.model.calibration.spectralon import WhiteSignals
+from dsl_core.model.rig import Rgb, Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.charts import chart_reflectance
+from dsl_core.progress import CallbackProgress, CancelToken
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
+
+BANDS = (FINE_NM >= 430) & (FINE_NM <= 660)
+
+
+def surfaces(true: Rig, noise: float, seed: int = 0) -> SurfaceSignals:
+    """What the true rig sees of the chart and of white."""
+    chart = np.stack(list(chart_reflectance(FINE_NM).values()))
+    reflectance = np.concatenate([chart, np.ones((1, FINE_NM.size))])
+    shape = (len(reflectance), 3, len(LIGHTS))
+    own = np.arange(len(reflectance)) < len(chart)
+    empty = SurfaceSignals(np.zeros(shape), np.ones(shape), reflectance, LIGHTS, own)
+    model = SpectralModel(true)
+    signal, _ = model.predict(np.zeros(model.size), empty)
+    std = noise * signal + 0.1 * noise * signal.max()
+    noisy = signal + std * np.random.default_rng(seed).standard_normal(shape)
+    return SurfaceSignals(noisy, std, reflectance, LIGHTS, own)
+
+
+def known_emission(true: Rig, rel_std: float = 0.001) -> Rgb:
+    red, green, blue = (
+        SpectralCurve.of(FINE_NM, c.at(FINE_NM)).model_copy(
+            update={"std": tuple((rel_std * c.at(FINE_NM) + 1e-5).tolist())}
+        )
+        for c in true.emission
+    )
+    return red, green, blue
+
+
+def response_error(rig_or: Rgb, true: Rig) -> np.ndarray:
+    """Error over the bands (3, bands) as a share of each peak, common scale left out."""
+    given = np.stack([c.at(FINE_NM) for c in rig_or])
+    truth = np.stack([c.at(FINE_NM) for c in true.response])
+    error = given * truth.sum() / given.sum() - truth
+    return np.asarray((error / truth.max(1, keepdims=True))[:, BANDS])
+
+
+@pytest.mark.parametrize("seed", range(1, 4))
+def test_refined_response_is_better_than_the_data_sheet(seed: int) -> None:
+    true, nominal = random_rig(seed, published_rig()), published_rig()
+    start = nominal.model_copy(update={"emission": known_emission(true)})
+    data = surfaces(true, 3e-4)
+    found = refine(start, data, weight=None)
+    response, _, _ = refined_curves(start, found)
+    before, after = response_error(nominal.response, true), response_error(response, true)
+    for channel in range(3):
+        assert np.sqrt((after[channel] ** 2).mean()) < 0.4 * np.sqrt((before[channel] ** 2).mean())
+    std = np.stack([np.array(c.std)[BANDS] / max(c.values) for c in response])
+    assert np.mean(np.abs(after) < 1.96 * std) > 0.85
+    assert all(min(curve.values) >= 0 for curve in response)
+
+
+def test_derivatives_are_those_of_the_signals() -> None:
+    model, data = SpectralModel(published_rig()), surfaces(published_rig(), 1e-3)
+    x = 0.1 * np.random.default_rng(1).standard_normal(model.size)
+    signal, slope = model.predict(x, data)
+    step = 1e-5
+    for k in (8, 31, 48, 63, 110, 140, model.size - 1):
+        ahead, behind = x.copy(), x.copy()
+        ahead[k] += step
+        behind[k] -= step
+        numeric = (model.predict(ahead, data)[0] - model.predict(behind, data)[0]) / (2 * step)
+        np.testing.assert_allclose(slope[..., k], numeric, rtol=1e-4, atol=1e-7 * signal.max())
+
+
+def test_true_curves_stay() -> None:
+    true = published_rig()
+    start = true.model_copy(update={"emission": known_emission(true)})
+    data = surfaces(true, 3e-4)
+    response, emission, white_scale = refined_curves(start, refine(start, data, weight=None))
+    assert np.abs(response_error(response, true)).max() < 0.01
+    assert white_scale == pytest.approx(true.white_scale, rel=2e-3)
+    for new, old in zip(emission, true.emission, strict=True):
+        assert np.abs(np.array(new.values) - old.at(FINE_NM)).max() < 0.005 * max(old.values)
+
+
+def test_a_measured_emission_is_not_flattened_by_the_published_weight() -> None:
+    true = random_rig(3, published_rig())
+    start = published_rig().model_copy(update={"emission": known_emission(true)})
+    found = refine(start, surfaces(true, 3e-4), weight=PUBLISHED_WEIGHT)
+    _, emission, _ = refined_curves(start, found)
+    for new, old in zip(emission, true.emission, strict=True):
+        ratio = np.array(new.values).sum() / old.at(FINE_NM).sum()
+        assert np.abs(np.array(new.values) / ratio - old.at(FINE_NM)).max() < 0.02 * max(old.values)
+
+
+def test_an_unmeasured_emission_is_refined_too() -> None:
+    true, nominal = random_rig(2, published_rig()), published_rig()
+    data = surfaces(true, 3e-4)
+    found = refine(nominal, data, weight=None)
+    unchanged = found.deviation * 0
+    before = residuals(nominal, data, type(found)(unchanged, found.covariance, 0.0, 0.0, 0.0, 0.0))
+    after = residuals(nominal, data, found)
+    assert np.sqrt((after**2).mean()) < 0.1 * np.sqrt((before**2).mean())
+
+
+def test_whites_are_matched_exactly_and_once() -> None:
+    true, nominal = random_rig(4, published_rig()), published_rig()
+    model = SpectralModel(true)
+    white = SurfaceSignals(
+        np.zeros((1, 3, 3)),
+        np.ones((1, 3, 3)),
+        np.full((1, FINE_NM.size), 0.97),
+        np.eye(3),
+        np.zeros(1, bool),
+    )
+    signal = model.predict(np.zeros(model.size), white)[0][0]
+    measured = WhiteSignals.model_validate(
+        {"signal": signal.tolist(), "rel_std": [[1e-4] * 3] * 3, "white_over_sum": [1.0] * 3}
+    )
+    start = nominal.model_copy(update={"emission": true.emission})
+    reflectance = SpectralCurve.of([400, 700], [0.97, 0.97])
+    once = match_whites(start, measured, reflectance)
+    again = match_whites(once, measured, reflectance)
+    matched = SpectralModel(once).predict(np.zeros(model.size), white)[0][0]
+    np.testing.assert_allclose(matched, signal, rtol=1e-9)
+    assert again.white_scale == pytest.approx(once.white_scale, rel=1e-12)
+    np.testing.assert_allclose(again.response[1].values, once.response[1].values, rtol=1e-9)
+    errors = [np.sqrt((response_error(rig.response, true) ** 2).mean()) for rig in (start, once)]
+    assert errors[1] < 0.7 * errors[0]
+
+
+def test_a_refinement_that_is_cancelled_ends_at_its_next_trial() -> None:
+    rig, told = published_rig(), list[int]()
+    token = CancelToken()
+
+    def hear(stage: str, done: int, total: int) -> None:
+        told.append(total)
+        if done == 2:
+            token.cancel()
+
+    with pytest.raises(Cancelled, match=f"after 3 of {len(WEIGHTS)} steps"):
+        refine(rig, surfaces(rig, 3e-4), None, 0.01, CallbackProgress(hear, token))
+    assert len(told) == 3

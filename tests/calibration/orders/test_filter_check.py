@@ -1,0 +1,85 @@
+"""A filter that is not the one asked for is named, by its orders and by its colours."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.orders.filter_check import PlacedFilter, colour_shift, found_wavelengths, verdict
+from dsl_core.optics.filters import nominal_filter, passed
+from dsl_core.simulation.published_rig import published_rig
+
+CENTRES = (430.0, 460.0, 490.0, 520.0, 550.0, 580.0, 610.0, 640.0)
+
+
+def offset_px(nm: float) -> float:
+    """Distance of a first order by the grating equation at normal incidence."""
+    sine = nm / 2083.0
+    return float(983.0 * sine / np.sqrt(1 - sine**2))
+
+
+def placed(true_nm: dict[float, float] | None = None, measured: bool = True) -> list[PlacedFilter]:
+    really = true_nm or {}
+    return [
+        PlacedFilter(nm, nm, measured, {m: (m * offset_px(really.get(nm, nm)), 0.2) for m in (1, -1)})
+        for nm in CENTRES
+    ]
+
+
+def test_right_filters_raise_no_doubt() -> None:
+    filters = placed()
+    for each, found in zip(filters, found_wavelengths(published_rig(), filters), strict=True):
+        assert found is not None
+        assert verdict(each, found, 3.0, 1.0) == (False, "")
+
+
+def test_wrong_filter_is_named_and_the_others_are_not() -> None:
+    filters = placed({520.0: 550.0})
+    found = found_wavelengths(published_rig(), filters)
+    verdicts = {f.filter_nm: verdict(f, w, 3.0, 1.0) for f, w in zip(filters, found, strict=True)}
+    unusable, sentence = verdicts.pop(520.0)
+    assert unusable
+    assert "the filter of 520 nm: its first orders stand where 55" in sentence
+    assert not any(bad for bad, _ in verdicts.values())
+
+
+def test_tilted_filter_is_a_doubt() -> None:
+    filters = placed({550.0: 546.0})
+    index = CENTRES.index(550.0)
+    found = found_wavelengths(published_rig(), filters)[index]
+    unusable, sentence = verdict(filters[index], found, 3.0, 1.0)
+    assert not unusable
+    assert "nm less than it should; it may stand tilted" in sentence
+
+
+def test_broad_light_is_no_filter() -> None:
+    each = placed()[0]
+    unusable, sentence = verdict(each, (430.0, 1.0), 30.0, 0.4)
+    assert unusable
+    assert "as without a narrow filter" in sentence
+
+
+def test_few_filters_are_compared_with_the_film() -> None:
+    filters = placed({460.0: 600.0})[:2]
+    right, wrong = found_wavelengths(published_rig(), filters)
+    assert right is not None
+    assert wrong is not None
+    assert not verdict(filters[0], right, 3.0, 1.0)[0]
+    assert verdict(filters[1], wrong, 3.0, 1.0)[0]
+
+
+@pytest.mark.parametrize(("asked", "there"), [(450.0, 600.0), (540.0, 470.0), (600.0, 540.0)])
+def test_colours_tell_another_filter(asked: float, there: float) -> None:
+    rig = published_rig()
+    seen = passed(rig, nominal_filter(there)).sum(1)
+    shift, gain = colour_shift(rig, seen, nominal_filter(asked))
+    assert abs(asked + shift - there) < 20.0
+    assert gain > 12.0
+
+
+def test_colours_of_the_right_filter_are_accepted_though_the_response_is_off() -> None:
+    rig = published_rig()
+    for nm in CENTRES:
+        seen = passed(rig, nominal_filter(nm)).sum(1) * np.array([0.85, 1.0, 1.15])
+        shift, gain = colour_shift(rig, seen, nominal_filter(nm))
+        assert gain < 12.0 or abs(shift) < 14.0

@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.orders.order_graph import Graph, PlanePixels
+from dsl_core.calibration.orders.order_place import find_order
+
+FRAME_PX, LINE_PX, REACH_PX = 640, 5, (150.0, 400.0)
+
+
+def graph_of(distance_px: float, bend_px: float, width_px: float = 3.0) -> Graph:
+    """White pixels all over the image that see one order ``distance_px`` to the right of the zero order."""
+    down, across = np.meshgrid(np.linspace(0.01, 0.99, 60), np.linspace(0.01, 0.99, 160), indexing="ij")
+    place = np.stack([down.ravel(), across.ravel()])
+    column = 30 + 580 * place[1]
+    lines = (LINE_PX - 1) / 2 + np.arange(0, FRAME_PX, LINE_PX)
+    at = distance_px + bend_px * (place[1] - 0.5) ** 2
+    signal = np.exp(-0.5 * ((lines[:, None] - column - at) / width_px) ** 2)
+    pixels = PlanePixels(column, np.ones(len(column)), np.zeros(len(column), int), place, {})
+    return Graph(
+        signal, np.full(signal.shape, 1e-6), lines[:, None] - column, np.ones(len(column)), pixels, FRAME_PX
+    )
+
+
+@pytest.mark.parametrize("distance_px", [200.0, 290.0, 320.0, 335.0, 365.0])
+def test_an_order_that_leaves_the_frame_is_placed_by_the_pixels_that_see_all_of_it(
+    distance_px: float,
+) -> None:
+    found = find_order(graph_of(distance_px, bend_px=25.0), 1, REACH_PX)
+    assert found is not None
+    middle = float(found.at(np.array([[0.5], [0.5]]))[0])
+    assert abs(middle - distance_px) < 3 * found.std_px
+    assert found.std_px < 2
+
+
+def test_light_that_is_none_has_no_place() -> None:
+    dark = graph_of(200.0, 0.0)
+    assert find_order(Graph(dark.signal * 0, *list(vars(dark).values())[1:]), 1, REACH_PX) is None
