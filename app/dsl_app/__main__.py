@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("QT_API", "pyside6")
     from dsl_app.composition.window import IMPORTS, Composition, Wish
     from dsl_app.connection.state import RigChoice
-    from dsl_app.shell.application import ExceptionHook, keep_house, make_application, make_window
+    from dsl_app.shell.application import ExceptionHook, collect_garbage, make_application, make_window
     from dsl_app.shell.warm_up import WarmUp
 
     application = make_application(sys.argv[:1])
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         imports=IMPORTS,
         takers=composition.takers,
     )
-    keep_house(window)
+    collect_garbage(window)
     hook = ExceptionHook(window.toasts)
     hook.install()
     warm_up = WarmUp()

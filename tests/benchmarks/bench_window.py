@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.app.virtual_display import virtual_display
+from tests.app.support.virtual_display import virtual_display
 from tests.benchmarks.common import as_on_screen, options, print_table, write_json
 from tests.benchmarks.stall_watch import Stalls, StallWatch
 

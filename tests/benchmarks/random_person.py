@@ -16,7 +16,7 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import WORKERS
-from dsl_app.shared.widgets.late import Late
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.application import ExceptionHook, make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
@@ -200,8 +200,8 @@ class RandomPerson:
                     if key == "view_cloud":
                         self._wait(lambda: results.scene.scene is not None)
                     self.rest()
-        for room in self.window.findChildren(Late):
-            _ = room.part
+        for room in self.window.findChildren(Deferred):
+            _ = room.content
         self._busy_all_workers()
         self._compare(results)
 

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import psutil
 
-from tests.app.virtual_display import virtual_display
+from tests.app.support.virtual_display import virtual_display
 from tests.benchmarks.common import as_on_screen
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def _soak(minutes: float, seed: int, theme: str) -> int:
-    from dsl_app.shell.application import keep_house, make_application
+    from dsl_app.shell.application import collect_garbage, make_application
 
     from tests.benchmarks.random_person import RandomPerson
 
@@ -65,7 +65,7 @@ def _soak(minutes: float, seed: int, theme: str) -> int:
         os.environ["HOME"] = os.environ["DSL_SCAN_HOME"] = home
         errors = _Errors()
         person = RandomPerson(Path(home), theme, random.Random(seed))
-        keep_house(person.window)
+        collect_garbage(person.window)
         rounds: list[tuple[float, ...]] = []
         kinds: list[Counter[str]] = []
         limit = time.monotonic() + 60 * minutes

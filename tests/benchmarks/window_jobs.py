@@ -18,7 +18,7 @@ from dsl_app.rig.page import RigPage
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
-from dsl_app.shell.application import keep_house
+from dsl_app.shell.application import collect_garbage
 from dsl_app.shell.warm_up import WarmUp
 
 from dsl_core.io.campaign_folder import CampaignFolder
@@ -98,7 +98,7 @@ class WindowJobs:
         self.stage.open(library=True, page_waits=True, campaign=campaign)
         window = self.stage.window
         with self._job("first page"):
-            keep_house(window)
+            collect_garbage(window)
             self._wait(lambda: window.stack.count() > 0)
         with self._job("connect at the start"):
             self.stage.composition.start(window)
@@ -174,7 +174,7 @@ class WindowJobs:
         page.middle.setCurrentWidget(page.effects)
         with self._job("weigh effects"):
             for i in range(DRAGS):
-                page.effects.part.choice.setCurrentIndex(i % page.effects.part.choice.count())
+                page.effects.content.choice.setCurrentIndex(i % page.effects.content.choice.count())
                 self._live_for(DRAG_S)
             self.stage.idle()
         page.middle.setCurrentWidget(page.view)

@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.app.virtual_display import is_missing, virtual_display
+from tests.app.support.virtual_display import is_missing, virtual_display
 from tests.screens.gallery import write_gallery
 from tests.screens.look import SIZES, THEMES, Look, parse_size
 from tests.screens.material import make_material

@@ -162,7 +162,7 @@ def effects(stage: Stage) -> None:
     """What the twin renders, as usual, by what the scene calls for, and by name."""
     stage.open()
     scan = planned_scan(stage)
-    panel = scan.page.effects.part
+    panel = scan.page.effects.content
     scan.page.middle.setCurrentWidget(scan.page.effects)
     stage.wait(lambda: panel.table.rowCount() > 0)
     stage.idle()

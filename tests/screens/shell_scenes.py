@@ -14,7 +14,7 @@ from dsl_app.shell.actions import PAGES
 from dsl_app.shell.tour import Tour
 from PySide6.QtWidgets import QMenu
 
-from tests.app.published_folders import make_folders
+from tests.app.importing.published_folders import make_folders
 from tests.screens.results_scenes import marked
 from tests.screens.stage import Stage
 

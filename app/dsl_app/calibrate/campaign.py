@@ -13,8 +13,7 @@ from dsl_app.calibrate.wizard.work import Recipes
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import RigChoice
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import NO_RIG, sentence_of
+from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_core.campaign.assembly import campaign_recipes
 from dsl_core.campaign.recipes import recipe_names
 from dsl_core.devices.conditions import current_conditions

@@ -16,8 +16,7 @@ from dsl_app.calibrate.words import calibrate_command
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Offerer
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.errors import DslError
@@ -37,7 +36,7 @@ class CalibrateController:
         state: CalibrateState,
         rig: RigController,
         runner: JobRunner,
-        notifier: Offerer,
+        notifier: Notifier,
         library: CalibrationLibrary | None = None,
         kinds: Kinds | None = None,
     ) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QPushButton, QVBoxLayout, QWidget
 
+from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.state import DriftVerdict
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.figures_table import FiguresTable
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_core.model.figure import failures

@@ -10,8 +10,7 @@ from pathlib import Path
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Offerer
-from dsl_app.shared.sentences import NO_RIG, sentence_of
+from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
 from dsl_core.model.figure import failures
 from dsl_core.progress import Progress
@@ -35,7 +34,7 @@ class LibraryController:
         state: CalibrateState,
         rig: RigController,
         runner: JobRunner,
-        notifier: Offerer,
+        notifier: Notifier,
         library: CalibrationLibrary,
     ) -> None:
         self._state, self._rig, self._runner, self._notifier = state, rig, runner, notifier

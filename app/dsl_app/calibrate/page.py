@@ -24,7 +24,7 @@ from dsl_app.calibrate.row import CalibrationRow
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict, Row
 from dsl_app.connection.state import RigState
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.banner import Banner
+from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.page import PageWidget
 
 #: How often news of a calibration of everything is fetched, ms.

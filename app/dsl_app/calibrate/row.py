@@ -7,8 +7,8 @@ from datetime import datetime
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QWidget
 
+from dsl_app.calibrate.figures_table import value_words
 from dsl_app.calibrate.state import Row, RowState
-from dsl_app.shared.widgets.figures_table import value_words
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_core.model.figure import Figure
 

@@ -15,9 +15,8 @@ from dsl_app.compare.series.commands import SeriesCommands
 from dsl_app.compare.series.panel import SeriesPanel
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.drops import dropped_paths
-from dsl_app.shared.widgets.late import Late
-from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.deferred import Deferred
+from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 
 
 class ComparePage(PageWidget):
@@ -34,7 +33,7 @@ class ComparePage(PageWidget):
         self._commands, self._series_commands = commands, series_commands
         self.setAcceptDrops(True)
         self.pair = ComparePair(state, commands)
-        self._series = Late(lambda: SeriesPanel(series_state, series_commands))
+        self._series = Deferred(lambda: SeriesPanel(series_state, series_commands))
         self.tabs = QTabWidget()
         self.tabs.setDocumentMode(True)
         self.tabs.tabBar().setDrawBase(False)
@@ -49,7 +48,7 @@ class ComparePage(PageWidget):
     @property
     def series(self) -> SeriesPanel:
         """The series, made when somebody looks."""
-        return self._series.part
+        return self._series.content
 
     def show_series(self) -> None:
         """Show the tab of several results."""

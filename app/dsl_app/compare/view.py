@@ -11,11 +11,10 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dsl_app.compare.pair.state import CompareState, Pair, Shown
-from dsl_app.shared.colour_scales import DEPTH, GREY, colour_map, spread_of
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.arrow_keys import arrow_step, moved_within
-from dsl_app.shared.widgets.turns import take_turn
+from dsl_app.shared.widgets.deferred import call_deferred
+from dsl_app.shared.widgets.pictures import DEPTH, GREY, arrow_step, colour_map, moved_within, spread_of
 
 #: Differences: white is none, blue below, red above; lightness changes evenly.
 DIFFERENCE = "CET-D1A"
@@ -88,7 +87,7 @@ class CompareView(QWidget):
         for item in self.images:
             item.clear()
         if pair is not None and not self.bars:
-            take_turn(self, self._make_bars)
+            call_deferred(self, self._make_bars)
         for bar in self.bars:
             bar.setVisible(pair is not None)
         self._title(pair)

@@ -13,7 +13,7 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import Phase
 from dsl_app.scan.words import fresh_target
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Offerer
+from dsl_app.shared.notify import Notifier
 from dsl_core.errors import Cancelled, DslError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS
@@ -39,7 +39,7 @@ class DemoController:
         folder: Path,
         rig: RigController,
         runner: JobRunner,
-        notifier: Offerer,
+        notifier: Notifier,
         open_result: Callable[[Path], object],
         scan_page: Callable[[], ScanController],
         clock: Callable[[], datetime] = datetime.now,

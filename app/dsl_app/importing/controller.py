@@ -16,8 +16,7 @@ from dsl_app.importing.words import (
     trouble_of,
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, TakeInOrder, TakeInState
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.dialogs import OrderCommands, OrderDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
-from dsl_app.shared.widgets.order_dialog import OrderCommands, OrderDialog
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 
 _COLUMNS = ("Wanted", "Found", "Status", "What to do")

@@ -17,7 +17,7 @@ from dsl_app.results.state import Limits, ResultsState, Search, Seek, View
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
-from dsl_app.shared.notify import Offerer
+from dsl_app.shared.notify import Notifier
 from dsl_app.shared.spectrum import Pixel, Spectrum
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
@@ -28,7 +28,7 @@ from dsl_core.workflows.inspection import FrameBlock, IntensityGraph, intensity_
 class ResultsController:
     """Opens results and answers what the page asks of the whole image; ``marks`` has pins and regions."""
 
-    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer, undo: UndoStack) -> None:
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self.marks = MarksController(state, runner, notifier, undo)
         self._undo = undo

@@ -13,10 +13,9 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from dsl_app.results.layers import Layer, Layers
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, Tool
-from dsl_app.shared.colour_scales import colour_map
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.arrow_keys import arrow_step
+from dsl_app.shared.widgets.pictures import arrow_step, colour_map
 
 #: Moves of the mouse are looked at no more often than this, Hz.
 CURSOR_HZ = 60

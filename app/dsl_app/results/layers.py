@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.results.state import Limits, Quality, ResultsState, View
-from dsl_app.shared.colour_scales import DEPTH, GREY, SHARE, colour_map, spread_of
+from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map, spread_of
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 

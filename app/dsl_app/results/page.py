@@ -33,10 +33,10 @@ from dsl_app.results.view_bar import ViewBar
 from dsl_app.results.welcome import Welcome
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import Figure
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.late import Late
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.workflows.inspection import IntensityGraph
 
@@ -68,12 +68,12 @@ class ResultsPage(PageWidget):
         )
         self.bar = ViewBar(state, commands)
         set_help(self.bar, "numbers#views")
-        self._image = Late(self._make_image)
+        self._image = Deferred(self._make_image)
         set_help(self._image, "numbers#under-the-picture")
         self.scene = ScenePanel(state, runner)
         self.readout = Readout(state)
         set_help(self.readout, "hard-cases")
-        self._spectra = Late(lambda: SpectrumPanel(state))
+        self._spectra = Deferred(lambda: SpectrumPanel(state))
         self._spectra.setObjectName("spectra")
         set_help(self._spectra, "numbers#spectra")
         self.marks = MarksPanel(state, commands.marks)
@@ -95,12 +95,12 @@ class ResultsPage(PageWidget):
     @property
     def image(self) -> ResultImage:
         """The picture."""
-        return self._image.part
+        return self._image.content
 
     @property
     def spectra(self) -> SpectrumPanel:
         """The spectra under the cursor and of what is marked."""
-        return self._spectra.part
+        return self._spectra.content
 
     def _make_image(self) -> ResultImage:
         commands, made = self._commands, ResultImage(self._state)

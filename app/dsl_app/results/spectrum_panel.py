@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dsl_app.results.state import Mark, ResultsState
-from dsl_app.shared.colour_scales import spread_of
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.pictures import spread_of
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 #: Higher values are wrong or gloss: they are there for who zooms out.

@@ -17,10 +17,10 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.commands import ResultCommands
 from dsl_app.results.state import Quality, ResultsState, Tool, View
-from dsl_app.shared.colour_scales import spread_of
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_app.shared.widgets.icons import icon
+from dsl_app.shared.widgets.pictures import spread_of
 from dsl_core.optics.relighting import LIGHTS
 
 VIEWS = (

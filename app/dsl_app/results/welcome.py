@@ -9,9 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QListWidget, QListWidgetItem, QPushButton, QVBoxLayout, QWidget
 
-from dsl_app.shared.recent import RecentFiles
+from dsl_app.shared.settings import RecentFiles, entry_text
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.recent_menu import entry_text
 
 WIDTH_PX = 560
 HINT = (

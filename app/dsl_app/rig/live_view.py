@@ -12,9 +12,8 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, 
 
 from dsl_app.connection.state import FrameCounts
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.arrow_keys import arrow_step, moved_within
 from dsl_app.shared.widgets.forms import label, set_role
-from dsl_app.shared.widgets.region_box import Region, RegionBox, cut
+from dsl_app.shared.widgets.pictures import Region, RegionBox, arrow_step, cut, moved_within
 from dsl_core.capture.preview import BINS, Statistics, quick_picture, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame

@@ -20,9 +20,9 @@ from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, set_role
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.late import Late
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 
@@ -42,7 +42,7 @@ class RigPage(PageWidget):
         super().__init__()
         self._state, self._commands = state, commands
         self._stops: list[Callable[[], None]] = []
-        self._live = Late(self._make_live)
+        self._live = Deferred(self._make_live)
         self._live.setObjectName("live-view")
         set_help(self._live, "rig#live-picture")
         self.projector = ProjectorPanel()
@@ -87,7 +87,7 @@ class RigPage(PageWidget):
     @property
     def live(self) -> LiveView:
         """What the camera sees."""
-        return self._live.part
+        return self._live.content
 
     def _make_live(self) -> LiveView:
         state, made = self._state, LiveView()

@@ -16,8 +16,7 @@ from dsl_app.scan.state import Interrupted, Phase, Rescue, ScanState
 from dsl_app.scan.words import fresh_target, rig_words, scan_command
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.undo import UndoStack
 from dsl_core.capture.status import State, Status
 from dsl_core.devices.base import DeviceRig

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dsl_app.scan.state import Facts
-from dsl_app.shared.sentences import NO_RIG
+from dsl_app.shared.notify import NO_RIG
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import PlanError

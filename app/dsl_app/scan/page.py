@@ -27,10 +27,10 @@ from dsl_app.scan.run import CalibrationBox, RunBox, TargetBox
 from dsl_app.scan.state import Phase, Rescue, ScanState
 from dsl_app.scan.view import ScanView
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.banner import Banner
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import Figure
+from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.late import Late
 from dsl_app.shared.widgets.page import PageWidget
 
 #: How often news of the scan is fetched, ms: ten pictures a second look alive.
@@ -71,8 +71,8 @@ class ScanPage(PageWidget):
         self.forecast = forecast
         set_help(self.forecast, "accuracy-against-time")
         # Tabs behind the first are made when somebody looks.
-        self.view = Late(lambda: ScanView(state, commands))
-        self.effects = Late(lambda: EffectsPanel(rendered, effects))
+        self.view = Deferred(lambda: ScanView(state, commands))
+        self.effects = Deferred(lambda: EffectsPanel(rendered, effects))
         set_help(self.effects, "effects-of-the-twin")
         self._rendered, self._effects = rendered, effects
         self.calibration = CalibrationBox(state, commands)
@@ -91,7 +91,7 @@ class ScanPage(PageWidget):
     @property
     def curve(self) -> OperatingCurve:
         """Accuracy against time."""
-        return self.forecast.curve.part
+        return self.forecast.curve.content
 
     def _lay_out(self) -> None:
         self.middle = QTabWidget()

@@ -11,8 +11,7 @@ from dsl_app.scan.plan_files import read_plan
 from dsl_app.scan.state import OWN_CALIBRATION, CalibrationChoice, Interrupted, Phase, ScanState, same_plan
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DslError

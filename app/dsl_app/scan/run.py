@@ -19,8 +19,8 @@ from PySide6.QtWidgets import (
 from dsl_app.scan.commands import ScanCommands
 from dsl_app.scan.forecast.words import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
+from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widgets.forms import ChoiceBox, label, set_role
-from dsl_app.shared.widgets.job_strip import describe_seconds
 from dsl_core.capture.status import Status
 from dsl_core.model.plan import Columns
 

@@ -13,9 +13,9 @@ from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 from dsl_app.scan.commands import ScanCommands
 from dsl_app.scan.state import LivePicture, ScanState
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.arrow_keys import arrow_step
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.pictures import arrow_step
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_core.capture.growth import IntensityGraph
 from dsl_core.model.plan import CapturePlan, Shot

@@ -1,39 +1,35 @@
-"""How controllers tell the person at the window something; no Qt, so that tests keep a list instead."""
+"""How controllers tell the person at the window something, and sentences that several of them use. No Qt."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Literal, Protocol
 
+from dsl_core.errors import DslError
+
 Level = Literal["info", "warning", "error"]
+
+NO_RIG = "No rig is connected. Connect one on the Rig page."
 
 
 class Notifier(Protocol):
     """Tells the person at the window something in a sentence."""
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
-        """Show a sentence; ``details`` are there for who asks."""
-
-
-class Offerer(Notifier, Protocol):
-    """A notifier that can offer something to do."""
+        """Show a sentence, with ``details`` on request."""
 
     def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
         """Show a sentence with buttons by their texts; it stays until one is used or it is closed."""
 
 
-class RecordingNotifier:
-    """Keeps what it is told: for tests and scripts."""
+def sentence_of(error: Exception) -> str:
+    """What went wrong, for people."""
+    return str(error) if isinstance(error, DslError) else f"{type(error).__name__}: {error}"
 
-    def __init__(self) -> None:
-        self.told: list[tuple[Level, str]] = []
-        self.offers: dict[str, Callable[[], object]] = {}
 
-    def tell(self, level: Level, text: str, details: str = "") -> None:
-        """Keep the sentence."""
-        self.told.append((level, text))
-
-    def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
-        """Keep the sentence and what it offers."""
-        self.told.append(("info", text))
-        self.offers.update(offers)
+def describe_seconds(seconds: float) -> str:
+    """A duration as people say it: ``45 s``, ``3 min``, ``1 h 20 min``."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from dsl_app.shared.evented import Value
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside, write_atomic
 
@@ -46,6 +47,33 @@ class Settings(BaseModel):
         """Put a file first among the recent ones."""
         name = str(path.absolute())
         self.recent = [name, *(other for other in self.recent if other != name)][:RECENT_COUNT]
+
+
+class RecentFiles:
+    """The recent files of the settings, for menus and pages that follow them."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self.paths: Value[tuple[Path, ...]] = Value(tuple(Path(name) for name in settings.recent))
+
+    def add(self, path: Path) -> None:
+        """Put a file first."""
+        self._settings.remember(path)
+        self._tell()
+
+    def forget(self, path: Path) -> None:
+        """Leave a file out from now on."""
+        self._settings.recent = [name for name in self._settings.recent if Path(name) != path]
+        self._tell()
+
+    def _tell(self) -> None:
+        self.paths.set(tuple(Path(name) for name in self._settings.recent))
+
+
+def entry_text(path: Path) -> str:
+    """How a recent file is named in lists: its name and folder, and whether it is gone."""
+    text = f"{path.name}  –  {path.parent}"
+    return text if path.exists() else f"{text}  (missing)"
 
 
 def settings_folder() -> Path:

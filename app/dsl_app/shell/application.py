@@ -16,12 +16,11 @@ from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
 from dsl_app.shared.jobs.base import Job
-from dsl_app.shared.jobs.housekeeping import LOOK_MS, Housekeeper, share_heaps
+from dsl_app.shared.jobs.memory import CHECK_MS, GarbageCollector, limit_heaps
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.notify import Notifier
-from dsl_app.shared.recent import RecentFiles
-from dsl_app.shared.settings import load_settings, settings_folder
+from dsl_app.shared.settings import RecentFiles, load_settings, settings_folder
 from dsl_app.shared.theme import DARK, LIGHT, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.icons import icon
@@ -45,7 +44,7 @@ SWITCH_S = 0.001
 def make_application(arguments: Sequence[str]) -> QApplication:
     """The one Qt application, in a style that looks alike on all systems."""
     sys.setswitchinterval(SWITCH_S)
-    share_heaps()
+    limit_heaps()
     _import_plainly()
     application = QApplication.instance()
     if not isinstance(application, QApplication):
@@ -56,15 +55,15 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     return application
 
 
-def keep_house(window: MainWindow) -> Housekeeper:
-    """Look for garbage in the window's thread alone from now on."""
-    keeper = Housekeeper(lambda: bool(window.parts.runner.active))
-    keeper.take_charge()
+def collect_garbage(window: MainWindow) -> GarbageCollector:
+    """Collect garbage in the window's thread only, from now on."""
+    collector = GarbageCollector(lambda: bool(window.parts.runner.active))
+    collector.start()
     timer = QTimer(window)
-    timer.setInterval(LOOK_MS)
-    timer.timeout.connect(keeper.look)
+    timer.setInterval(CHECK_MS)
+    timer.timeout.connect(collector.check)
     timer.start()
-    return keeper
+    return collector
 
 
 def _import_plainly() -> None:

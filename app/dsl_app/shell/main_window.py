@@ -11,12 +11,10 @@ from PySide6.QtWidgets import QAbstractSpinBox, QDockWidget, QLineEdit
 
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.widgets.page import PageWidget
-from dsl_app.shared.widgets.recent_menu import RecentMenu
 from dsl_app.shell.actions import ACTIONS, PAGES, Action
-from dsl_app.shell.layout_memory import restore_layout
 from dsl_app.shell.log import LogPanel
-from dsl_app.shell.menus import Menus
-from dsl_app.shell.paged_window import PagedWindow, Parts
+from dsl_app.shell.menus import Menus, RecentMenu
+from dsl_app.shell.paged_window import PagedWindow, Parts, restore_layout
 from dsl_app.shell.window_actions import THEMES, WindowActions
 
 PageMaker = Callable[["MainWindow"], PageWidget]

@@ -7,27 +7,26 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import QSize, QTimer, Signal
+from PySide6.QtCore import QByteArray, QObject, QSize, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QMessageBox, QStackedWidget, QWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
-from dsl_app.shared.recent import RecentFiles
-from dsl_app.shared.settings import Settings, save_settings
+from dsl_app.shared.settings import RecentFiles, Settings, save_settings
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.undo import UndoStack
-from dsl_app.shared.widgets.drops import FilesInTurn, dropped_paths
-from dsl_app.shared.widgets.job_strip import JobStrip
-from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 from dsl_app.shell.actions import PAGES, Page
-from dsl_app.shell.layout_memory import keep_layout
+from dsl_app.shell.job_strip import JobStrip
 from dsl_app.shell.log import LogRecords
 from dsl_app.shell.rail import Rail
 from dsl_app.shell.toasts import Toasts
 
 _log = logging.getLogger(__name__)
 SMALLEST = QSize(1024, 700)
+#: Rises when docks change, so that a layout of an older version is not restored.
+LAYOUT_VERSION = 1
 
 
 @dataclass
@@ -76,8 +75,8 @@ class PagedWindow(QMainWindow):
         self.stack = QStackedWidget()
         self.strip = JobStrip(parts.runner)
         self.statusBar().addPermanentWidget(self.strip)
-        self._dropped = FilesInTurn(self.open_path, self._is_reading, self)
-        parts.runner.changed.connect(self._dropped.go_on)
+        self._dropped = OpenQueue(self.open_path, self._is_reading, self)
+        parts.runner.changed.connect(self._dropped.open_next)
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -203,3 +202,47 @@ class PagedWindow(QMainWindow):
             f"{titles} is still running. Stop it and leave? What is captured is kept and can be resumed.",
         )
         return answer == QMessageBox.StandardButton.Yes
+
+
+class OpenQueue(QObject):
+    """Opens files one after the other, each once what was opened before it is read."""
+
+    def __init__(
+        self, open_path: Callable[[Path], object], is_reading: Callable[[], bool], parent: QObject
+    ) -> None:
+        super().__init__(parent)
+        self._open_path, self._is_reading = open_path, is_reading
+        self._waiting: list[Path] = []
+        self._is_opening = False
+
+    def add(self, paths: list[Path]) -> None:
+        """Open files once the drop is over, so that its sender does not wait."""
+        self._waiting.extend(paths)
+        QTimer.singleShot(0, self, self.open_next)
+
+    def open_next(self) -> None:
+        """Open what waits as far as nothing is read; called whenever work begins, moves on or ends."""
+        if self._is_opening:
+            return  # opening a file begins work itself
+        self._is_opening = True
+        try:
+            while self._waiting and not self._is_reading():
+                self._open_path(self._waiting.pop(0))
+        finally:
+            self._is_opening = False
+
+
+def restore_layout(window: QMainWindow, settings: Settings) -> None:
+    """Place window and docks as they lay; Qt leaves them where it cannot make sense of what was kept."""
+    window.restoreGeometry(QByteArray.fromBase64(settings.window_geometry.encode()))
+    window.restoreState(QByteArray.fromBase64(settings.window_state.encode()), LAYOUT_VERSION)
+
+
+def keep_layout(window: QMainWindow, settings: Settings) -> None:
+    """Note in the settings how window and docks lie."""
+    settings.window_geometry = _text(window.saveGeometry())
+    settings.window_state = _text(window.saveState(LAYOUT_VERSION))
+
+
+def _text(kept: QByteArray) -> str:
+    return bytes(kept.toBase64().data()).decode()

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+import platform
+import sys
+import zipfile
+from collections.abc import Callable, Iterable
 from functools import partial
+from importlib.metadata import distributions
 from pathlib import Path
 
-from PySide6.QtWidgets import QFileDialog, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence
+from PySide6.QtWidgets import QDialog, QFileDialog, QLabel, QTextBrowser, QWidget
 
+from dsl_app.shared.settings import Settings
+from dsl_app.shared.widgets.dialogs import command_window, text_window
 from dsl_app.shared.widgets.figure_file import FORMATS, save_figure
 from dsl_app.shared.widgets.help_window import help_of, help_window
-from dsl_app.shared.widgets.text_windows import command_window
-from dsl_app.shell.about import about_window, shortcuts_window
-from dsl_app.shell.actions import ACTIONS
+from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.paged_window import PagedWindow
-from dsl_app.shell.report_bundle import write_report_bundle
-from dsl_app.shell.tour import Tour
-from dsl_app.shell.tour_steps import STEPS, Step
+from dsl_app.shell.tour import STEPS, Step, Tour
+from dsl_core import __version__
 from dsl_core.errors import DslError
+from dsl_core.io.staging import staged
 
 THEMES = ("system", "light", "dark")
 
@@ -146,3 +153,57 @@ class WindowActions:
 
     def _end_tour(self) -> None:
         self._tour = None
+
+
+def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
+    """Every action with its keys."""
+    rows = [
+        f"| {action.text.replace('&', '')} | {_keys(action)} | {action.tip} |"
+        for action in actions
+        if action.shortcut
+    ]
+    browser = QTextBrowser()
+    browser.setAccessibleName("Keyboard shortcuts")
+    browser.setToolTip("Every action that has a key")
+    browser.setMarkdown("\n".join(["| Action | Keys | What it does |", "|---|---|---|", *rows]))
+    return text_window("Keyboard shortcuts", browser, parent, 720, 620)
+
+
+def _keys(action: Action) -> str:
+    return QKeySequence(action.shortcut).toString(QKeySequence.SequenceFormat.NativeText)
+
+
+def about_window(parent: QWidget) -> QDialog:
+    """What this is, which version, under which licence."""
+    from PySide6 import __version__ as qt_version
+
+    text = QLabel(
+        f"<h3>dsl-scan {__version__}</h3>"
+        "<p>Hyperspectral 3D scanning by Dispersed Structured Light: an RGB camera, an RGB projector and a"
+        " diffraction film.</p>"
+        "<p>After S. Shin, S. Choi, F. Heide and S.-H. Baek, <i>Dispersed Structured Light for Hyperspectral"
+        " 3D Imaging</i>, CVPR 2024.</p>"
+        f"<p>BSD-3-Clause · Python {sys.version.split()[0]} · Qt {qt_version} (LGPL)</p>"
+    )
+    text.setWordWrap(True)
+    text.setAlignment(Qt.AlignmentFlag.AlignTop)
+    return text_window("About dsl-scan", text, parent, 460, 280)
+
+
+def write_report_bundle(path: Path, lines: Iterable[str], settings: Settings) -> Path:
+    """Write a zip file, over one that exists: who chose its name was asked. Raises `StoreError`."""
+    versions = sorted(f"{d.metadata['Name']}=={d.version}" for d in distributions())
+    facts = {
+        "dsl-scan": __version__,
+        "python": sys.version,
+        "system": platform.platform(),
+        "packages": versions,
+    }
+    with (
+        staged([path], overwrite=True) as (draft,),
+        zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as bundle,
+    ):
+        bundle.writestr("log.txt", "\n".join(lines))
+        bundle.writestr("settings.json", settings.model_dump_json(indent=1))
+        bundle.writestr("versions.json", json.dumps(facts, indent=1))
+    return path

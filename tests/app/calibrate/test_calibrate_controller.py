@@ -13,7 +13,7 @@ from dsl_app.calibrate.state import RowState
 from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
 from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Value
-from dsl_app.shared.jobs.base import InlineRunner, Job
+from dsl_app.shared.jobs.base import Job
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
@@ -27,7 +27,8 @@ from dsl_core.model.figure import Figure
 from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.calibrate_bench import CalibrateBench, make_bench, with_a_campaign
+from tests.app.calibrate.calibrate_bench import CalibrateBench, make_bench, with_a_campaign
+from tests.app.support.doubles import InlineRunner
 
 
 @pytest.fixture

@@ -39,7 +39,7 @@ from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.figure import Figure
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.calibrate_bench import CalibrateBench, make_bench
+from tests.app.calibrate.calibrate_bench import CalibrateBench, make_bench
 
 LIMITED = Figure(name="error", value=0.8, std=0.1, unit="px", high=0.5, advice="Hold it still.")
 

@@ -11,7 +11,7 @@ from dsl_app.calibrate.evidence.base import PlainEvidence, make_evidence
 from dsl_app.calibrate.evidence.parts import Aside, ChartBox, NumberTable, with_spread
 from dsl_app.calibrate.wizard.fit_page import FitPage
 from dsl_app.calibrate.wizard.state import Fit, WizardState
-from dsl_app.shared.widgets.turns import TURN_MS
+from dsl_app.shared.widgets.deferred import PAUSE_MS
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
@@ -20,7 +20,7 @@ from dsl_core.campaign.recipes import recipe_names
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
-from tests.app.evidence_bench import THEMES, session_of
+from tests.app.calibrate.evidence_bench import THEMES, session_of
 
 MAKE_ALL = """
 import sys
@@ -112,7 +112,7 @@ def test_between_two_charts_the_window_comes_round(qtbot: QtBot) -> None:
 
     def draw() -> None:
         drawn.append(len(rounds))
-        time.sleep(2.5e-3 * TURN_MS)
+        time.sleep(2.5e-3 * PAUSE_MS)
 
     boxes = [ChartBox(f"Chart {i}", "A chart", "y", "x") for i in range(3)]
     for box in boxes:

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
 from dsl_core.model.spectral import SpectralCurve
-from tests.app.evidence_bench import NM, THEMES, bump, curves, points, shown
+from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, points, shown
 
 
 def order(number: int, ratio: float) -> OrderSample:

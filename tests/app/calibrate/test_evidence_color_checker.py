@@ -32,7 +32,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.progress import NoProgress
 from dsl_core.simulation.sim_devices import open_twin
-from tests.app.evidence_bench import THEMES, bars, curves, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, curves, shown
 
 CHART = "BabelColor Average"
 #: Where the chart stands in the twin's picture of 222 x 145 pixels.

@@ -25,7 +25,7 @@ from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.rig import CorrespondenceGrid
 from dsl_core.optics.pinhole import project, rays_at
 from dsl_core.simulation.published_rig import published_rig
-from tests.app.evidence_bench import THEMES, bars, items, points, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, items, points, shown
 
 RIG = published_rig()
 #: alpha, beta, gamma of both orders, the same at every node and wavelength.

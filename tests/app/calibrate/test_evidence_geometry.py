@@ -25,7 +25,7 @@ from dsl_core.model.calibration.geometry import (
     PoseQuality,
 )
 from dsl_core.simulation.published_rig import published_rig
-from tests.app.evidence_bench import THEMES, bars, points, session_of, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, points, session_of, shown
 
 FLAT = Flatness(square_mm=20.004, square_std_mm=0.03, plane_rms_mm=0.041)
 LENS = LensDeviation(fx_px=1, fy_px=1, cx_px=1, cy_px=1, distortion=(0, 0, 0, 0, 0))

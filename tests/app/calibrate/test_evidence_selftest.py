@@ -19,7 +19,7 @@ from dsl_core.campaign.session import CalibrationSession
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.calibration.selftest import SelfTest
-from tests.app.evidence_bench import THEMES, bars, points, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, points, shown
 from tests.cases.light_rig import LightWorld, light_rig
 
 

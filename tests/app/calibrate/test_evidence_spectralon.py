@@ -17,7 +17,7 @@ from dsl_core.model.calibration.spectralon import (
 )
 from dsl_core.model.flat_field import FlatField
 from dsl_core.model.spectral import SpectralCurve
-from tests.app.evidence_bench import NM, THEMES, bump, curves, shown
+from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, shown
 
 EVEN = FlatField(rows_px=(50.0,), columns_px=(80.0,), gain=((1.0,),))
 GAIN = ((0.98, 1.0, 0.98), (1.0, 1.04, 1.0))

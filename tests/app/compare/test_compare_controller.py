@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from dsl_app.compare.pair.controller import CompareController
 from dsl_app.compare.pair.state import CompareState, Shown
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
 
-from tests.app.compare_bench import make_result
-from tests.app.later import Later
+from tests.app.support.compare_bench import make_result
+from tests.app.support.doubles import InlineRunner, ManualRunner, RecordingNotifier
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +42,7 @@ def test_two_results_fill_both_sides_and_are_compared(results: tuple[Path, Path,
 
 
 def test_results_opened_together_follow_each_other(results: tuple[Path, Path, Path]) -> None:
-    notifier, runner = RecordingNotifier(), Later()
+    notifier, runner = RecordingNotifier(), ManualRunner()
     compare = CompareController(CompareState(), runner, notifier)
     assert all(compare.open(path) for path in results[:2])
     runner.run_all()
@@ -55,7 +53,7 @@ def test_results_opened_together_follow_each_other(results: tuple[Path, Path, Pa
 
 
 def test_who_cancels_wants_none_of_what_waits(results: tuple[Path, Path, Path]) -> None:
-    runner = Later()
+    runner = ManualRunner()
     compare = CompareController(CompareState(), runner, RecordingNotifier())
     for path in results[:2]:
         compare.open(path)

@@ -8,14 +8,14 @@ from dsl_app.compare.pair.controller import CompareController
 from dsl_app.compare.pair.panel import NOTHING, ComparePair
 from dsl_app.compare.pair.state import CompareState, Shown
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.theme import DARK, LIGHT
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from tests.app.compare_bench import make_result
+from tests.app.support.compare_bench import make_result
+from tests.app.support.doubles import RecordingNotifier
 
 Bench = tuple[ComparePair, CompareState, CompareController]
 

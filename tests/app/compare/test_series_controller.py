@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import Kind, SeriesState
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.io.result.result_file import save_result
 from dsl_core.model.result import build_result
-from tests.app.later import Later
+from tests.app.support.doubles import InlineRunner, ManualRunner, RecordingNotifier
 from tests.cases.stage_series import NM, flat_arrays, write_stage, write_sweep
 
 POSITIONS = (700.0, 725.0, 750.0, 775.0)
@@ -130,7 +128,7 @@ def test_accuracy_over_time_against_one_result(series: SeriesController, tmp_pat
 
 
 def test_results_that_come_while_one_is_read_wait_and_a_cancel_says_so(stage: list[Path]) -> None:
-    runner = Later()
+    runner = ManualRunner()
     series = SeriesController(SeriesState(), runner, RecordingNotifier(), UndoStack())
     series.add(stage[:2])
     series.add(stage[2:])

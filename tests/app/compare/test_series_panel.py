@@ -15,7 +15,6 @@ from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.panel import NOTHING, SeriesPanel
 from dsl_app.compare.series.state import Kind, SeriesState
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.undo import UndoStack
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
@@ -24,6 +23,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
 from pytestqt.qtbot import QtBot
 
+from tests.app.support.doubles import RecordingNotifier
 from tests.cases.stage_series import write_stage, write_sweep
 
 POSITIONS = (700.0, 725.0, 750.0, 775.0)

@@ -10,14 +10,14 @@ from dsl_app.composition import demo
 from dsl_app.composition.demo import DemoController
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.state import Phase
-from dsl_app.shared.jobs.base import InlineRunner
 
 from dsl_core.errors import DeviceError
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import SHORT, ScanBench, make_bench
+from tests.app.support.doubles import InlineRunner
+from tests.app.support.scan_bench import SHORT, ScanBench, make_bench
 
 SMALL = {"scene": "color-checker", "size": "64x48"}
 

@@ -17,7 +17,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QWidget
 from pytestqt.qtbot import QtBot
 
-from tests.app.small_result import write_small_result
+from tests.app.support.small_result import write_small_result
 
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 #: Closing the window, which all other actions need, has tests of its own.

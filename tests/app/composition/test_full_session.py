@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.two_screens import missing_programs, two_screens
+from tests.app.support.two_screens import missing_programs, two_screens
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -19,7 +19,7 @@ def test_a_day_at_the_rig_by_mouse_and_keys(tmp_path: Path) -> None:
     home.mkdir()
     with two_screens() as display:
         done = subprocess.run(
-            [sys.executable, "-m", "tests.app.full_session", str(home)],
+            [sys.executable, "-m", "tests.app.composition.full_session", str(home)],
             env={
                 **os.environ,
                 "DISPLAY": display,

@@ -31,7 +31,7 @@ from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.faults import FaultPlan, with_faults
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.small_result import write_small_result
+from tests.app.support.small_result import write_small_result
 
 ROOT = Path(__file__).resolve().parents[3]
 _LEFT = Qt.MouseButton.LeftButton

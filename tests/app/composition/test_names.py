@@ -10,7 +10,7 @@ from dsl_app.calibrate.campaign_box import NewCampaignDialog
 from dsl_app.composition.window import Composition, Wish
 from dsl_app.results.export_dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
-from dsl_app.shared.widgets.late import Late
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.actions import PAGES
 from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
@@ -35,7 +35,7 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from tests.app.small_result import write_small_result
+from tests.app.support.small_result import write_small_result
 
 INTERACTIVE = (
     QAbstractButton,
@@ -91,8 +91,8 @@ def is_standard(widget: QWidget) -> bool:
 
 def complaints(root: QWidget) -> list[str]:
     found = []
-    for room in root.findChildren(Late):
-        _ = room.part
+    for room in root.findChildren(Deferred):
+        _ = room.content
     for widget in operable(root):
         interface = QAccessible.queryAccessibleInterface(widget)
         name = interface.text(QAccessible.Text.Name) if interface is not None else ""

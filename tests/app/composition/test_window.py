@@ -17,7 +17,7 @@ from shiboken6 import isValid
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
-from tests.app.scan_bench import foreseen
+from tests.app.support.scan_bench import foreseen
 
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from dsl_app.connection.controller import LOST_AFTER, RIG, RigController
 from dsl_app.connection.state import FrameCounts, Link, RigChoice, RigState
-from dsl_app.shared.jobs.base import InlineRunner, Job
+from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import WORKERS, QtRunner
-from dsl_app.shared.notify import RecordingNotifier
 from pytestqt.qtbot import QtBot
 
 from dsl_core.devices.base import DeviceRig
@@ -20,6 +19,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import PictureKind
 from dsl_core.progress import Progress
 from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
 Live = Callable[[], tuple[RigController, RecordingNotifier, QtRunner]]
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))

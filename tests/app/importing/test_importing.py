@@ -12,9 +12,8 @@ import pytest
 from dsl_app.importing.controller import TakeInController, take_scan
 from dsl_app.importing.state import FileRow, Found, TakeInOrder, TakeInState
 from dsl_app.importing.words import rows_of
-from dsl_app.shared.jobs.base import InlineRunner, Job
+from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import RecordingNotifier
 
 from dsl_core.cli import main
 from dsl_core.errors import Cancelled
@@ -23,7 +22,8 @@ from dsl_core.io.published import FileRecord
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.session import SessionReader
 from dsl_core.progress import CallbackProgress
-from tests.app.published_folders import Folders, make_folders
+from tests.app.importing.published_folders import Folders, make_folders
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[4] / "shared"))
 CAPTURES = SHARED / "data"

@@ -16,9 +16,9 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainText
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.calibration_library import CalibrationLibrary
+from tests.app.composition.test_drops import drop
 from tests.app.composition.test_names import complaints
-from tests.app.published_folders import Folders, make_folders
-from tests.app.shared.test_drops import drop
+from tests.app.importing.published_folders import Folders, make_folders
 
 PATIENCE_MS = 60_000
 

@@ -11,8 +11,6 @@ import pytest
 from dsl_app.results.again.controller import AgainController, took_s
 from dsl_app.results.again.state import AgainDone, AgainOrder, AgainSource, AgainState
 from dsl_app.results.again.words import command_of
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
 
 from dsl_core.cli import main
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -20,7 +18,8 @@ from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import save_rig
 from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.rig import Rig
-from tests.app.compare_bench import make_result
+from tests.app.support.compare_bench import make_result
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QFileDialog, QMessageBox, QPlainTextEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
-from tests.app.compare_bench import make_result
 from tests.app.composition.test_names import complaints
+from tests.app.support.compare_bench import make_result
 
 PATIENCE_MS = 60_000
 

@@ -10,16 +10,14 @@ from dsl_app.results.controller import ResultsController
 from dsl_app.results.marks import kept as kept_marks
 from dsl_app.results.marks.records import annotations_of
 from dsl_app.results.state import Mark, ResultsState
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.spectrum import Spectrum
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.errors import StoreError
 from dsl_core.io.result.annotations_file import Annotations, load_annotations, save_annotations
 from dsl_core.io.result.result_file import load_result, save_result
-from tests.app.small_result import BLUE, DARK, write_reference, write_small_result
-from tests.app.waiting_runner import WaitingRunner
+from tests.app.support.doubles import InlineRunner, RecordingNotifier, WaitingRunner
+from tests.app.support.small_result import BLUE, DARK, write_reference, write_small_result
 
 MARKS = "small.marks.json"
 SQUARE = ((1.5, 5.5), (6.5, 5.5), (6.5, 9.5), (1.5, 9.5))

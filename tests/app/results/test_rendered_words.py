@@ -9,16 +9,14 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.results.rendered_words import rendered_words
 from dsl_app.results.state import ResultsState
 from dsl_app.results.welcome import Welcome
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
-from dsl_app.shared.recent import RecentFiles
-from dsl_app.shared.settings import Settings
+from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.help_window import help_of
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.result.result_file import load_result, save_result
-from tests.app.small_result import write_small_result
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
+from tests.app.support.small_result import write_small_result
 
 NOTE = {
     "choice": "auto",

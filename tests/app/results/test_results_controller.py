@@ -8,12 +8,11 @@ import pytest
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layers, rgb_of
 from dsl_app.results.state import Limits, ResultsState, Seek, View
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.io.result.annotations_file import load_annotations
-from tests.app.small_result import BLUE, DARK, NM, write_reference, write_small_result
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
+from tests.app.support.small_result import BLUE, DARK, NM, write_reference, write_small_result
 from tests.io.test_reference_file import BRICK, write_library
 
 SQUARE = ((1.5, 5.5), (6.5, 5.5), (6.5, 9.5), (1.5, 9.5))

@@ -27,11 +27,10 @@ from dsl_app.results.marks.figures import figures_of
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import Mark, Quality, ResultsState, Seek, Tool, View
 from dsl_app.results.welcome import Welcome
-from dsl_app.shared.jobs.base import InlineRunner
 from dsl_app.shared.spectrum import Pixel, Spectrum
 from dsl_app.shared.theme import DARK as DARK_THEME
 from dsl_app.shared.theme import LIGHT
-from dsl_app.shared.widgets.late import Late
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.spectrum_curve import split_by_share
 from dsl_app.shell.application import make_window
@@ -46,7 +45,8 @@ from pytestqt.qtbot import QtBot
 from dsl_core.errors import Cancelled
 from dsl_core.evaluation.distance import on_screen
 from dsl_core.workflows.inspection import IntensityGraph
-from tests.app.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
+from tests.app.support.doubles import InlineRunner
+from tests.app.support.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
 from tests.io.test_reference_file import write_library
 
 
@@ -112,7 +112,7 @@ def bench(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
     made.window.show()
     qtbot.waitExposed(made.window)
     made.window.open_path(write_small_result(tmp_path))
-    qtbot.waitUntil(lambda: all(room.made is not None for room in made.page.findChildren(Late)))
+    qtbot.waitUntil(lambda: all(room.made is not None for room in made.page.findChildren(Deferred)))
     QTest.qWait(20)
     yield made
     made.window.close()

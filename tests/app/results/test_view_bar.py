@@ -9,13 +9,12 @@ from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import ResultsState
 from dsl_app.results.view_bar import ViewBar
 from dsl_app.session.parts import come_back_to_result, results_part
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.undo import UndoStack
 from pytestqt.qtbot import QtBot
 
 from dsl_core.io.result.result_file import load_result, save_result
-from tests.app.small_result import write_small_result
-from tests.app.waiting_runner import WaitingRunner
+from tests.app.support.doubles import RecordingNotifier, WaitingRunner
+from tests.app.support.small_result import write_small_result
 
 
 class Bench:

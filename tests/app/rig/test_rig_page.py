@@ -7,13 +7,14 @@ from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.rig.page import RigPage, cycles_text, parse_options
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
+
+from tests.app.support.doubles import RecordingNotifier
 
 Bench = tuple[RigPage, RigState, QtRunner, RecordingNotifier]
 

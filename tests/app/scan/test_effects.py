@@ -9,7 +9,6 @@ from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.panel import EffectsPanel
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.state import Phase
-from dsl_app.shared.jobs.base import InlineRunner
 from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -19,7 +18,8 @@ from dsl_core.io.scan.session import SessionReader
 from dsl_core.simulation.effects.catalogue import NAMES, NEEDED, USUAL
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import FRAMES, TWIN, ScanBench, planned_bench
+from tests.app.support.doubles import InlineRunner
+from tests.app.support.scan_bench import FRAMES, TWIN, ScanBench, planned_bench
 
 
 @pytest.fixture

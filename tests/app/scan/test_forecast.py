@@ -9,7 +9,7 @@ from dsl_app.scan.forecast.job import ForecastJob, Rigging
 from dsl_app.scan.forecast.state import ForecastState, Foreseen, identity, plan_title
 from dsl_app.scan.forecast.store import ForecastStore
 from dsl_app.scan.state import Phase
-from dsl_app.shared.jobs.base import InlineRunner, Job
+from dsl_app.shared.jobs.base import Job
 
 from dsl_core.errors import PlanError
 from dsl_core.io.result.result_file import load_result, save_result
@@ -17,8 +17,17 @@ from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
 from dsl_core.planning import prediction, views
-from tests.app.scan_bench import COMB, TWIN, ScanBench, foreseen, make_bench, make_forecast, planned_bench
-from tests.app.small_result import write_small_result
+from tests.app.support.doubles import InlineRunner
+from tests.app.support.scan_bench import (
+    COMB,
+    TWIN,
+    ScanBench,
+    foreseen,
+    make_bench,
+    make_forecast,
+    planned_bench,
+)
+from tests.app.support.small_result import write_small_result
 
 
 def forecast(bench: ScanBench, folder: Path, automatic: bool = True) -> ForecastController:

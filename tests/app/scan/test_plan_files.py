@@ -17,7 +17,7 @@ from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
 from dsl_core.model.presets import PRESETS
 from dsl_core.planning.designed import DesignedSet, packed, save_design
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import COMB, SMALL, TWIN, ScanBench, planned_bench
+from tests.app.support.scan_bench import COMB, SMALL, TWIN, ScanBench, planned_bench
 
 
 @pytest.fixture

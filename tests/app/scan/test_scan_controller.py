@@ -24,7 +24,16 @@ from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
 from dsl_core.workflows import sessions
-from tests.app.scan_bench import FRAMES, PATTERNS, SHORT, SMALL, TWIN, ScanBench, make_bench, planned_bench
+from tests.app.support.scan_bench import (
+    FRAMES,
+    PATTERNS,
+    SHORT,
+    SMALL,
+    TWIN,
+    ScanBench,
+    make_bench,
+    planned_bench,
+)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import FRAMES, SHORT, TWIN, ScanBench, foreseen, make_bench, make_forecast
+from tests.app.support.scan_bench import FRAMES, SHORT, TWIN, ScanBench, foreseen, make_bench, make_forecast
 
 Bench = tuple[ScanPage, ScanBench, list[Path]]
 
@@ -224,10 +224,10 @@ def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:
     page, bench, _ = ready
     click(page.run.start)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
-    QTest.keyClick(page.view.part.picture, Qt.Key.Key_Right)
-    QTest.keyClick(page.view.part.picture, Qt.Key.Key_Down)
+    QTest.keyClick(page.view.content.picture, Qt.Key.Key_Right)
+    QTest.keyClick(page.view.content.picture, Qt.Key.Key_Down)
     assert bench.state.cursor.value == (36, 28)
-    assert "Intensity graph at 36, 28" in page.view.part.graph._title.text()
+    assert "Intensity graph at 36, 28" in page.view.content.graph._title.text()
 
 
 @pytest.fixture

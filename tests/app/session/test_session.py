@@ -30,8 +30,6 @@ from dsl_app.session.parts import (
 )
 from dsl_app.session.records import ResultsPart, ScanPart, SeriesPart, Session
 from dsl_app.shared.evented import Value
-from dsl_app.shared.jobs.base import InlineRunner
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shell.application import make_window
 from PySide6.QtWidgets import QApplication, QPushButton
@@ -41,8 +39,9 @@ from dsl_core.errors import DeviceError
 from dsl_core.evaluation.time_sweep import FIGURES
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.scan_bench import make_bench
-from tests.app.small_result import write_small_result
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
+from tests.app.support.scan_bench import make_bench
+from tests.app.support.small_result import write_small_result
 from tests.cases.stage_series import write_stage, write_sweep
 
 #: A number that no process has.

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
-from dsl_app.shared.recent import RecentFiles
-from dsl_app.shared.settings import Settings
+from dsl_app.shared.settings import RecentFiles, Settings
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 from dsl_app.shared.jobs.base import Job
-from dsl_app.shared.notify import RecordingNotifier
 from dsl_app.shared.undo import Change
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.actions import ACTIONS, PAGES
@@ -16,6 +15,8 @@ from dsl_app.shell.application import ExceptionHook, make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
+
+from tests.app.support.doubles import RecordingNotifier
 
 
 class Page(PageWidget):

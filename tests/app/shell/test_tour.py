@@ -8,8 +8,7 @@ from dsl_app.composition.window import Composition, Wish
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
-from dsl_app.shell.tour import Tour, beside
-from dsl_app.shell.tour_steps import STEPS
+from dsl_app.shell.tour import STEPS, Tour, beside
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget

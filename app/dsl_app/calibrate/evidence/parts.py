@@ -22,10 +22,10 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
-from dsl_app.shared.widgets.turns import take_turn
 
 Floats = NDArray[np.floating[Any]]
 #: A name of the legend with its colour (``#rrggbb``) and the sign that stands for it.
@@ -111,7 +111,7 @@ class ChartBox(QWidget):
     def _draw_soon(self) -> None:
         if self._draw is not None and not self._is_next:
             self._is_next = True
-            take_turn(self, self._take_turn)
+            call_deferred(self, self._take_turn)
 
     def _take_turn(self) -> None:
         self._is_next = False

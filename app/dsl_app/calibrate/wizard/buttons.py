@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QVBoxLayou
 
 from dsl_app.calibrate.wizard.commands import WizardCommands
 from dsl_app.calibrate.wizard.state import Doing, Told, WizardState
+from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.job_strip import describe_seconds
 
 
 class WizardButtons(QWidget):

@@ -14,7 +14,7 @@ from dsl_app.calibrate.wizard.work import Captured, Opened, Recipes, WizardWork
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
 from dsl_app.shared.jobs.base import JobRunner
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import sentence_of
 from dsl_core.devices.base import DeviceRig
 
 

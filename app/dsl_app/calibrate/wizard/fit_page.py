@@ -7,11 +7,11 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
 
 from dsl_app.calibrate.evidence.base import Evidence, make_evidence
+from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.figures_table import FiguresTable
+from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label, set_role
-from dsl_app.shared.widgets.turns import take_turn
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.figure import failures
 
@@ -82,7 +82,7 @@ class FitPage(QWidget):
         self._show_due_soon()
 
     def _show_due_soon(self) -> None:
-        take_turn(self, self._take_turn)
+        call_deferred(self, self._take_turn)
 
     def _take_turn(self) -> None:
         # Making evidence takes as long as filling it: a turn each.

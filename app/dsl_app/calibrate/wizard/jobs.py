@@ -8,7 +8,7 @@ from typing import TypeVar
 from dsl_app.calibrate.wizard.state import Doing, Told, WizardState
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import sentence_of
 from dsl_core.errors import DeviceError
 from dsl_core.progress import Progress
 

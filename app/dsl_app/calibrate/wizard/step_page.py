@@ -5,11 +5,11 @@ from __future__ import annotations
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
+from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.live_picture import LivePicture
 from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
 from dsl_app.calibrate.wizard.state import Doing, Look, WizardState
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.figures_table import FiguresTable
 from dsl_app.shared.widgets.forms import label, set_role
 
 TABLE_PX = 166

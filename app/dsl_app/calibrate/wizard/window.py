@@ -15,7 +15,7 @@ from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.calibrate.wizard.step_list import StepList
 from dsl_app.calibrate.wizard.step_page import StepPage
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.banner import Banner
+from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import add_help_key
 
 #: How often frames and progress are fetched, ms.

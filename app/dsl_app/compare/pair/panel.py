@@ -15,8 +15,8 @@ from dsl_app.compare.pair.figures import CompareFigures
 from dsl_app.compare.pair.state import CompareState, Pair, Side
 from dsl_app.compare.view import CompareView
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark
-from dsl_app.shared.widgets.late import Late
 
 NOTHING = (
     "Open a result as A, then another one as B, or take the truth of its twin as B."
@@ -41,9 +41,9 @@ class ComparePair(QWidget):
             "Write &report…", "Figures and pictures of A against the truth as an HTML page"
         )
         self.hint = remark_line()
-        self._view = Late(self._make_view)
+        self._view = Deferred(self._make_view)
         self.bar = CompareBar(state, commands)
-        self._figures = Late(lambda: CompareFigures(state))
+        self._figures = Deferred(lambda: CompareFigures(state))
         self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
@@ -51,12 +51,12 @@ class ComparePair(QWidget):
     @property
     def view(self) -> CompareView:
         """The three pictures, made when somebody looks."""
-        return self._view.part
+        return self._view.content
 
     @property
     def figures(self) -> CompareFigures:
         """Spectra and figures, made when somebody looks."""
-        return self._figures.part
+        return self._figures.content
 
     def _make_view(self) -> CompareView:
         made = CompareView(self._state)

@@ -23,9 +23,9 @@ from dsl_app.compare.series.plot import SeriesPlot
 from dsl_app.compare.series.state import Kind, SeriesState
 from dsl_app.compare.series.table import SeriesTable
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.late import Late
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
@@ -72,8 +72,8 @@ class SeriesPanel(QWidget):
         self.figures.setMinimumWidth(FIGURES_PX)
         self.figures.verticalHeader().setDefaultSectionSize(24)
         self.figures.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        self._plot = Late(lambda: SeriesPlot(state))
-        self._picture = Late(lambda: SeriesPicture(state, commands))
+        self._plot = Deferred(lambda: SeriesPlot(state))
+        self._picture = Deferred(lambda: SeriesPicture(state, commands))
         set_help(self, "comparing#a-series")
         set_help(self.figures, "comparing#depth-over-stage-positions")
         self._stops: list[Callable[[], None]] = []
@@ -83,12 +83,12 @@ class SeriesPanel(QWidget):
     @property
     def plot(self) -> SeriesPlot:
         """The plot, made when somebody looks."""
-        return self._plot.part
+        return self._plot.content
 
     @property
     def picture(self) -> SeriesPicture:
         """The plane of the selected row, made when somebody looks."""
-        return self._picture.part
+        return self._picture.content
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()

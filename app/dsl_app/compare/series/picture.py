@@ -11,10 +11,9 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 from dsl_app.compare.series.commands import SeriesCommands
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.compare.view import DIFFERENCE
-from dsl_app.shared.colour_scales import colour_map, spread_of
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.region_box import RegionBox
+from dsl_app.shared.widgets.pictures import RegionBox, colour_map, spread_of
 
 
 class SeriesPicture(QWidget):

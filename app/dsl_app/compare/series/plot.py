@@ -12,9 +12,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from dsl_app.compare.series.state import Kind, SeriesState
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.curve_marks import ticks
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks
 from dsl_core.evaluation.stage_test import StageLine, StageTest
 from dsl_core.evaluation.time_sweep import SweepPoint, best_points
 from dsl_core.evaluation.uncertainty import BAND_95

@@ -13,8 +13,7 @@ from dsl_app.results.again.words import RESULT_SUFFIX, bands_of, command_of, cos
 from dsl_app.results.again.words import trouble_of as trouble_of_order
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.progress import Progress

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.results.again.state import OWN, AgainOrder, AgainState
+from dsl_app.shared.widgets.dialogs import OrderCommands, OrderDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
-from dsl_app.shared.widgets.order_dialog import OrderCommands, OrderDialog
 from dsl_core.model.spectral_choices import MODELS, SOLVERS, SpectralChoice
 
 LOW_NM, HIGH_NM = 380.0, 780.0

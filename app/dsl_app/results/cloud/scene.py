@@ -24,7 +24,7 @@ from dsl_app.results.cloud.points import Points
 from dsl_app.results.cloud.render_window import MouseButton, Picture, graphics_work
 from dsl_app.results.cloud.renderer import Artist
 from dsl_app.results.cloud.still_scene import StillScene
-from dsl_app.shared.widgets.arrow_keys import arrow_step
+from dsl_app.shared.widgets.pictures import arrow_step
 
 #: A notch of a mouse's wheel, in the unit that Qt counts in.
 NOTCH = 120

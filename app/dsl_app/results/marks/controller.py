@@ -14,7 +14,7 @@ from dsl_app.results.marks.records import NOTHING, fill_region, mark_of_referenc
 from dsl_app.results.marks.spectra import spectra_of
 from dsl_app.results.state import Library, Mark, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Offerer
+from dsl_app.shared.notify import Notifier
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.evaluation.regions import runs_of
@@ -32,7 +32,7 @@ class MarksController:
     New ones wait while those that are kept are read.
     """
 
-    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer, undo: UndoStack) -> None:
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
         self._kept = KeptMarks(state, runner, notifier)
 

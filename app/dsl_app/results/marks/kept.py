@@ -10,7 +10,7 @@ from pathlib import Path
 from dsl_app.results.marks.records import annotations_of, marks_of
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Offerer
+from dsl_app.shared.notify import Notifier
 from dsl_core.errors import DslError
 from dsl_core.io.atomic import set_aside
 from dsl_core.io.result.annotations_file import (
@@ -36,7 +36,7 @@ class KeptMarks:
     Whoever saves writes all marks. So what was kept is either read first, or put aside by the person's wish.
     """
 
-    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Offerer) -> None:
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
         self._reading = _Reading.DONE
         self._reason = ""

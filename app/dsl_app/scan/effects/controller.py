@@ -10,8 +10,7 @@ from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.effects.state import EffectRow, EffectsState, EffectsView, Wanted
 from dsl_app.scan.state import ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.plan import CapturePlan
 from dsl_core.progress import Progress

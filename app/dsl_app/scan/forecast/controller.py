@@ -12,8 +12,7 @@ from dsl_app.scan.forecast.state import ForecastState, Foreseen, Measured, ident
 from dsl_app.scan.plan import KEEPS_ITS_PLAN, ScanPlanController
 from dsl_app.scan.state import Phase, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
-from dsl_app.shared.sentences import sentence_of
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig

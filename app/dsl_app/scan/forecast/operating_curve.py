@@ -14,9 +14,8 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from dsl_app.scan.forecast.state import Foreseen
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.curve_marks import ticks, time_ticks
 from dsl_app.shared.widgets.forms import ChoiceBox
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks, time_ticks
 
 #: Presets that are always named; other points only while they are chosen or pointed at.
 NAMED = ("preview", "balanced", "reference")

@@ -21,8 +21,8 @@ from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.state import ForecastState, Foreseen, identity
 from dsl_app.scan.forecast.words import FIGURES
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
-from dsl_app.shared.widgets.late import Late
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
 #: How often news of the predictions is fetched, ms.
@@ -62,7 +62,7 @@ class ForecastPanel(QWidget):
         self._state, self._commands = state, commands
         self._pointed: Foreseen | None = None
         self._is_fixed = False
-        self.curve = Late(self._make_curve)
+        self.curve = Deferred(self._make_curve)
         self.scene = ChoiceBox("Scene", "For what is predicted: a chart, or the scene of the last result")
         self.scene.addItems(("for a chart", "for the last scan"))
         self.scene.setEnabled(False)

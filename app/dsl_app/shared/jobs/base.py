@@ -137,22 +137,3 @@ class JobRunner(Protocol):
 
     def submit(self, job: Job[Any]) -> Job[Any]:
         """Start a job; raises `DeviceError` when another one uses what it needs alone."""
-
-
-class InlineRunner:
-    """Runs every job at once in the caller's thread: for tests and scripts."""
-
-    def __init__(self) -> None:
-        self.finished: list[Job[Any]] = []
-
-    @property
-    def active(self) -> tuple[Job[Any], ...]:
-        """Nothing is ever left running."""
-        return ()
-
-    def submit(self, job: Job[Any]) -> Job[Any]:
-        """Run the job to its end."""
-        job.accept()
-        job.run()()
-        self.finished.append(job)
-        return job

@@ -9,7 +9,7 @@ from typing import Any
 from PySide6.QtCore import QObject, QTimer, Signal
 
 from dsl_app.shared.jobs.base import Job, JobState
-from dsl_app.shared.jobs.housekeeping import return_memory
+from dsl_app.shared.jobs.memory import trim_memory
 from dsl_core.errors import DeviceError
 
 #: How often listeners hear of progress, ms: often enough to look alive, seldom enough to cost nothing.
@@ -75,7 +75,7 @@ class QtRunner(QObject):
 
     def _work(self, job: Job[Any]) -> None:
         finish = job.run()
-        return_memory()
+        trim_memory()
         self._ended.emit(job, finish)
 
     def _finish(self, job: Job[Any], finish: Callable[[], None]) -> None:

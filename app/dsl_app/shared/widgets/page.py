@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from PySide6.QtCore import QMimeData
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.shared.theme import Theme
@@ -44,3 +45,8 @@ class PageWidget(QWidget):
 
     def release(self) -> None:
         """Let go of devices, files and threads before the window closes."""
+
+
+def dropped_paths(data: QMimeData) -> list[Path]:
+    """Files and folders of this computer among what is dropped."""
+    return [Path(url.toLocalFile()) for url in data.urls() if url.isLocalFile()]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -9,6 +10,11 @@ import pyqtgraph as pg
 
 from dsl_app.shared.theme import Theme
 
+Ticks = list[tuple[float, str]]
+#: Seconds that are marked, as far as they are in view.
+TIMES_S = (5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600)
+#: Ranges narrower than this factor are marked evenly, wider ones at 1, 2 and 5.
+NARROW = 8.0
 #: Red, green and blue that are told apart on both themes.
 RGB_COLOURS = ("#e0524d", "#2fa84f", "#4c8dff")
 
@@ -38,3 +44,43 @@ def theme_plots(plots: Iterable[Any], theme: Theme) -> None:
             axis.setTextPen(theme.muted)
             axis.labelStyle["color"] = theme.muted
             axis.setLabel(axis.labelText)
+
+
+def time_ticks(low_s: float, high_s: float) -> Ticks:
+    """Where seconds and minutes are marked.
+
+    >>> [text for _, text in time_ticks(12, 150)]
+    ['20 s', '30 s', '1 min', '2 min']
+    """
+    return [(math.log10(s), _time(s)) for s in TIMES_S if low_s <= s <= high_s]
+
+
+def _time(seconds: int) -> str:
+    return f"{seconds} s" if seconds < 60 else f"{seconds // 60} min"
+
+
+def ticks(low: float, high: float) -> Ticks:
+    """Where values are marked.
+
+    >>> [text for _, text in ticks(0.004, 0.05)]
+    ['0.005', '0.01', '0.02', '0.05']
+    >>> [text for _, text in ticks(9.0, 18.0)]
+    ['10', '12', '14', '16', '18']
+    """
+    return [(math.log10(value), f"{value:.6g}") for value in _values(low, high)]
+
+
+def _values(low: float, high: float) -> list[float]:
+    if high / low < NARROW:
+        step = _step((high - low) / 5)
+        first = math.ceil(low / step - 1e-9)
+        return [i * step for i in range(first, math.floor(high / step + 1e-9) + 1)]
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    found = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
+    return [value for value in found if low * (1 - 1e-9) <= value <= high * (1 + 1e-9)]
+
+
+def _step(rough: float) -> float:
+    """The next 1, 2 or 5 above."""
+    unit = 10.0 ** math.floor(math.log10(rough))
+    return next(digit * unit for digit in (1, 2, 5, 10) if digit * unit >= rough * (1 - 1e-9))

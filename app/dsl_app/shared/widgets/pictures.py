@@ -1,12 +1,69 @@
-"""A rectangle on a picture that a person draws up by its corners."""
+"""What all pictures share: colour scales, steps of the arrow keys, and a rectangle to drag."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeyEvent
 
 from dsl_app.shared.theme import Theme
+
+#: Perceptually uniform maps of pyqtgraph: grey for a band, colours for quantities that are not light.
+GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
+
+
+def spread_of(values: NDArray[np.floating[Any]], low: float = 0.5, high: float = 99.5) -> tuple[float, float]:
+    """Levels that hold nearly all values, from a thinned copy."""
+    step = max(values.shape[-1] // 200, 1)
+    known = values[..., ::step, ::step]
+    known = known[np.isfinite(known)]
+    if known.size == 0:
+        return 0.0, 1.0
+    bottom, top = (float(v) for v in np.percentile(known, (low, high)))
+    return bottom, max(top, bottom + 1e-6 * max(abs(bottom), 1.0))
+
+
+def colour_map(name: str) -> Any:
+    """A colour map of pyqtgraph."""
+    return pg.colormap.get(name)
+
+
+# Arrow keys --------------------------------------------------------------------------------------
+
+_STEPS = {
+    Qt.Key.Key_Left: (-1, 0),
+    Qt.Key.Key_Right: (1, 0),
+    Qt.Key.Key_Up: (0, -1),
+    Qt.Key.Key_Down: (0, 1),
+}
+#: How much further a step goes with Shift.
+WITH_SHIFT = 10
+
+
+def arrow_step(event: QKeyEvent) -> tuple[int, int] | None:
+    """Steps to the right and down that a key asks for, ten times as far with Shift; None for other keys."""
+    step = _STEPS.get(Qt.Key(event.key()))
+    if step is None:
+        return None
+    by = WITH_SHIFT if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
+    return by * step[0], by * step[1]
+
+
+def moved_within(pixel: tuple[int, int], step: tuple[int, int], size: tuple[int, int]) -> tuple[int, int]:
+    """A pixel (x, y) after a step, kept in an image of (width, height).
+
+    >>> moved_within((3, 0), (10, -1), (8, 6))
+    (7, 0)
+    """
+    x, y = (min(max(at + by, 0), most - 1) for at, by, most in zip(pixel, step, size, strict=True))
+    return x, y
+
+
+# Region ------------------------------------------------------------------------------------------
 
 #: Region of an image as x, y, width, height in its pixels.
 Region = tuple[int, int, int, int]

@@ -13,14 +13,14 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.forecast.controller import ForecastController
 from dsl_app.scan.forecast.state import ForecastState
 from dsl_app.scan.state import ScanState
-from dsl_app.shared.jobs.base import InlineRunner, JobRunner
-from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.model.plan import CapturePlan, LineComb
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
 if TYPE_CHECKING:
     from dsl_core.planning.prediction import Prediction

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import psutil
 import pytest
-from dsl_app.shared.jobs.housekeeping import ALL_S, Housekeeper, return_memory
+from dsl_app.shared.jobs.memory import FULL_S, GarbageCollector, trim_memory
 
 
 class Knot:
@@ -23,16 +23,16 @@ class Day:
 
     def __init__(self) -> None:
         self.is_busy, self.time_s = False, 0.0
-        self.keeper = Housekeeper(lambda: self.is_busy, lambda: self.time_s)
+        self.keeper = GarbageCollector(lambda: self.is_busy, lambda: self.time_s)
 
 
 @pytest.fixture
 def day() -> Iterator[Day]:
     made = Day()
     gc.collect()
-    made.keeper.take_charge()
+    made.keeper.start()
     yield made
-    made.keeper.leave()
+    made.keeper.stop()
     assert gc.isenabled()
 
 
@@ -48,7 +48,7 @@ def test_a_thread_takes_nothing_apart_that_belongs_to_the_window(day: Day) -> No
     thread.join()
     assert knot() is not None
     kept = allocate()
-    day.keeper.look()
+    day.keeper.check()
     assert kept
     assert knot() is None
 
@@ -56,10 +56,10 @@ def test_a_thread_takes_nothing_apart_that_belongs_to_the_window(day: Day) -> No
 def test_little_garbage_may_wait_until_a_job_ends(day: Day) -> None:
     day.is_busy = True
     knot = weakref.ref(Knot())
-    day.keeper.look()
+    day.keeper.check()
     assert knot() is not None
     day.is_busy = False
-    day.keeper.look()
+    day.keeper.check()
     assert knot() is None
 
 
@@ -68,13 +68,13 @@ def test_what_grew_old_is_found_in_time_but_not_while_a_job_runs(day: Day) -> No
     knot = weakref.ref(held)
     gc.collect()
     del held
-    day.is_busy, day.time_s = True, 10 * ALL_S
+    day.is_busy, day.time_s = True, 10 * FULL_S
     kept = allocate()
-    day.keeper.look()
+    day.keeper.check()
     assert kept
     assert knot() is not None
     day.is_busy = False
-    day.keeper.look()
+    day.keeper.check()
     assert knot() is None
 
 
@@ -85,6 +85,6 @@ def test_freed_memory_goes_back_to_the_system() -> None:
     last = bytearray(20_000)
     full = process.memory_info().rss
     del blocks
-    return_memory()
+    trim_memory()
     assert len(last) == 20_000
     assert full - process.memory_info().rss > 60e6

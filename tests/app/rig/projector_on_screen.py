@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QApplication
 
 from dsl_core.devices.base import Projector, ProjectorInfo
 from dsl_core.errors import DeviceError
-from tests.app.two_screens import PROJECTOR, plug, set_monitor, unplug
+from tests.app.support.two_screens import PROJECTOR, plug, set_monitor, unplug
 
 application = QApplication(sys.argv)
 display = sys.argv[1]

@@ -1,14 +1,56 @@
-"""What dialogs that order some long work have in common: a remark, *Show command line*, and who may start."""
+"""Dialogs that only show text, and the base of those that start long work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Protocol
 
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontDatabase
+from PySide6.QtWidgets import (
+    QApplication,
+    QDialog,
+    QDialogButtonBox,
+    QLabel,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from dsl_app.shared.widgets.forms import label, set_role
-from dsl_app.shared.widgets.text_windows import command_window
+
+
+def text_window(title: str, content: QWidget, parent: QWidget, width: int, height: int) -> QDialog:
+    """A dialog around some content, with a Close button."""
+    window = QDialog(parent)
+    window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    window.setWindowTitle(title)
+    window.resize(width, height)
+    buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+    buttons.button(QDialogButtonBox.StandardButton.Close).setToolTip("Close this window (Escape)")
+    buttons.rejected.connect(window.reject)
+    column = QVBoxLayout(window)
+    column.addWidget(content, 1)
+    column.addWidget(buttons)
+    return window
+
+
+def command_window(command: str, parent: QWidget) -> QDialog:
+    """A command line to copy."""
+    text = QPlainTextEdit(command)
+    text.setReadOnly(True)
+    text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+    text.setAccessibleName("Command line")
+    text.setToolTip("Give this in a terminal to do the same")
+    window = text_window("Command line", text, parent, 640, 220)
+    copy = QPushButton("Copy")
+    copy.setToolTip("Copy the command")
+    copy.clicked.connect(lambda: QApplication.clipboard().setText(command))
+    box = window.findChild(QDialogButtonBox)
+    assert isinstance(box, QDialogButtonBox)
+    box.addButton(copy, QDialogButtonBox.ButtonRole.ActionRole)
+    return window
 
 
 class OrderCommands(Protocol):
@@ -22,7 +64,10 @@ class OrderCommands(Protocol):
 
 
 class OrderDialog(QDialog):
-    """Closes once its order has been taken. Lay out what is asked in `column`, then call `close_column`."""
+    """Asks for the settings of long work, and closes once that has started.
+
+    Lay out the settings in `column`, then call `close_column`.
+    """
 
     def __init__(self, commands: OrderCommands, parent: QWidget) -> None:
         super().__init__(parent)

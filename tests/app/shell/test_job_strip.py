@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shared.widgets.job_strip import JobStrip
+from dsl_app.shell.job_strip import JobStrip
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot

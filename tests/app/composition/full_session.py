@@ -32,8 +32,8 @@ from PySide6.QtCore import QPoint, QPointF, Qt, QtMsgType, qInstallMessageHandle
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QLineEdit, QWidget
 
-from tests.app.beam_reader import BeamReader, screen_of
-from tests.app.person import (
+from tests.app.composition.beam_reader import BeamReader, screen_of
+from tests.app.composition.person import (
     choose,
     click,
     double_click,
@@ -46,7 +46,7 @@ from tests.app.person import (
     when_asked,
     write,
 )
-from tests.app.two_screens import PROJECTOR, plug, unplug
+from tests.app.support.two_screens import PROJECTOR, plug, unplug
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 CAMPAIGN = "room 12"

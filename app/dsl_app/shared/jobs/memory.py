@@ -1,4 +1,4 @@
-"""Keeps memory small and objects of the window in its thread, while jobs allocate in theirs. No Qt here."""
+"""Garbage collection in the window's thread only, and memory returned to the system. No Qt here."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-#: How often a `Housekeeper` should look, ms, and how long all objects may go without a look at them, s.
-LOOK_MS, ALL_S = 500, 300.0
-#: Heaps from which threads take memory. The system's default, eight a core, keeps what each of them once had.
+#: How often to call `GarbageCollector.check`, ms, and the longest time between two full collections, s.
+CHECK_MS, FULL_S = 500, 300.0
+#: Heaps from which threads allocate. Each of the system's default, eight a core, keeps its peak.
 HEAPS = 2
 #: Numbers of the C library's ``mallopt``.
 _M_ARENA_MAX = -8
 
 
-class Housekeeper:
-    """Looks for garbage, in the thread that calls `look`, as long as it is in charge.
+class GarbageCollector:
+    """Collects garbage in the thread that calls `check`, in place of Python's automatic collection.
 
-    Python by itself would look in whichever thread allocates most, and take apart there what belongs to the
-    window: Qt ends programs for that. Nor would it look at what a job has left behind when that ends.
+    That runs in whichever thread allocates most and would delete widgets there: Qt aborts programs for that.
+    Nor would it collect what a job has left behind when that ends.
     """
 
     def __init__(self, is_busy: Callable[[], bool], clock: Callable[[], float] = time.monotonic) -> None:
         self._is_busy, self._clock = is_busy, clock
         self._was_busy = False
-        self._last_all_s = clock()
+        self._last_full_s = clock()
 
-    def take_charge(self) -> None:
-        """Let garbage be looked for by this one alone."""
+    def start(self) -> None:
+        """Switch Python's automatic collection off."""
         gc.disable()
 
-    def leave(self) -> None:
-        """Let Python look for garbage by itself again."""
+    def stop(self) -> None:
+        """Switch Python's automatic collection on again."""
         gc.enable()
 
-    def look(self) -> None:
-        """At what is fresh while jobs run; at all that a job has left when it ends; seldom at everything."""
+    def check(self) -> None:
+        """Collect new objects while jobs run, what a job has left when it ends, and seldom everything."""
         is_busy = self._is_busy()
         has_ended, self._was_busy = self._was_busy and not is_busy, is_busy
         now_s = self._clock()
-        if not is_busy and now_s - self._last_all_s > ALL_S:
-            self._last_all_s = now_s
+        if not is_busy and now_s - self._last_full_s > FULL_S:
+            self._last_full_s = now_s
             gc.collect()
         elif has_ended:
             gc.collect(1)
@@ -52,15 +52,15 @@ class Housekeeper:
             gc.collect(0)
 
 
-def share_heaps() -> None:
+def limit_heaps() -> None:
     """Let all threads share few heaps; to be called before there are any."""
     limit = _c_function("mallopt")
     if limit is not None:
         limit(_M_ARENA_MAX, HEAPS)
 
 
-def return_memory() -> None:
-    """Give the system what was freed but is kept in heaps; quick where that is little."""
+def trim_memory() -> None:
+    """Return freed memory of the heaps to the system; quick where there is little."""
     trim = _c_function("malloc_trim")
     if trim is not None:
         trim(0)

@@ -3,8 +3,7 @@ from __future__ import annotations
 import time
 
 from dsl_app.shared.theme import DARK, LIGHT, Theme
-from dsl_app.shared.widgets.late import Late
-from dsl_app.shared.widgets.turns import TURN_MS, take_turn
+from dsl_app.shared.widgets.deferred import PAUSE_MS, Deferred, call_deferred
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from pytestqt.qtbot import QtBot
@@ -24,7 +23,7 @@ class Slow(QLabel):
 
 def test_a_part_is_made_when_it_is_seen(qtbot: QtBot) -> None:
     made: list[Slow] = []
-    room = Late(lambda: Slow(made))
+    room = Deferred(lambda: Slow(made))
     qtbot.addWidget(room)
     room.apply_theme(LIGHT)
     room.show()
@@ -35,28 +34,28 @@ def test_a_part_is_made_when_it_is_seen(qtbot: QtBot) -> None:
     assert made[0].theme is DARK
     room.hide()
     room.show()
-    assert room.part is made[0]
+    assert room.content is made[0]
     assert len(made) == 1
 
 
 def test_who_asks_for_a_part_gets_it_at_once(qtbot: QtBot) -> None:
     made: list[Slow] = []
-    room = Late(lambda: Slow(made))
+    room = Deferred(lambda: Slow(made))
     qtbot.addWidget(room)
-    assert room.part is made[0]
+    assert room.content is made[0]
     room.show()
     qtbot.waitUntil(made[0].isVisible)
-    qtbot.wait(2 * TURN_MS)
+    qtbot.wait(2 * PAUSE_MS)
     assert len(made) == 1
 
 
 def test_a_part_that_nobody_waits_for_any_more_is_not_made(qtbot: QtBot) -> None:
     made: list[Slow] = []
-    room = Late(lambda: Slow(made))
+    room = Deferred(lambda: Slow(made))
     qtbot.addWidget(room)
     room.show()
     room.hide()
-    qtbot.wait(2 * TURN_MS)
+    qtbot.wait(2 * PAUSE_MS)
     assert made == []
     room.show()
     qtbot.waitUntil(lambda: len(made) == 1)
@@ -72,10 +71,10 @@ def test_the_window_comes_round_between_two_turns(qtbot: QtBot) -> None:
 
     def act() -> None:
         turns.append(len(rounds))
-        time.sleep(2.5e-3 * TURN_MS)
+        time.sleep(2.5e-3 * PAUSE_MS)
 
     for _ in range(3):
-        take_turn(page, act)
+        call_deferred(page, act)
     qtbot.waitUntil(lambda: len(turns) == 3)
     assert turns[0] < turns[1] < turns[2]
 
@@ -85,8 +84,8 @@ def test_whose_window_is_gone_loses_the_turn_and_others_do_not(qtbot: QtBot) -> 
     qtbot.addWidget(page)
     column = QVBoxLayout(page)
     column.addWidget(gone)
-    take_turn(gone, lambda: taken.append("gone"))
-    take_turn(page, lambda: taken.append("page"))
+    call_deferred(gone, lambda: taken.append("gone"))
+    call_deferred(page, lambda: taken.append("page"))
     column.removeWidget(gone)
     gone.deleteLater()
     qtbot.waitUntil(lambda: taken == ["page"])

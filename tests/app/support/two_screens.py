@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from tests.app.virtual_display import virtual_display
+from tests.app.support.virtual_display import virtual_display
 
 PROJECTOR = "PROJECTOR"
 OPERATOR_AREA, PROJECTOR_AREA = "1280/340x800/210+0+0", "1280/300x720/170+1280+0"

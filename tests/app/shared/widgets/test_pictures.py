@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import pytest
-from dsl_app.shared.widgets.arrow_keys import arrow_step, moved_within
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox
+from dsl_app.shared.widgets.pictures import arrow_step, moved_within
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QWidget

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.two_screens import missing_programs, two_screens
+from tests.app.support.two_screens import missing_programs, two_screens
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[3]
 def test_pixels_are_exact_and_the_window_survives_unplugging(scale: str) -> None:
     with two_screens() as display:
         done = subprocess.run(
-            [sys.executable, "-m", "tests.app.projector_on_screen", display],
+            [sys.executable, "-m", "tests.app.rig.projector_on_screen", display],
             env={
                 **os.environ,
                 "DISPLAY": display,

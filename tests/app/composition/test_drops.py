@@ -18,7 +18,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, save_annotations
 from dsl_core.model.plan import CapturePlan, LineComb
-from tests.app.small_result import RED, write_reference, write_small_result
+from tests.app.support.small_result import RED, write_reference, write_small_result
 
 
 @pytest.fixture

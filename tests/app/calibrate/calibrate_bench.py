@@ -15,8 +15,7 @@ from dsl_app.calibrate.wizard.controller import WizardController
 from dsl_app.calibrate.wizard.state import WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import RigChoice, RigState
-from dsl_app.shared.jobs.base import InlineRunner, JobRunner
-from dsl_app.shared.notify import RecordingNotifier
+from dsl_app.shared.jobs.base import JobRunner
 
 from dsl_core.campaign.common.recipe import Recipe
 from dsl_core.campaign.recipes import _build
@@ -24,6 +23,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.rig import Rig
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
 from tests.cases.fake_recipe import FakeGeometry, FakeSelfTest
 
 SMALL = RigChoice("twin", (("scene", "plane"), ("size", "32x24")))

@@ -3,13 +3,14 @@ from __future__ import annotations
 import threading
 
 import pytest
-from dsl_app.shared.jobs.base import InlineRunner, Job, JobState
+from dsl_app.shared.jobs.base import Job, JobState
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from PySide6.QtCore import QThread
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import DecodeError, DeviceError
 from dsl_core.progress import Progress
+from tests.app.support.doubles import InlineRunner
 
 
 def test_a_job_reports_and_ends_with_its_result() -> None:

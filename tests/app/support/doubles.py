@@ -1,0 +1,87 @@
+"""Runners and a notifier that stand in for those of the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.notify import Level
+
+
+class InlineRunner:
+    """Runs every job at once in the caller's thread."""
+
+    def __init__(self) -> None:
+        self.finished: list[Job[Any]] = []
+
+    @property
+    def active(self) -> tuple[Job[Any], ...]:
+        """Nothing is ever left running."""
+        return ()
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        """Run the job to its end."""
+        job.accept()
+        job.run()()
+        self.finished.append(job)
+        return job
+
+
+class WaitingRunner(InlineRunner):
+    """Runs jobs at once, but keeps those with a title that begins as one of ``held``."""
+
+    def __init__(self, *held: str) -> None:
+        super().__init__()
+        self._held = held
+        self.waiting: list[Job[Any]] = []
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        """Run the job, or keep it for `run`."""
+        if job.title.startswith(self._held):
+            self.waiting.append(job)
+            return job
+        return super().submit(job)
+
+    def run(self, place: int = 0) -> None:
+        """Run one of the jobs that wait."""
+        self.waiting.pop(place).run()()
+
+
+class ManualRunner:
+    """Keeps jobs until it is told to run them, as threads end them some time."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Job[Any]] = []
+
+    @property
+    def active(self) -> tuple[Job[Any], ...]:
+        return tuple(self.waiting)
+
+    def submit(self, job: Job[Any]) -> Job[Any]:
+        self.waiting.append(job)
+        return job
+
+    def run_next(self) -> None:
+        self.waiting.pop(0).run()()
+
+    def run_all(self) -> None:
+        while self.waiting:
+            self.run_next()
+
+
+class RecordingNotifier:
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[Level, str]] = []
+        self.offers: dict[str, Callable[[], object]] = {}
+
+    def tell(self, level: Level, text: str, details: str = "") -> None:
+        """Keep the sentence."""
+        self.told.append((level, text))
+
+    def offer(self, text: str, offers: Mapping[str, Callable[[], object]]) -> None:
+        """Keep the sentence and what it offers."""
+        self.told.append(("info", text))
+        self.offers.update(offers)
