@@ -19,7 +19,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
-    from dsl_core.calibration.common.plane import PlaneFit
+    from dsl_core.calibration.common.plane import TargetPlane
     from dsl_core.calibration.drift.light import PlaneSignals
     from dsl_core.patterns.gray_code import DecodedCode
     from dsl_core.reconstruction.hdr import MergedFrame
@@ -122,7 +122,7 @@ def _maps(rig: Rig, code: DecodedCode, white: MergedFrame) -> tuple[Floats, Floa
 
 def _signals(
     rig: Rig,
-    fit: PlaneFit,
+    fit: TargetPlane,
     chosen: NDArray[np.int64],
     profiles: Floats,
     radiance: NDArray[np.floating],

@@ -61,12 +61,15 @@ class SpectralCurve(Record):
         return self
 
     @classmethod
-    def of(cls, wavelengths_nm: ArrayLike, values: ArrayLike, unit: str = "1") -> SpectralCurve:
-        """Make a curve from two arrays of equal length."""
+    def of(
+        cls, wavelengths_nm: ArrayLike, values: ArrayLike, unit: str = "1", std: ArrayLike | None = None
+    ) -> SpectralCurve:
+        """Make a curve from arrays of equal length."""
         return cls(
             wavelengths_nm=tuple(np.asarray(wavelengths_nm, float).tolist()),
             values=tuple(np.asarray(values, float).tolist()),
             unit=unit,
+            std=None if std is None else tuple(np.asarray(std, float).tolist()),
         )
 
     def at(self, wavelengths_nm: ArrayLike) -> NDArray[np.float64]:

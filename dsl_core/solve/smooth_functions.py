@@ -25,6 +25,11 @@ AMPLITUDES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
 NOISE_FACTORS = (1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 16.0, 32.0, 64.0)
 
 
+def hat_functions(at: Floats, nodes: Floats) -> Floats:
+    """Share of each node in the value at each place by linear interpolation, (places, nodes)."""
+    return np.stack([np.interp(at, nodes, unit) for unit in np.eye(len(nodes))], 1)
+
+
 @dataclass(frozen=True)
 class SmoothPrior:
     """One function: its nodes (rising), and what its level and its rise over all nodes may be."""

@@ -15,11 +15,11 @@ from itertools import product
 import numpy as np
 import torch
 
+from dsl_core.calibration.film.correspondence import fit_stage_grid
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, fit_first_orders
-from dsl_core.calibration.film.film import OrderSamples
-from dsl_core.calibration.film.line_samples import LineFrames
+from dsl_core.calibration.film.fit import OrderSamples
+from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.calibration.film.residual import choose_residual
-from dsl_core.calibration.film.stage_grid import fit_stage_grid
 from dsl_core.campaign.depth_stage.stage_scans import lines_on_plane
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import CapturePlan, NoCode, ScanLines, Setting

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry.boards import find_corners
-from dsl_core.calibration.geometry.projector_corners import refine_corners
+from dsl_core.calibration.geometry.boards import find_corners, refine_corners
 from dsl_core.errors import PlanError
 from dsl_core.model.board import Charuco, corner_positions_mm
 from dsl_core.model.calibration.pose_frames import PoseFrames

@@ -1,4 +1,4 @@
-"""Response and emission from the patches of a chart, with patches held out in turn."""
+"""Response and emission from the patches of a chart, with patches held out in turn, and their limits."""
 
 from __future__ import annotations
 
@@ -22,9 +22,12 @@ from dsl_core.calibration.light.spectral_refinement import (
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.color_checker import ColorCheckerCalibration, PatchResult
+from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.shading import Plane
+from dsl_core.optics.spectra import chain_response
 from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float64]
@@ -37,6 +40,12 @@ FOLDS = 4
 SATURATED, MIN_PIXELS = 0.02, 8
 #: The white that the rig already reproduces is known to this, at best.
 WHITE_FLOOR = 2e-4
+#: Limits in percent of a patch's white.
+RESIDUAL_PERCENT, WORST_PERCENT = 1.5, 4.0
+#: The chart may be lit so much otherwise (%) than the Spectralon, and tilted so much (degrees).
+LEVEL_PERCENT, MAX_TILT_DEG = 3.0, 20.0
+#: Where curves are judged, nm.
+BANDS_NM = (430.0, 660.0)
 
 
 @dataclass(frozen=True)
@@ -207,3 +216,73 @@ def _patch_rms(residual: Floats) -> Floats:
 
 def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def patch_colours(record: ColorCheckerCalibration, rig: Rig) -> tuple[Floats, Floats]:
+    """Measured and expected signals of the patches under white, (24, 3), over those of a perfect diffuser.
+
+    ``rig`` is what was known before the chart; the record's curves and level of light replace its own.
+    """
+    refined = rig.model_copy(
+        update={"response": record.response, "emission": record.emission, "white_scale": record.white_scale}
+    )
+    white = chain_response(refined, 0, FINE_NM).sum((1, 2)) * (1 + record.chart_level)
+    measured = np.array([[channel[-1] for channel in patch.signal] for patch in record.patches])
+    expected = expected_colours(refined, record.chart) * (1 + record.chart_level)
+    return measured / white, expected / white
+
+
+def _deviation(curve: SpectralCurve) -> float:
+    """Median deviation of a curve over the bands, as a share of its peak."""
+    nm = np.array(curve.wavelengths_nm)
+    bands = (nm >= BANDS_NM[0]) & (nm <= BANDS_NM[1])
+    return float(np.median(np.array(curve.std or (0.0,) * len(nm))[bands])) / max(curve.values)
+
+
+def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]:
+    """Patches, residuals and the chart's level, each with its limits and what to do."""
+    worst = max(record.patches, key=lambda patch: patch.held_out)
+    deviation = max(_deviation(curve) for curve in record.response)
+    return (
+        Figure(name="patches found", value=len(record.patches), unit="", low=24, high=24),
+        Figure(
+            name="residual before the refinement", value=100 * record.start, unit="% of white"
+        ),
+        Figure(name="residual", value=100 * record.residual, unit="% of white", high=RESIDUAL_PERCENT),
+        Figure(
+            name="residual of patches held out",
+            value=100 * record.held_out,
+            unit="% of white",
+            high=RESIDUAL_PERCENT,
+            advice="Clean the chart, keep reflections off, and check that its reflectances are those of this"
+            " edition.",
+        ),
+        Figure(
+            name="residual of patches held out, published weight",
+            value=100 * record.published_held_out,
+            unit="% of white",
+        ),
+        Figure(
+            name=f"worst patch held out ({worst.name})",
+            value=100 * worst.held_out,
+            unit="% of white",
+            high=WORST_PERCENT,
+            advice=f"Look at the patch {worst.name!r}: dust, scratches, gloss or shadow.",
+        ),
+        Figure(
+            name="deviation of the response, of its peak", value=100 * deviation, unit="%", high=3.0,
+            advice="Expose longer, or place the chart closer.",
+        ),
+        Figure(
+            name="light on the chart against the Spectralon",
+            value=100 * record.chart_level,
+            unit="%",
+            low=-LEVEL_PERCENT,
+            high=LEVEL_PERCENT,
+            advice="Keep other light and shadows off, and check the Spectralon's certified reflectance.",
+        ),
+        Figure(
+            name="tilt of the chart", value=record.tilt_deg, unit="degrees", high=MAX_TILT_DEG,
+            advice="Turn the chart to face the camera.",
+        ),
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The classic chart in a picture: found, turned the right way round, and its patches measured."""
+"""The classic chart in a picture: found, turned upright, and its patches measured."""
 
 from __future__ import annotations
 
@@ -8,17 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.colour.chart_alignment import (
-    align_corners,
-    apply_homography,
-    grid_corners,
-    homography,
-)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.charts import CHART_SHAPE
 from dsl_core.optics.demosaic import demosaic
 from dsl_core.optics.sensor import bayer_channels
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +24,11 @@ NOT_THIS_CHART = 0.35
 #: The next best orientation must be this many times farther off.
 CLEARLY = 1.5
 MIN_PIXELS = 12
+#: Half width of the part of a patch that must be even, as a share of the distance between patches; samples
+#: along each side of it.
+EVEN_PART, SAMPLES = 0.40, 9
+#: Largest move of a corner, as a share of the distance between patches.
+CORNER_REACH = 0.3
 
 
 @dataclass(frozen=True)
@@ -117,10 +117,8 @@ def patch_samples(corners_px: Floats, shape: tuple[int, int]) -> PatchSamples:
     """Inner pixels of the 24 patches in a picture of ``shape``; raises `CalibrationError` when cut off."""
     to_picture = homography(grid_corners(), corners_px)
     to_grid: Floats = np.linalg.inv(to_picture).astype(np.float64)
-    rows, columns = CHART_SHAPE
     picked = []
-    for index in range(rows * columns):
-        centre = np.array([index % columns + 0.5, index // columns + 0.5])
+    for index, centre in enumerate(_grid_centres()):
         pixels = _inside(to_picture, to_grid, centre, shape)
         if len(pixels) < MIN_PIXELS:
             raise CalibrationError(
@@ -169,7 +167,7 @@ def patch_signals(
 
 def _robust_mean(values: Floats) -> tuple[float, float, int]:
     middle = np.median(values)
-    spread = 1.4826 * np.median(np.abs(values - middle))
+    spread = float(robust_std(values - middle))
     kept = values[np.abs(values - middle) <= 4 * max(spread, 1e-12)]
     return float(kept.mean()), float(kept.std(ddof=1) / np.sqrt(len(kept))), len(kept)
 
@@ -229,5 +227,65 @@ def _signed_area(corners: Floats) -> float:
 
 
 def _grid_centres() -> Floats:
+    """Centres of the patches in reading order, in units of the distance between patches, (24, 2)."""
     rows, columns = CHART_SHAPE
     return np.array([[i % columns + 0.5, i // columns + 0.5] for i in range(rows * columns)])
+
+
+def align_corners(picture: NDArray[np.uint8], corners_px: Floats) -> Floats:
+    """Corners (4, 2) near those given for which the patches of a picture (rows, columns, 3) are most even.
+
+    A detector's corners are some percent of a patch off; seen from a slightly wrong grid, dark lines between
+    patches enter their squares, which this pushes out.
+    """
+    import cv2
+    from scipy.optimize import minimize
+
+    points = _sample_points()
+    pitch = np.linalg.norm(corners_px[1] - corners_px[0]) / CHART_SHAPE[1]
+    image = picture.astype(np.float32)
+
+    def unevenness(shift: Floats) -> float:
+        to_picture = homography(grid_corners(), corners_px + pitch * shift.reshape(4, 2))
+        at = apply_homography(to_picture, points).astype(np.float32)
+        values = cv2.remap(
+            image, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0
+        )
+        patches = np.asarray(values, np.float64).reshape(-1, SAMPLES**2, 3)
+        return float(patches.std(1).mean())
+
+    found = minimize(
+        unevenness,
+        np.zeros(8),
+        method="Powell",
+        bounds=[(-CORNER_REACH, CORNER_REACH)] * 8,
+        options={"xtol": 1e-3},
+    )
+    return corners_px + pitch * np.asarray(found.x).reshape(4, 2)
+
+
+def grid_corners() -> Floats:
+    """Corners of the grid of patches in units of the distance between patches, (4, 2), clockwise."""
+    rows, columns = CHART_SHAPE
+    return np.array([[0, 0], [columns, 0], [columns, rows], [0, rows]], float)
+
+
+def homography(source: Floats, target: Floats) -> Floats:
+    """The homography (3, 3) that takes points (n, 2) to others, best in the sense of least squares."""
+    import cv2
+
+    found, _ = cv2.findHomography(source, target)
+    return np.asarray(found, float)
+
+
+def apply_homography(matrix: Floats, points: Floats) -> Floats:
+    """Points (n, 2) moved by a homography."""
+    lifted = np.concatenate([points, np.ones((len(points), 1))], 1) @ matrix.T
+    return np.asarray(lifted[:, :2] / lifted[:, 2:])
+
+
+def _sample_points() -> Floats:
+    """Points of the grid inside all patches in reading order, (24 * SAMPLES**2, 2)."""
+    offsets = np.linspace(-EVEN_PART, EVEN_PART, SAMPLES)
+    square = np.stack(np.meshgrid(offsets, offsets), -1).reshape(-1, 2)
+    return np.concatenate([square + centre for centre in _grid_centres()])

@@ -11,6 +11,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -24,7 +25,7 @@ LEAST_WIDTH = 0.02
 
 
 @dataclass(frozen=True)
-class PlaneFit:
+class TargetPlane:
     """A plane, the pixels that lie on it (rows, columns) and the rms of their depths about it, mm."""
 
     plane: Plane
@@ -32,7 +33,7 @@ class PlaneFit:
     rms_mm: float
 
 
-def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = None) -> PlaneFit:
+def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = None) -> TargetPlane:
     """The plane through most of the depths (rows, columns); ``start`` marks pixels that surely lie on it.
 
     A plane's inverse depth is affine in the image coordinates, and inverse depth is nearly linear in the
@@ -52,13 +53,13 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
         _require_area(rays[:2, on_plane])
         plane = Plane(_least_squares(rays[:, on_plane], inverse[on_plane]))
         miss = np.tensordot(plane.inverse, rays, 1) / inverse - 1
-        spread = 1.4826 * float(np.median(np.abs(miss[on_plane])))
+        spread = float(robust_std(miss[on_plane]))
         before = on_plane
         on_plane = usable & (np.abs(miss) < max(OUTLIER_SIGMAS * spread, LEAST_RELATIVE))
         if (on_plane == before).all():
             break
     off = (miss * depth_mm)[on_plane]
-    return PlaneFit(plane, on_plane, float(np.sqrt(np.mean(off**2))))
+    return TargetPlane(plane, on_plane, float(np.sqrt(np.mean(off**2))))
 
 
 def _require_area(rays: Floats) -> None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.solve.robust import robust_std
+
 Floats = NDArray[np.float64]
 
 #: Tiles down and across the image, at least this many camera pixels a side.
@@ -62,7 +64,7 @@ def tile_columns(column_px: NDArray[np.floating], std_px: NDArray[np.floating]) 
     weight = np.where(good, 1 / np.where(good, std, 1) ** 2, 0.0)
     course = _straight(tiles, x, y, np.where(good, q, 0.0), weight)
     off = np.abs(q - course)
-    limit = OUTLIER_SIGMAS * np.maximum(1.4826 * np.median(off[good]) if good.any() else 0.0, std)
+    limit = OUTLIER_SIGMAS * np.maximum(robust_std(off[good]) if good.any() else 0.0, std)
     weight = np.where(good & (off < limit), weight, 0.0)
     count = tiles.max() + 1
     total = np.bincount(tiles, weight, count)

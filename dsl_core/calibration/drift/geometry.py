@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.common.plane import PlaneFit
+from dsl_core.calibration.common.plane import TargetPlane
 from dsl_core.calibration.common.tiles import tile_of_pixels
 from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import Figure
@@ -37,7 +37,9 @@ class SmoothPart:
     std: float
 
 
-def geometry_drift(rig: Rig, column: Floats, row: Floats, depth_mm: Floats, plane: PlaneFit) -> list[Figure]:
+def geometry_drift(
+    rig: Rig, column: Floats, row: Floats, depth_mm: Floats, plane: TargetPlane
+) -> list[Figure]:
     """Drift of rows and columns against the calibration, px; maps are (rows, columns), NaN unknown.
 
     ``column`` and ``row`` are decoded projector pixels, ``depth_mm`` the triangulated depth of ``column``.

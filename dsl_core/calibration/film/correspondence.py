@@ -11,15 +11,18 @@ first on a fixed set, which no start value can mislead, then by golden sections,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.tiles import tile_edges
+from dsl_core.calibration.film.fit import OrderSamples, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import CorrespondenceGrid, Rig
 from dsl_core.optics.correspondence import GratingModel
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +41,8 @@ FLOOR_PX = 0.02
 ROBUST_ROUNDS = 3
 #: Depths a node needs, and nodes a wavelength needs to carry the polynomials of this degree.
 MIN_DEPTHS, MIN_NODES, DEGREE = 3, 20, 3
+#: Significant digits of the coefficients: a thousandth of a pixel, at half the size on disk.
+DIGITS = 8
 
 
 @dataclass(frozen=True)
@@ -208,8 +213,7 @@ def _linear(beta: Floats, z: Floats, q: Floats, used: NDArray[np.bool_]) -> tupl
 
 def _outlier_limit(residual: Floats, used: NDArray[np.bool_]) -> float:
     """Limit (px) from the median absolute residual of all nodes."""
-    median = float(np.median(np.abs(residual[used & np.isfinite(residual)])))
-    return OUTLIER_SIGMAS * max(1.4826 * median, FLOOR_PX)
+    return OUTLIER_SIGMAS * max(float(robust_std(residual[used & np.isfinite(residual)])), FLOOR_PX)
 
 
 def _smooth(values: Floats, weight: Floats) -> Floats:
@@ -245,4 +249,47 @@ def _record(samples: GridSamples, maps: Floats) -> CorrespondenceGrid:
         depth_unit_mm=DEPTH_UNIT_MM,
         depth_range_mm=(float(samples.depths_mm.min()), float(samples.depths_mm.max())),
         coefficients=tuple(maps.ravel().tolist()),
+    )
+
+
+def fit_stage_grid(rig: Rig, samples: OrderSamples) -> GridFit:
+    """Eq. (2) of the seed at the middles of all tiles, from samples of planes at three positions or more.
+
+    The grid wants the same depths and wavelengths at every node; what samples differ from these is little,
+    and is taken from the fitted film of ``rig``. Raises `CalibrationError` as `fit_grid` does.
+    """
+    fit = fit_grid(grid_samples(rig, samples))
+    return replace(fit, grid=_rounded(fit.grid))
+
+
+def grid_samples(rig: Rig, samples: OrderSamples) -> GridSamples:
+    """The samples on a grid of tiles, at one depth a position and one wavelength a filter."""
+    rows, columns = (
+        (edges[1:] + edges[:-1] - 1) / 2 for edges in tile_edges((rig.camera.width_px, rig.camera.height_px))
+    )
+    # Nodes are whole pixels, where the film's model is evaluated.
+    rows, columns = np.unique(np.rint(rows)), np.unique(np.rint(columns))
+    depths = _means(samples.position, samples.depth_mm)
+    wavelengths = _means(samples.filter, samples.wavelength_nm)
+    down, across = np.divmod(samples.tile, len(columns))
+    node = (rows[down] * rig.camera.width_px + columns[across]).astype(np.int64)
+    position, name = (np.unique(of, return_inverse=True)[1] for of in (samples.position, samples.filter))
+    there = replace(samples, pixel=node, depth_mm=depths[position], wavelength_nm=wavelengths[name])
+    moved = samples.column_px + grating_columns(rig, there) - grating_columns(rig, samples)
+    orders = sorted({int(m) for m in samples.order}, reverse=True)
+    values = np.full((len(orders), len(wavelengths), len(depths), len(rows), len(columns)), np.nan)
+    which = np.array([orders.index(int(m)) for m in samples.order])
+    values[which, name, position, down, across] = moved
+    return GridSamples(tuple(orders), wavelengths, depths, rows, columns, values)
+
+
+def _means(of: NDArray[np.int64], values: Floats) -> Floats:
+    """Mean of the values of each index that occurs."""
+    _, which, counts = np.unique(of, return_inverse=True, return_counts=True)
+    return np.asarray(np.bincount(which, values) / counts)
+
+
+def _rounded(grid: CorrespondenceGrid) -> CorrespondenceGrid:
+    return grid.model_copy(
+        update={"coefficients": tuple(float(f"{value:.{DIGITS}g}") for value in grid.coefficients)}
     )

@@ -14,13 +14,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.film import FLOOR_PX, HUBER_SIGMAS, OrderSamples, fit_film, grating_columns
+from dsl_core.calibration.film.fit import FLOOR_PX, HUBER_SIGMAS, OrderSamples, fit_film, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import HeldOutError
 from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.rig import Rig
 from dsl_core.optics.column_residual import chebyshev, residual_columns, scaled
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.solve.robust import huber_weights
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -160,9 +161,7 @@ def _robust(basis: Floats, values: Floats, std: Floats) -> Floats:
     sigma = np.hypot(std, FLOOR_PX)
     found: Floats = np.zeros(basis.shape[1])
     for _ in range(ROUNDS):
-        off = np.abs(values - basis @ found) / sigma
-        scale = max(1.0, 1.4826 * float(np.median(off)))
-        weight = np.minimum(1.0, HUBER_SIGMAS * scale / np.maximum(off, 1e-12)) / (scale * sigma) ** 2
+        weight, _ = huber_weights(values - basis @ found, sigma, HUBER_SIGMAS)
         normal = (basis * weight[:, None]).T @ basis + np.eye(basis.shape[1]) / COEFFICIENT_STD_PX**2
         found = np.asarray(np.linalg.solve(normal, basis.T @ (weight * values)), float)
     return found

@@ -8,11 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.geometry.corner_model import even_mosaic, fit_corners
 from dsl_core.errors import CalibrationError
-from dsl_core.model.board import Board, Charuco, Checkerboard
+from dsl_core.model.board import Board, Charuco, Checkerboard, corner_positions_mm
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.demosaic import demosaic
+
+Floats = NDArray[np.float64]
 
 #: A board with fewer corners in view says too little of its pose.
 MIN_CORNERS = 12
@@ -22,6 +25,8 @@ SATURATED_SHARE = 0.998
 REACH, ARUCO_REACH, MAX_REACH_PX = 0.35, 0.12, 11
 #: Red, green and blue in the grey picture, as a mosaic samples them.
 _GREY = np.array([0.25, 0.5, 0.25], np.float32)
+#: Colours of a mosaic are made even over so many squares, of which half are black.
+EVEN_SQUARES = 2.0
 
 
 @dataclass(frozen=True)
@@ -141,3 +146,79 @@ def _exposure_hint(eight_bit: NDArray[np.uint8], grey: NDArray[np.float32]) -> s
     if float((grey >= grey.max()).mean()) > 0.2:
         return " A fifth of the picture is equally bright: it is probably over-exposed."
     return " The picture has hardly any contrast." if float(eight_bit.std()) < 5 else ""
+
+
+def refine_corners(frames: PoseFrames, corners: Corners, board: Board) -> tuple[Corners, float]:
+    """Corners at the crossing of the edges around them, and the median blur of these edges, px.
+
+    Corners whose edges cannot be told stay where they were.
+    """
+    along = _steps_px(corners, board)
+    light = _full_light(frames)
+    if frames.bayer is not None:
+        light = even_mosaic(light, frames.bayer, EVEN_SQUARES * float(np.linalg.norm(along, axis=2).mean()))
+    grey = grey_of(light)
+    grey[saturated(frames)] = np.nan
+    gap = 0.5 * (1 - board.marker_mm / board.square_mm) if isinstance(board, Charuco) else 1.0
+    straight = fit_corners(grey, corners.points_px, along, gap)
+    points = np.where(np.isfinite(straight.points_px), straight.points_px, corners.points_px)
+    # A lens bends edges by some hundredths of a pixel, which would draw every corner towards its axis.
+    found = fit_corners(grey, points, along, gap, _bends_per_px(Corners(corners.ids, points), board))
+    points = np.where(np.isfinite(found.points_px), found.points_px, points)
+    return Corners(corners.ids, points), float(np.median(found.blur_px))
+
+
+def _full_light(frames: PoseFrames) -> NDArray[np.float32]:
+    """The board in white light, from all pictures: pattern and inverse add up to it, with less noise."""
+    total = np.array(frames.white, np.float32)
+    for picture in frames.pairs:
+        total += picture
+    pairs = len(frames.pairs) // 2
+    return np.asarray(
+        total / (pairs + 1) - np.asarray(frames.black, np.float32) * ((2 * pairs + 1) / (pairs + 1))
+    )
+
+
+def _bends_per_px(corners: Corners, board: Board) -> Floats:
+    """Curvature of the edges along board x and y at every corner, (corners, 2), from corners beside it.
+
+    Straight lines stay straight in any perspective, so that what bends them is the lens. Corners without
+    neighbours on both sides take what the nearest other has.
+    """
+    places = np.rint(corner_positions_mm(board)[corners.ids, :2] / board.square_mm).astype(int)
+    index = {tuple(place): number for number, place in enumerate(places.tolist())}
+    bends = np.full((len(places), 2), np.nan)
+    for number, (x, y) in enumerate(places.tolist()):
+        for axis, (dx, dy) in enumerate(((1, 0), (0, 1))):
+            before, after = index.get((x - dx, y - dy)), index.get((x + dx, y + dy))
+            if before is not None and after is not None:
+                a, b, c = corners.points_px[[before, number, after]]
+                along, bent = (c - a) / 2, a - 2 * b + c
+                bends[number, axis] = (along[0] * bent[1] - along[1] * bent[0]) / np.linalg.norm(along) ** 3
+    return _nearest_known(places, bends, np.isfinite(bends))
+
+
+def _nearest_known(places: NDArray[np.int_], values: Floats, known: NDArray[np.bool_]) -> Floats:
+    """Values (corners, 2) with those that are not known taken from the nearest corner, or zero."""
+    filled = np.where(known, values, 0.0)
+    for axis in range(2):
+        have, lack = (np.flatnonzero(which[:, axis]) for which in (known, ~known))
+        if len(have) and len(lack):
+            apart = ((places[lack, None] - places[None, have]) ** 2).sum(2)
+            filled[lack, axis] = values[have[apart.argmin(1)], axis]
+    return filled
+
+
+def _steps_px(corners: Corners, board: Board) -> Floats:
+    """One square's step along board x and y at every corner, shape (corners, 2, 2), px."""
+    import cv2
+
+    places = corner_positions_mm(board)[corners.ids, :2] / board.square_mm
+    homography, _ = cv2.findHomography(places, corners.points_px, cv2.RANSAC, 3.0)
+    if homography is None:
+        raise CalibrationError("The corners of the board lie on one line. Leave this pose out.")
+    ends = []
+    for step in np.array([[0.5, 0.0], [0.0, 0.5]]):
+        both = cv2.perspectiveTransform(np.stack([places + step, places - step]), homography)
+        ends.append(np.asarray(both, np.float64)[0] - np.asarray(both, np.float64)[1])
+    return np.stack(ends, 1)

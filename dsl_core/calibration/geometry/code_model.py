@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry.boards import saturated
+from dsl_core.calibration.geometry.boards import grey_of, saturated
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import GrayCode
 from dsl_core.patterns.gray_code import bit_counts, gray_bit
+from dsl_core.solve.robust import robust_std
 
 Floats = NDArray[np.float64]
 
@@ -55,8 +55,8 @@ class CodeLight:
 def code_light(frames: PoseFrames, projector_size_px: tuple[int, int]) -> tuple[CodeLight, CodeLight]:
     """The finest bits of columns and of rows."""
     columns, _ = bit_counts(GrayCode(), projector_size_px)
-    black = _mono(frames.black)
-    white = _mono(frames.white)
+    black = grey_of(frames.black)
+    white = grey_of(frames.white)
     light = np.maximum(white - black, 0)
     usable = np.isfinite(white) & (light > LEAST_LIGHT * np.quantile(light, 0.99)) & ~saturated(frames)
     variance = light if frames.variance is None else np.asarray(frames.variance, np.float32)
@@ -75,18 +75,13 @@ def code_light(frames: PoseFrames, projector_size_px: tuple[int, int]) -> tuple[
 
 
 def _contrast(frames: PoseFrames, pair: int, black: NDArray[np.float32]) -> NDArray[np.float32]:
-    one, other = _mono(frames.pairs[2 * pair]), _mono(frames.pairs[2 * pair + 1])
+    one, other = grey_of(frames.pairs[2 * pair]), grey_of(frames.pairs[2 * pair + 1])
     total = one + other - 2 * black
     return np.asarray(np.divide(one - other, total, out=np.zeros_like(total), where=total > 0))
 
 
-def _mono(picture: NDArray[Any]) -> NDArray[np.float32]:
-    values = np.asarray(picture, np.float32)
-    return np.asarray(values.mean(2)) if values.ndim == 3 else values
-
-
 @dataclass(frozen=True)
-class Window:
+class CornerWindow:
     """Pixels (rows, columns) around a corner, and the six terms of a quadratic map there, (pixels, 6).
 
     Terms are those of the distance from the corner in units of the window's radius, the constant first, so
@@ -99,7 +94,7 @@ class Window:
     radius_px: float
 
     @classmethod
-    def around(cls, point_px: Floats, radius_px: float, shape: tuple[int, ...]) -> Window:
+    def around(cls, point_px: Floats, radius_px: float, shape: tuple[int, ...]) -> CornerWindow:
         """All pixels of a picture within a radius of a point (column, row)."""
         reach = int(np.ceil(radius_px))
         middle = np.rint(point_px).astype(int)
@@ -115,7 +110,7 @@ class Window:
         return cls(y[inside], x[inside], terms, radius_px)
 
 
-def refine_maps(light: CodeLight, windows: Sequence[Window], maps: Floats) -> Floats:
+def refine_maps(light: CodeLight, windows: Sequence[CornerWindow], maps: Floats) -> Floats:
     """Quadratic maps (corners, 6) of camera pixels to projector columns (or rows), px.
 
     ``maps`` come from decoded bits and must be right within a pixel. A window without light keeps its map.
@@ -124,18 +119,18 @@ def refine_maps(light: CodeLight, windows: Sequence[Window], maps: Floats) -> Fl
         (light.contrast[:, w.rows, w.columns].astype(float), light.weight[w.rows, w.columns].astype(float))
         for w in windows
     ]
-    fit = _Fit(START_BLUR_PX, 1.0, np.full(len(light.signs), np.inf))
+    fit = _CodeFit(START_BLUR_PX, 1.0, np.full(len(light.signs), np.inf))
     maps = maps.copy()
     for _ in range(ROUNDS):
-        table = _Table(light.signs, fit.blur_px)
+        table = _BitTable(light.signs, fit.blur_px)
         fit = fit.improved(table, windows, seen, maps)
-        table = _Table(light.signs, fit.blur_px)
+        table = _BitTable(light.signs, fit.blur_px)
         for k, (window, (contrast, weight)) in enumerate(zip(windows, seen, strict=True)):
             maps[k] = fit.step(table, window, contrast, weight, maps[k])
     return maps
 
 
-class _Table:
+class _BitTable:
     """Blurred bits and their slopes at any place."""
 
     def __init__(self, signs: Floats, blur_px: float) -> None:
@@ -158,7 +153,7 @@ class _Table:
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _CodeFit:
     """What all windows share: blur, contrast, and noise of each bit (times the root of the weight).
 
     Light scattered between surfaces takes contrast from all fine bits alike.
@@ -169,8 +164,12 @@ class _Fit:
     sigma: Floats
 
     def improved(
-        self, table: _Table, windows: Sequence[Window], seen: Sequence[tuple[Floats, Floats]], maps: Floats
-    ) -> _Fit:
+        self,
+        table: _BitTable,
+        windows: Sequence[CornerWindow],
+        seen: Sequence[tuple[Floats, Floats]],
+        maps: Floats,
+    ) -> _CodeFit:
         """Blur by a step of Gauss and Newton, contrast by least squares, noises by the median residual."""
         place = np.concatenate([w.terms @ m for w, m in zip(windows, maps, strict=True)])
         contrast = np.concatenate([c for c, _ in seen], 1)
@@ -184,11 +183,13 @@ class _Fit:
         step = (used * change * residual).sum() / max((used * change**2).sum(), 1e-30)
         blur = float(np.clip(self.blur_px + np.clip(step, -0.3, 0.3), *BLUR_RANGE_PX))
         lit = weight > 0
-        scatter = np.abs(residual[:, lit]) * np.sqrt(weight[lit])
-        sigma = 1.4826 * np.median(scatter, 1) if lit.any() else np.ones(len(contrast))
-        return _Fit(blur, strength, np.maximum(sigma, 1e-6))
+        scatter = residual[:, lit] * np.sqrt(weight[lit])
+        sigma = robust_std(scatter, 1) if lit.any() else np.ones(len(contrast))
+        return _CodeFit(blur, strength, np.maximum(sigma, 1e-6))
 
-    def step(self, table: _Table, window: Window, contrast: Floats, weight: Floats, start: Floats) -> Floats:
+    def step(
+        self, table: _BitTable, window: CornerWindow, contrast: Floats, weight: Floats, start: Floats
+    ) -> Floats:
         """A map after one step of Gauss and Newton."""
         value, slope = table.at(window.terms @ start, table.values, table.slopes)
         slope = slope * self.strength

@@ -16,13 +16,6 @@ from numpy.typing import NDArray
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR, SHARED, STEREO
 from dsl_core.calibration.geometry.solve import lens_of, pose_of
-from dsl_core.calibration.geometry.stage_checks import (
-    require_agreement,
-    require_alike,
-    require_flat,
-    require_steps,
-    require_tiles,
-)
 from dsl_core.calibration.geometry.stage_planes import (
     DISTANCE,
     SLOPES,
@@ -31,9 +24,15 @@ from dsl_core.calibration.geometry.stage_planes import (
     columns_at,
     plane_of,
     rays_through,
+    require_agreement,
+    require_alike,
+    require_flat,
+    require_steps,
+    require_tiles,
 )
 from dsl_core.model.rig import Rig
 from dsl_core.optics.shading import Plane
+from dsl_core.solve.robust import huber_weights
 
 Floats = NDArray[np.float64]
 
@@ -130,7 +129,7 @@ def _gauss_newton(
     for _ in range(ROUNDS):
         residual = problem.residual_px(numbers)
         jacobian = problem.jacobian(numbers, free)
-        weight = _weights(residual, sigma)
+        weight, _ = huber_weights(residual, sigma, HUBER_SIGMAS)
         information = (jacobian * weight[:, None]).T @ jacobian + np.diag(pull**2)
         gradient = jacobian.T @ (weight * residual) - pull**2 * numbers[free]
         size = np.sqrt(np.diag(information).clip(1e-30))
@@ -144,13 +143,6 @@ def _gauss_newton(
     return numbers, covariance
 
 
-def _weights(residual: Floats, sigma: Floats) -> Floats:
-    """Robust weights of residuals whose scatter sets the scale of the noise."""
-    scale = max(1.0, 1.4826 * float(np.median(np.abs(residual / sigma))))
-    off = np.abs(residual) / (scale * sigma)
-    return np.minimum(1.0, HUBER_SIGMAS / np.maximum(off, 1e-12)) / (scale * sigma) ** 2
-
-
 def _bow(problem: StageProblem, numbers: Floats, posterior: Floats) -> tuple[float, float]:
     """The bulge that all positions share and its deviation, mm, while all that was fitted may move with it.
 
@@ -158,7 +150,7 @@ def _bow(problem: StageProblem, numbers: Floats, posterior: Floats) -> tuple[flo
     the bulge as a further number needs its own row of the normal equations only.
     """
     residual = problem.residual_px(numbers)
-    weight = _weights(residual, np.hypot(problem.std_px, FLOOR_PX))
+    weight, _ = huber_weights(residual, np.hypot(problem.std_px, FLOOR_PX), HUBER_SIGMAS)
     free = np.flatnonzero(np.diag(posterior) > 0)
     bulge, jacobian = problem.bulge(numbers), problem.jacobian(numbers, free)
     shared = jacobian.T @ (weight * bulge)

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dsl_core.calibration.geometry.boards import grey_of, saturated
+from dsl_core.calibration.geometry.bundle import LENS
 from dsl_core.calibration.geometry.code_model import code_light
-from dsl_core.calibration.geometry.diagnosis import MIN_POSES, exposure_warning
 from dsl_core.calibration.geometry.projector_corners import PoseObservation, observe_pose
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
-from dsl_core.model.calibration.geometry import LeftOut
+from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut
 from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.geometry import Lens
 
 #: A pose is blurred when its edges are this many times as wide as those of the others, and so wide (px).
 BLURRED, LEAST_BLUR_PX = 2.0, 0.8
@@ -21,6 +24,17 @@ BLURRED, LEAST_BLUR_PX = 2.0, 0.8
 GAMMA_TOLERANCE = 0.15
 #: Pixels whose pattern and inverse differ by less than this share see half the light in each.
 HALF_LIT, LEAST_PIXELS = 0.15, 200
+Size = tuple[int, int]
+
+MIN_POSES = 3
+#: Poses tilted less than this against each other do not tell the focal lengths; advised is more.
+MIN_TILT_DEG, GOOD_TILT_DEG = 5.0, 20.0
+#: Share of the pixels on the board that may be saturated.
+MAX_SATURATED = 0.01
+MIN_COVERAGE, CELLS = 0.3, 8
+GOOD_RMS_PX, GOOD_FOCAL_SHARE = 0.5, 0.01
+#: What the distortion may leave open in the corners of a picture, px.
+MAX_CORNER_PX = 1.0
 
 
 @dataclass
@@ -81,11 +95,8 @@ def picture_gamma(frames: PoseFrames, projector_size_px: tuple[int, int]) -> flo
     columns, _ = code_light(frames, projector_size_px)
     pair = (projector_size_px[0] - 1).bit_length() - 1
     one, other, white, black = (
-        np.asarray(p, np.float32)
-        for p in (frames.pairs[2 * pair], frames.pairs[2 * pair + 1], frames.white, frames.black)
+        grey_of(p) for p in (frames.pairs[2 * pair], frames.pairs[2 * pair + 1], frames.white, frames.black)
     )
-    if one.ndim == 3:
-        one, other, white, black = (p.mean(2) for p in (one, other, white, black))
     half = (columns.weight > 0) & (np.abs(columns.contrast[-1]) < HALF_LIT)
     half &= white - black > 0.3 * np.quantile(white - black, 0.99)
     if half.sum() < LEAST_PIXELS:
@@ -94,11 +105,184 @@ def picture_gamma(frames: PoseFrames, projector_size_px: tuple[int, int]) -> flo
     return 1 - float(np.log2(max(ratio, 1e-3)))
 
 
-def _bent(gammas: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[str]:
+def _bent(gammas: NDArray[np.float64]) -> list[str]:
     known = gammas[np.isfinite(gammas)]
     if not len(known) or abs(np.median(known) - 1) <= GAMMA_TOLERANCE:
         return []
     return [
         f"The pictures are not linear: half the light reads like a gamma of {np.median(known):.2f}. Switch"
         " off the camera's gamma and the projector's dynamic contrast, which shift corners and bits."
+    ]
+
+
+def exposure_warning(frames: PoseFrames, seen: PoseObservation) -> str | None:
+    """A sentence when the board is over-exposed on the white picture of a pose."""
+    (left, top), (right, bottom) = seen.camera_px.min(0).astype(int), seen.camera_px.max(0).astype(int)
+    share = float(saturated(frames)[max(top, 0) : bottom + 1, max(left, 0) : right + 1].mean())
+    if share <= MAX_SATURATED:
+        return None
+    return (
+        f"{frames.name} is over-exposed: {share:.0%} of the white picture's pixels on the board are saturated"
+        ", which shifts its corners. Expose less and take the pose again."
+    )
+
+
+def check_poses(poses: Sequence[PoseObservation], camera_size_px: Size) -> None:
+    """Raise `CalibrationError` for poses that no calibration can come from, saying what to do."""
+    if len(poses) < MIN_POSES:
+        raise CalibrationError(
+            f"{len(poses)} usable poses of the board are too few: {MIN_POSES} are needed, 10 are good."
+            " Add poses with the board tilted in different directions."
+        )
+    for pose in poses:
+        if not all(np.isfinite(v).all() for v in (pose.board_mm, pose.camera_px, pose.projector_px)):
+            raise CalibrationError(f"{pose.name} has corners that are not finite. Take the pose again.")
+    _check_axes(poses)
+    tilt = largest_tilt_deg(poses, camera_size_px)
+    if tilt < MIN_TILT_DEG:
+        raise CalibrationError(
+            f"All poses of the board are nearly parallel (at most {tilt:.1f} degrees apart), so that focal"
+            f" lengths and distances cannot be told apart. Tilt the board by {GOOD_TILT_DEG:.0f} to 45"
+            " degrees in different directions."
+        )
+
+
+def _check_axes(poses: Sequence[PoseObservation]) -> None:
+    """A camera and a projector in front of a board see it with one handedness; mirror images are mistakes."""
+    slopes = np.array([_affine(pose.camera_px, pose.projector_px) for pose in poses])
+    mirrored = np.linalg.det(slopes) < 0
+    if not mirrored.any():
+        return
+    names = ", ".join(pose.name for pose, odd in zip(poses, mirrored, strict=True) if odd)
+    typical = np.abs(slopes[mirrored]).mean(0)
+    if typical[0, 1] + typical[1, 0] > typical[0, 0] + typical[1, 1]:
+        cause = (
+            "the axes are swapped: rows of the projector are decoded as columns. Show the columns' bits first"
+        )
+    else:
+        axis = "left to right" if slopes[mirrored][:, 0, 0].mean() < 0 else "top to bottom"
+        cause = f"the projector's picture is mirrored {axis}. Switch off its mirroring (rear or ceiling mode)"
+    raise CalibrationError(f"In {names} camera and projector see mirror images of the board: {cause}.")
+
+
+def largest_tilt_deg(poses: Sequence[PoseObservation], camera_size_px: Size) -> float:
+    """Largest angle between two poses of the board, degrees, judged before any lens is known.
+
+    The normal of a plane is ``K^T l`` with its vanishing line l (Hartley and Zisserman 2004, 8.6.3); the
+    focal length is taken as a typical one, which serves to tell parallel poses from tilted ones.
+    """
+    width, height = camera_size_px
+    focal = 1.5 * max(width, height)
+    matrix = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
+    return largest_angle_deg(
+        np.array([board_normal(pose.board_mm, pose.camera_px, matrix, pose.name) for pose in poses])
+    )
+
+
+def largest_angle_deg(normals: NDArray[np.float64]) -> float:
+    """Largest angle between unit normals (n, 3) of either sign, degrees."""
+    return float(np.degrees(np.arccos(np.clip(np.abs(normals @ normals.T), 0, 1))).max())
+
+
+def board_normal(
+    board_mm: NDArray[np.float64], camera_px: NDArray[np.float64], matrix: NDArray[np.float64], name: str
+) -> NDArray[np.float64]:
+    """Unit normal of a board in camera coordinates, (3,), either sign, from corners and camera matrix."""
+    import cv2
+
+    homography, _ = cv2.findHomography(board_mm[:, :2], camera_px, 0)
+    if homography is None:
+        raise CalibrationError(f"The corners of {name} lie on one line. Leave this pose out.")
+    normal = matrix.T @ np.linalg.inv(np.asarray(homography, np.float64)).T @ np.array([0.0, 0.0, 1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
+def _affine(source: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The 2 x 2 part of the affine map that fits best."""
+    fit = np.linalg.lstsq(source - source.mean(0), target - target.mean(0), rcond=None)[0]
+    return np.asarray(fit.T)
+
+
+def coverage(points_px: NDArray[np.float64], size_px: Size) -> float:
+    """Share of the cells of a grid over the picture that hold a corner."""
+    cells = np.floor((points_px + 0.5) / np.array(size_px) * CELLS).astype(int)
+    inside = ((cells >= 0) & (cells < CELLS)).all(1)
+    return len(np.unique(cells[inside], axis=0)) / CELLS**2
+
+
+def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | None) -> list[str]:
+    """What a calibration that succeeded may still suffer from; ``baseline_mm`` is measured by hand."""
+    sentences = [
+        f"{pose.name} does not fit the other poses (camera {pose.camera_rms_px:.2f}, projector"
+        f" {pose.projector_rms_px:.2f} px) and was left out: the board or rig moved while it was taken, or"
+        " its pictures are blurred or over-exposed. Take it again."
+        for pose in found.poses
+        if not pose.used
+    ]
+    for what, share in (("camera", found.camera_coverage), ("projector", found.projector_coverage)):
+        if share < MIN_COVERAGE:
+            sentences.append(
+                f"Corners cover {share:.0%} of the {what}'s picture; distortion outside is a guess."
+                " Add poses with the board near the edges."
+            )
+    lenses = (
+        ("camera", found.camera, found.camera_deviation),
+        ("projector", found.projector, found.projector_deviation),
+    )
+    for what, lens, deviation in lenses:
+        if deviation.fx_px > GOOD_FOCAL_SHARE * lens.fx_px:
+            sentences.append(
+                f"The focal length of the {what} is known to {deviation.fx_px / lens.fx_px:.1%} only."
+                " Add poses with more tilt."
+            )
+        corner_px = _corner_px(found, lens, 0 if what == "camera" else LENS)
+        if corner_px > MAX_CORNER_PX:
+            sentences.append(
+                f"The distortion of the {what} is poorly known beyond the board (k3 {lens.distortion[4]:.2f}"
+                f" ± {deviation.distortion[4]:.2f}): {corner_px:.1f} px in a corner of its picture."
+                " Add poses near the edges."
+            )
+        if abs(lens.fx_px / lens.fy_px - 1) > 0.05:
+            sentences.append(
+                f"The {what} seems to have oblong pixels (fx {lens.fx_px:.0f}, fy {lens.fy_px:.0f} px). Check"
+                " that the printed squares are square and, for the projector, its size."
+            )
+    if found.rms_px > GOOD_RMS_PX:
+        sentences.append(
+            f"The reprojection error of {found.rms_px:.2f} px is large. Check that the board is flat and was"
+            " still during each pose."
+        )
+    if tilt_deg < GOOD_TILT_DEG:
+        sentences.append(
+            f"The board was tilted by {tilt_deg:.0f} degrees at most. Tilt it by {GOOD_TILT_DEG:.0f} to 45."
+        )
+    return sentences + _size_doubt(found, baseline_mm)
+
+
+def _corner_px(found: GeometryCalibration, lens: Lens, first: int) -> float:
+    """What the radial distortion (k1, k2, k3) leaves open in the farthest corner of a picture, px.
+
+    ``first`` is where the lens begins among the parameters of the covariance.
+    """
+    if found.covariance is None:
+        return 0.0
+    side = round(len(found.covariance) ** 0.5)
+    radial = [first + 4, first + 5, first + 8]
+    covariance = np.array(found.covariance).reshape(side, side)[np.ix_(radial, radial)]
+    across = max(lens.cx_px, lens.width_px - 1 - lens.cx_px) / lens.fx_px
+    down = max(lens.cy_px, lens.height_px - 1 - lens.cy_px) / lens.fy_px
+    radius = float(np.hypot(across, down))
+    slope = lens.fx_px * radius ** np.array([3, 5, 7])
+    return float(np.sqrt(slope @ covariance @ slope))
+
+
+def _size_doubt(found: GeometryCalibration, baseline_mm: float | None) -> list[str]:
+    """The size of the squares scales all lengths, so that only another known length can tell it is wrong."""
+    distance = float(np.linalg.norm(found.pose.translation_mm))
+    if baseline_mm is None or abs(distance / baseline_mm - 1) <= 0.1:
+        return []
+    size = found.board.square_mm * baseline_mm / distance
+    return [
+        f"Camera and projector come out {distance:.0f} mm apart, measured were {baseline_mm:.0f} mm: the"
+        f" printed squares are probably {size:.1f} mm, not {found.board.square_mm:g} mm. Measure them."
     ]

@@ -8,33 +8,35 @@ that map is quadratic, and fitted to the grey values of the code instead of deco
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry.board_code import (
-    check_frames,
-    check_projector_size,
-    decode_pose,
-    decoded_maps,
-    explain,
-    windows_around,
-)
-from dsl_core.calibration.geometry.boards import Corners, find_corners, grey_of, saturated
-from dsl_core.calibration.geometry.code_model import code_light, refine_maps
-from dsl_core.calibration.geometry.corner_model import even_mosaic, fit_corners
+from dsl_core.calibration.geometry.boards import Corners, find_corners, grey_of, pitches_px, refine_corners
+from dsl_core.calibration.geometry.code_model import MIN_PIXELS, CornerWindow, code_light, refine_maps
 from dsl_core.errors import CalibrationError
-from dsl_core.model.board import Board, Charuco, corner_positions_mm
+from dsl_core.model.board import Board, corner_positions_mm
 from dsl_core.model.calibration.pose_frames import PoseFrames
-from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.model.plan import GrayCode
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, frame_count, lit_mask
 
 Floats = NDArray[np.float64]
 
-#: Colours of a mosaic are made even over so many squares, of which half are black.
-EVEN_SQUARES = 2.0
 #: Share of the corners around which the code must be readable.
 MIN_READ = 0.4
+#: Pixels within this share of the distance between corners tell of a corner (into all four squares around
+#: it), at most so far away, where lenses still are nearly quadratic.
+REACH, MIN_REACH_PX, MAX_REACH_PX = 0.8, 4.0, 24.0
+#: Residual (projector px) beyond which a pixel is decoded wrongly.
+INLIER_PX = 1.5
+#: A bit counts when it differs from its inverse by this share of the light on its pixel.
+MIN_MARGIN = 0.05
+#: Pixels with less light than this share of the brightest ones are in shadow.
+MIN_LIGHT = 0.03
+#: Share of readable pixels that may tell of places that the projector does not have.
+MAX_OUTSIDE = 0.02
 
 
 @dataclass(frozen=True)
@@ -97,82 +99,6 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
     return seen.only(known)
 
 
-def refine_corners(frames: PoseFrames, corners: Corners, board: Board) -> tuple[Corners, float]:
-    """Corners at the crossing of the edges around them, and the median blur of these edges, px.
-
-    Corners whose edges cannot be told stay where they were.
-    """
-    along = _steps_px(corners, board)
-    light = _full_light(frames)
-    if frames.bayer is not None:
-        light = even_mosaic(light, frames.bayer, EVEN_SQUARES * float(np.linalg.norm(along, axis=2).mean()))
-    grey = grey_of(light)
-    grey[saturated(frames)] = np.nan
-    gap = 0.5 * (1 - board.marker_mm / board.square_mm) if isinstance(board, Charuco) else 1.0
-    straight = fit_corners(grey, corners.points_px, along, gap)
-    points = np.where(np.isfinite(straight.points_px), straight.points_px, corners.points_px)
-    # A lens bends edges by some hundredths of a pixel, which would draw every corner towards its axis.
-    found = fit_corners(grey, points, along, gap, _bends_per_px(Corners(corners.ids, points), board))
-    points = np.where(np.isfinite(found.points_px), found.points_px, points)
-    return Corners(corners.ids, points), float(np.median(found.blur_px))
-
-
-def _full_light(frames: PoseFrames) -> NDArray[np.float32]:
-    """The board in white light, from all pictures: pattern and inverse add up to it, with less noise."""
-    total = np.array(frames.white, np.float32)
-    for picture in frames.pairs:
-        total += picture
-    pairs = len(frames.pairs) // 2
-    return np.asarray(
-        total / (pairs + 1) - np.asarray(frames.black, np.float32) * ((2 * pairs + 1) / (pairs + 1))
-    )
-
-
-def _bends_per_px(corners: Corners, board: Board) -> Floats:
-    """Curvature of the edges along board x and y at every corner, (corners, 2), from corners beside it.
-
-    Straight lines stay straight in any perspective, so that what bends them is the lens. Corners without
-    neighbours on both sides take what the nearest other has.
-    """
-    places = np.rint(corner_positions_mm(board)[corners.ids, :2] / board.square_mm).astype(int)
-    index = {tuple(place): number for number, place in enumerate(places.tolist())}
-    bends = np.full((len(places), 2), np.nan)
-    for number, (x, y) in enumerate(places.tolist()):
-        for axis, (dx, dy) in enumerate(((1, 0), (0, 1))):
-            before, after = index.get((x - dx, y - dy)), index.get((x + dx, y + dy))
-            if before is not None and after is not None:
-                a, b, c = corners.points_px[[before, number, after]]
-                along, bent = (c - a) / 2, a - 2 * b + c
-                bends[number, axis] = (along[0] * bent[1] - along[1] * bent[0]) / np.linalg.norm(along) ** 3
-    return _nearest_known(places, bends, np.isfinite(bends))
-
-
-def _nearest_known(places: NDArray[np.int_], values: Floats, known: NDArray[np.bool_]) -> Floats:
-    """Values (corners, 2) with those that are not known taken from the nearest corner, or zero."""
-    filled = np.where(known, values, 0.0)
-    for axis in range(2):
-        have, lack = (np.flatnonzero(which[:, axis]) for which in (known, ~known))
-        if len(have) and len(lack):
-            apart = ((places[lack, None] - places[None, have]) ** 2).sum(2)
-            filled[lack, axis] = values[have[apart.argmin(1)], axis]
-    return filled
-
-
-def _steps_px(corners: Corners, board: Board) -> Floats:
-    """One square's step along board x and y at every corner, shape (corners, 2, 2), px."""
-    import cv2
-
-    places = corner_positions_mm(board)[corners.ids, :2] / board.square_mm
-    homography, _ = cv2.findHomography(places, corners.points_px, cv2.RANSAC, 3.0)
-    if homography is None:
-        raise CalibrationError("The corners of the board lie on one line. Leave this pose out.")
-    ends = []
-    for step in np.array([[0.5, 0.0], [0.0, 0.5]]):
-        both = cv2.perspectiveTransform(np.stack([places + step, places - step]), homography)
-        ends.append(np.asarray(both, np.float64)[0] - np.asarray(both, np.float64)[1])
-    return np.stack(ends, 1)
-
-
 def corners_on_projector(
     code: DecodedCode, corners: Corners, frames: PoseFrames, projector_size_px: tuple[int, int]
 ) -> tuple[Floats, Floats]:
@@ -192,3 +118,123 @@ def corners_on_projector(
         places[known, axis] = maps[:, 0]
         slopes[known, axis] = maps[:, 1:3] / np.array([each.radius_px for each in chosen])[:, None]
     return places, slopes
+
+
+def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None:
+    """Raise `CalibrationError` when the pictures of a pose are incomplete, of mixed sizes or exchanged."""
+    wanted = frame_count(GrayCode(), projector_size_px) - 2
+    if len(frames.pairs) != wanted:
+        width, height = projector_size_px
+        raise CalibrationError(
+            f"{frames.name} has {len(frames.pairs)} pattern pictures; a projector of {width} x {height} px"
+            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or take the"
+            " pose again."
+        )
+    shapes = {np.shape(picture) for picture in (*frames.pairs, frames.white, frames.black)}
+    if len(shapes) > 1:
+        raise CalibrationError(
+            f"The pictures of {frames.name} differ in size ({', '.join(map(str, sorted(shapes)))})."
+            " Take all pictures with one setting of the camera."
+        )
+    if not all(np.isfinite(np.asarray(p)).all() for p in (*frames.pairs, frames.white, frames.black)):
+        raise CalibrationError(f"Pictures of {frames.name} hold values that are not finite. Take them again.")
+    if np.mean(frames.white) <= np.mean(frames.black):
+        raise CalibrationError(
+            f"{frames.name}: the white picture is not brighter than the black one. They are exchanged, or the"
+            " projector was off; correct the order of the pictures."
+        )
+
+
+def decode_pose(frames: PoseFrames, projector_size_px: tuple[int, int]) -> DecodedCode:
+    """Projector column and row of every camera pixel; undecided in shadow and where a bit is unclear.
+
+    A mosaic is decoded pixel by pixel, since a pixel is compared with itself only.
+    """
+    decoder = GrayDecoder(GrayCode(), projector_size_px)
+    light = grey_of(frames.white) - grey_of(frames.black)
+    bright = float(np.quantile(light, 0.99))
+    # Noise of a bit over the light it is made of: the limit is a share, so each pixel has its own scale.
+    scale = np.where(lit_mask(light, 0, MIN_LIGHT * bright), light, np.inf)
+    for pattern, inverse in zip(frames.pairs[::2], frames.pairs[1::2], strict=True):
+        decoder.add(grey_of(pattern), grey_of(inverse), scale)
+    return decoder.finish(min_sigmas=MIN_MARGIN)
+
+
+def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[int, int]) -> None:
+    """Raise `CalibrationError` when clear bits lead outside the projector: then its size is wrong."""
+    assert code.margin_sigmas is not None
+    clear = code.margin_sigmas >= MIN_MARGIN
+    outside = float((code.undecided & clear).sum() / max(clear.sum(), 1))
+    if outside > MAX_OUTSIDE:
+        width, height = projector_size_px
+        raise CalibrationError(
+            f"{name}: {outside:.0%} of the pixels that can be read tell of places outside a projector of"
+            f" {width} x {height} px. Correct its size; width and height may be exchanged."
+        )
+
+
+def readable_share(code: DecodedCode, corners: Corners) -> float:
+    """Share of the corners around which the code can be read."""
+    maps = [decoded_maps(code, window) for window in windows_around(code, corners)]
+    return sum(each is not None for each in maps) / max(len(maps), 1)
+
+
+def windows_around(code: DecodedCode, corners: Corners) -> list[CornerWindow]:
+    """The pixels that tell of each corner."""
+    radii = np.clip(REACH * pitches_px(corners.points_px), MIN_REACH_PX, MAX_REACH_PX)
+    return [
+        CornerWindow.around(point, radius, code.undecided.shape)
+        for point, radius in zip(corners.points_px, radii, strict=True)
+    ]
+
+
+def decoded_maps(code: DecodedCode, window: CornerWindow) -> Floats | None:
+    """Quadratic maps (2, 6) to column and row through most of the decoded pixels; None for too few."""
+    import cv2
+
+    assert code.row is not None
+    read = ~code.undecided[window.rows, window.columns]
+    near = window.terms[read][:, 1:3]
+    if len(near) < MIN_PIXELS or not _surrounds(near):
+        return None
+    pixels = (window.rows[read], window.columns[read])
+    seen = np.stack([code.column[pixels], code.row[pixels]], 1).astype(float)
+    homography, used = cv2.findHomography(near, seen, cv2.RANSAC, INLIER_PX)
+    if homography is None or used.sum() < max(MIN_PIXELS, 0.5 * len(near)):
+        return None
+    agree = used.ravel() > 0
+    maps, *_ = np.linalg.lstsq(window.terms[read][agree], seen[agree], rcond=None)
+    return np.asarray(maps.T)
+
+
+def _surrounds(near: Floats) -> bool:
+    """Whether points lie on all sides of the origin, so that nothing is extrapolated."""
+    return bool((near.min(0) < 0).all() and (near.max(0) > 0).all())
+
+
+def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, int]) -> str:
+    """Why a code cannot be read: another order of the pictures that can, or else how they are lit."""
+    bits = bit_counts(GrayCode(), projector_size_px)
+    for words, pairs in _other_orders(list(frames.pairs), bits[0]):
+        code = decode_pose(replace(frames, pairs=pairs), projector_size_px)
+        read = readable_share(code, corners)
+        if read > 0.8:
+            return f"It can be read if {words}: the order of the patterns is wrong. Correct it."
+    return (
+        "Check that the projector lights the whole board, that its pictures are neither too dark nor"
+        " over-exposed, and the order of the patterns (columns first, most significant bit first, each"
+        " followed by its inverse)."
+    )
+
+
+def _other_orders(frames: list[NDArray[Any]], column_bits: int) -> list[tuple[str, list[NDArray[Any]]]]:
+    """Orders that are easily mistaken for the right one, in words and as pictures put right."""
+    pairs = list(zip(frames[::2], frames[1::2], strict=True))
+    half, rows = len(pairs), len(pairs) - column_bits
+    orders = {
+        "every inverse comes before its pattern": [(b, a) for a, b in pairs],
+        "rows come before columns": pairs[rows:] + pairs[:rows],
+        "the least significant bit comes first": pairs[:column_bits][::-1] + pairs[column_bits:][::-1],
+        "all patterns come before all inverses": list(zip(frames[:half], frames[half:], strict=True)),
+    }
+    return [(words, [picture for pair in order for picture in pair]) for words, order in orders.items()]

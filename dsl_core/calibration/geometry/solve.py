@@ -7,11 +7,22 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry import bundle
-from dsl_core.calibration.geometry.bundle import Adjustment, adjust, refit, rotation_of, vector_of
-from dsl_core.calibration.geometry.diagnosis import check_poses, coverage, doubts
+from dsl_core.calibration.geometry.bundle import (
+    CAMERA,
+    PROJECTOR,
+    SHARED,
+    STEREO,
+    Adjustment,
+    adjust,
+    flatness,
+    move,
+    refit,
+    rotation_of,
+    triangulate,
+    vector_of,
+)
+from dsl_core.calibration.geometry.pose_series import check_poses, coverage, doubts, largest_angle_deg
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
-from dsl_core.calibration.geometry.triangulation import flatness, triangulate
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
 from dsl_core.model.calibration.geometry import (
@@ -61,7 +72,8 @@ def calibrate_geometry(
     qualities = _qualities(poses, kept, fit, final, board)
     found = _record(poses, kept, final, qualities, board, camera_size_px, projector_size_px)
     found = found.model_copy(update={"camera_binning": camera_binning, "left_out": tuple(left_out)})
-    tilt = _largest_tilt_deg(final.parameters)
+    normals = [rotation_of(motion[:3])[:, 2] for motion in final.parameters[SHARED:].reshape(-1, 6)]
+    tilt = largest_angle_deg(np.array(normals))
     return found.model_copy(update={"warnings": (*warnings, *doubts(found, tilt, baseline_mm))})
 
 
@@ -106,8 +118,8 @@ def _alone(poses: Sequence[PoseObservation], device: str, size_px: Size) -> tupl
 
 def without(parameters: Floats, poses: Sequence[int] | NDArray[np.integer]) -> Floats:
     """Parameters without some board poses."""
-    boards = np.delete(parameters[bundle.SHARED :].reshape(-1, 6), poses, 0)
-    return np.concatenate([parameters[: bundle.SHARED], boards.ravel()])
+    boards = np.delete(parameters[SHARED:].reshape(-1, 6), poses, 0)
+    return np.concatenate([parameters[:SHARED], boards.ravel()])
 
 
 def _fitting(poses: Sequence[PoseObservation], fit: Adjustment) -> NDArray[np.bool_]:
@@ -145,7 +157,7 @@ def _qualities(
     for index, pose in enumerate(poses):
         fit, part = (final, final_parts[positions[index]]) if kept[index] else (first, first_parts[index])
         at = int(positions[index]) if kept[index] else index
-        motion = fit.parameters[bundle.SHARED :].reshape(-1, 6)[at]
+        motion = fit.parameters[SHARED:].reshape(-1, 6)[at]
         used = fit.used[part] if fit.used[part].sum() >= 4 else np.ones(len(pose.ids), bool)
         camera, projector = _rms_px(fit, part)
         left_out = None
@@ -172,19 +184,12 @@ def _qualities(
 
 
 def _placed(motion: Floats, pose: PoseObservation) -> Floats:
-    return bundle.move(np.broadcast_to(motion, (len(pose.ids), 6)), pose.board_mm)[0]
+    return move(np.broadcast_to(motion, (len(pose.ids), 6)), pose.board_mm)[0]
 
 
 def _measured(parameters: Floats, pose: PoseObservation, motion: Floats, board: Board) -> Flatness:
-    points = triangulate(parameters[: bundle.SHARED], pose, _placed(motion, pose))
+    points = triangulate(parameters[:SHARED], pose, _placed(motion, pose))
     return flatness(points, pose.ids, board)
-
-
-def _largest_tilt_deg(parameters: Floats) -> float:
-    normals = np.array(
-        [rotation_of(motion[:3])[:, 2] for motion in parameters[bundle.SHARED :].reshape(-1, 6)]
-    )
-    return float(np.degrees(np.arccos(np.clip(np.abs(normals @ normals.T), 0, 1))).max())
 
 
 def _record(
@@ -204,13 +209,13 @@ def _record(
     spread = [side.square_std_mm**2 + (side.square_mm - mean) ** 2 for side in sides]
     return GeometryCalibration(
         board=board,
-        camera=lens_of(values[bundle.CAMERA], camera_size_px),
-        projector=lens_of(values[bundle.PROJECTOR], projector_size_px),
-        pose=pose_of(values[bundle.STEREO]),
-        camera_deviation=_lens_deviation(deviations[bundle.CAMERA]),
-        projector_deviation=_lens_deviation(deviations[bundle.PROJECTOR]),
-        pose_deviation=_pose_deviation(deviations[bundle.STEREO]),
-        covariance=tuple(fit.covariance[: bundle.SHARED, : bundle.SHARED].ravel().tolist()),
+        camera=lens_of(values[CAMERA], camera_size_px),
+        projector=lens_of(values[PROJECTOR], projector_size_px),
+        pose=pose_of(values[STEREO]),
+        camera_deviation=_lens_deviation(deviations[CAMERA]),
+        projector_deviation=_lens_deviation(deviations[PROJECTOR]),
+        pose_deviation=_pose_deviation(deviations[STEREO]),
+        covariance=tuple(fit.covariance[:SHARED, :SHARED].ravel().tolist()),
         camera_rms_px=camera,
         projector_rms_px=projector,
         rms_px=float(np.hypot(camera, projector) / np.sqrt(2)),

@@ -25,6 +25,7 @@ from operator import add
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
 from dsl_core.calibration.light.chain_equations import (
     ORDERS,
     ZERO_ORDER_ERROR,
@@ -32,11 +33,11 @@ from dsl_core.calibration.light.chain_equations import (
     Unknowns,
     colours_of,
     first_order_equations,
+    stretched,
     without_outliers,
     zero_order_equations,
     zero_order_ratios,
 )
-from dsl_core.calibration.light.emission_shift import stretched
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
 from dsl_core.model.rig import Rig
@@ -49,11 +50,9 @@ __all__ = ["LineScan", "chain_correction"]
 
 Floats = NDArray[np.float64]
 
-#: Nodes of the corrections, nm.
-UNKNOWNS = Unknowns(np.arange(400.0, 701.0, 10.0))
+UNKNOWNS = Unknowns(NODES_NM)
 #: Prior deviations of a correction's level and of its rise over all nodes.
 LEVEL_STD, RISE_STD = 0.05, 0.1
-AMPLITUDES, LENGTHS, NOISE_FACTORS = (0.003, 0.01, 0.03, 0.1), (20.0, 40.0, 80.0, 160.0), (1.0, 2.0, 4.0, 8.0)
 ROUNDS = 2
 #: What is known beforehand of the scale of wavelengths.
 SCALE_STD = 0.02
@@ -130,9 +129,7 @@ def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: Spect
         total,
         [SmoothPrior(UNKNOWNS.nodes_nm, LEVEL_STD, RISE_STD)] * (len(ORDERS) + 3),
         [LEVEL_STD],
-        amplitudes=AMPLITUDES,
-        lengths=LENGTHS,
-        noise_factors=NOISE_FACTORS,
+        **SMOOTHNESS,
     )
     used = [part for part in parts if part.count]
     without = [
@@ -239,8 +236,7 @@ def _product(rig: Rig, order: int) -> Floats:
 
 def _record(factors: Floats, solved: _Solved, scale: tuple[float, float]) -> ChainCorrection:
     def curve(block: slice) -> SpectralCurve:
-        values = SpectralCurve.of(UNKNOWNS.nodes_nm, factors[block])
-        return values.model_copy(update={"std": tuple(solved.solution.std[block].tolist())})
+        return SpectralCurve.of(UNKNOWNS.nodes_nm, factors[block], std=solved.solution.std[block])
 
     red, green, blue = (curve(UNKNOWNS.response(colour)) for colour in range(3))
     both = np.sqrt(np.mean([std**2 for std in solved.chain_std.values()], 0))

@@ -9,7 +9,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.light.emission_shift import steepness
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -17,7 +16,8 @@ from dsl_core.optics.correspondence import Correspondence, Footprint
 from dsl_core.optics.line_profile import ProfileTable
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response, hat_moments
-from dsl_core.solve.smooth_functions import Equations
+from dsl_core.solve.robust import robust_std
+from dsl_core.solve.smooth_functions import Equations, hat_functions
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ OUTLIER_SIGMAS = 6.0
 CHUNK = 256
 #: Blur and width of a band beyond a line's edge.
 REACH_PX = 6.0
+#: Relative step of wavelengths for slopes.
+STRETCH = 1e-3
 
 
 @dataclass(frozen=True)
@@ -129,9 +131,7 @@ class Unknowns:
 
     def hats(self, wavelengths_nm: Floats) -> Floats:
         """Linear interpolation from the nodes to wavelengths, (wavelengths, nodes)."""
-        return np.stack(
-            [np.interp(wavelengths_nm, self.nodes_nm, row) for row in np.eye(len(self.nodes_nm))], 1
-        )
+        return hat_functions(wavelengths_nm, self.nodes_nm)
 
 
 def zero_order_signals(rig: Rig, reflectance: SpectralCurve) -> Floats:
@@ -160,7 +160,7 @@ def without_outliers(rig: Rig, scan: LineScan, reflectance: SpectralCurve) -> Li
         of_colour = good & (colours == colour)
         if of_colour.any():
             middle = np.median(ratio[of_colour])
-            spread = 1.4826 * np.median(np.abs(ratio[of_colour] - middle))
+            spread = robust_std(ratio[of_colour] - middle)
             good[of_colour] = np.abs(ratio[of_colour] - middle) <= OUTLIER_SIGMAS * spread + 1e-9
     return scan.at(good)
 
@@ -285,3 +285,27 @@ def _halo(rig: Rig, scan: LineScan) -> Floats:
     distance = np.abs(scan.column_px - scan.centres_px[:, None])
     peak = response.halo_peak_per_px * scan.lines.width_px
     return np.asarray(peak * np.exp(-distance / response.halo_decay_px))
+
+
+def steepness(rig: Rig, order: int, bands_nm: Floats, step_nm: float) -> Floats:
+    """Relative change of white light in each band for a relative shift of the emission, (3, bands).
+
+    Efficiency and response are measured through filters, so that they share the filters' wavelengths; the
+    emission has those of the spectroradiometer.
+    """
+    towards_red, towards_blue = (
+        hat_moments(stretched(rig, 1 + sign * STRETCH), order, bands_nm, step_nm)[0].sum(1)
+        for sign in (1, -1)
+    )
+    middle = 0.5 * (towards_red + towards_blue)
+    change = (towards_blue - towards_red) / (2 * STRETCH)
+    return np.asarray(np.where(middle > 0, change / np.where(middle > 0, middle, 1.0), 0.0))
+
+
+def stretched(rig: Rig, factor: float) -> Rig:
+    """The rig with its emission at wavelengths ``factor`` times as long."""
+    red, green, blue = (
+        curve.model_copy(update={"wavelengths_nm": tuple(factor * nm for nm in curve.wavelengths_nm)})
+        for curve in rig.emission
+    )
+    return rig.model_copy(update={"emission": (red, green, blue)})

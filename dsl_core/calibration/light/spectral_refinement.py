@@ -18,16 +18,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.spectral_nodes import NODES_NM
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.determinant import log_determinant
+from dsl_core.solve.smooth_functions import hat_functions
 
 Floats = NDArray[np.float64]
 
 PUBLISHED_WEIGHT = 0.005
-#: Nodes of the deviations, nm; linear between them.
-NODES_NM = np.arange(400.0, 701.0, 10.0)
 FINE_NM = np.arange(400.0, 701.0)
 #: Prior deviation of a response's level, and of the light on the chart against that on the Spectralon.
 LEVEL_STD, CHART_LEVEL_STD = 0.3, 0.02
@@ -235,9 +235,8 @@ def _relative_std(curve: SpectralCurve) -> Floats:
 
 def _basis(curve: Floats) -> Floats:
     """Effect of a curve's unknowns on its logarithm, (UNKNOWNS, wavelengths)."""
-    hats = np.stack([np.interp(FINE_NM, NODES_NM, unit) for unit in np.eye(len(NODES_NM))])
     slope = np.gradient(curve, FINE_NM) / np.maximum(curve, SHIFT_FLOOR * curve.max())
-    return np.concatenate([hats, -slope[None]])
+    return np.concatenate([hat_functions(FINE_NM, NODES_NM).T, -slope[None]])
 
 
 def _shape_std(basis: Floats, covariance: Floats, curves: Floats) -> Floats:
@@ -254,9 +253,5 @@ def _shape_std(basis: Floats, covariance: Floats, curves: Floats) -> Floats:
 
 
 def _curves(values: Floats, std: Floats) -> Rgb:
-    nm = tuple(FINE_NM.tolist())
-    red, green, blue = (
-        SpectralCurve(wavelengths_nm=nm, values=tuple(v.tolist()), std=tuple(s.tolist()))
-        for v, s in zip(values, std, strict=True)
-    )
+    red, green, blue = (SpectralCurve.of(FINE_NM, v, std=s) for v, s in zip(values, std, strict=True))
     return red, green, blue

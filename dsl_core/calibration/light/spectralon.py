@@ -1,4 +1,4 @@
-"""White signals and evenness from uniform pictures of a Spectralon whose plane is known."""
+"""White signals and evenness from uniform pictures of a Spectralon, and a rig that reproduces the whites."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.common.plane import PlaneFit
-from dsl_core.calibration.light.evenness import Evenness, fit_evenness
+from dsl_core.calibration.common.plane import TargetPlane
+from dsl_core.calibration.common.spectral_nodes import NODES_NM
+from dsl_core.calibration.light.spectral_refinement import FINE_NM
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import (
     MeasuredEmission,
@@ -18,10 +19,12 @@ from dsl_core.model.calibration.spectralon import (
     Square3,
     WhiteSignals,
 )
-from dsl_core.model.rig import Sensor
+from dsl_core.model.flat_field import FlatField
+from dsl_core.model.rig import Rgb, Rig, Sensor
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.flat_field import gain_at_pixels
 from dsl_core.optics.sensor import bayer_channels
+from dsl_core.solve.smooth_functions import hat_functions
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -31,6 +34,17 @@ BLOCKS = 6
 #: A pixel this far (relative) from the median of its colour is dirt, a mark, or beside the target.
 OFF_MEDIAN = 0.2
 MIN_PIXELS = 400
+#: Nodes over rows and columns, and blocks per node that the residual is judged by.
+NODES = (9, 13)
+BLOCKS_PER_NODE = 3
+#: Weight of third differences between nodes against a block: noise should not bend the grid; vignetting,
+#: which is quadratic, costs nothing.
+STIFFNESS = 3.0
+#: Signals of a channel under an LED with a larger relative deviation say nothing of the response's shape.
+TRUSTED = 0.02
+#: Curvature against which a level counts: small, so that only the shape is kept smooth.
+LEVEL_WEIGHT = 1e-4
+ITERATIONS = 30
 
 
 @dataclass(frozen=True)
@@ -82,7 +96,7 @@ def spectralon_calibration(
     emission: MeasuredEmission,
     pictures: UniformPictures,
     measured: WhiteMeasurement,
-    found: PlaneFit,
+    found: TargetPlane,
     region: Mask,
 ) -> SpectralonCalibration:
     """The record of all that was found; shares are of ``region`` (rows, columns)."""
@@ -151,3 +165,119 @@ def _row(values: Floats) -> Row3:
 
 def _square(values: Floats) -> Square3:
     return _row(values[0]), _row(values[1]), _row(values[2])
+
+
+@dataclass(frozen=True)
+class Evenness:
+    """A flat field, deviations of its nodes, reduced chi-square of an even camera, rms of blocks about it."""
+
+    flat_field: FlatField
+    std: tuple[tuple[float, ...], ...]
+    chi_square: float
+    residual: float
+
+
+def fit_evenness(relative: Floats, usable: Mask) -> Evenness:
+    """Bilinear grid through values (rows, columns) that would all be one, mean one over the usable pixels.
+
+    Pixels are averaged in blocks first: their noise, and whatever repeats from pixel to pixel, averages out,
+    and the scatter of blocks about the grid gives honest deviations.
+    """
+    rows_px, columns_px = (np.linspace(0, n - 1, k) for n, k in zip(relative.shape, NODES, strict=True))
+    row, column, value, count = _blocks(relative, usable)
+    weight = np.sqrt(count / count.mean())
+    design = hat_functions(row, rows_px)[:, :, None] * hat_functions(column, columns_px)[:, None, :]
+    design = design.reshape(len(value), -1)
+    rough = _roughness() * np.sqrt(STIFFNESS)
+    left = np.concatenate([design * weight[:, None], rough])
+    right = np.concatenate([value * weight, np.zeros(len(rough))])
+    gain, *_ = np.linalg.lstsq(left, right, rcond=None)
+    residual = (value - design @ gain) * weight
+    freedom = max(len(value) - gain.size, 1)
+    variance = float((residual**2).sum() / freedom)
+    std = np.sqrt(variance * np.diag(np.linalg.inv(left.T @ left)))
+    mean = float(np.average(design @ gain, weights=count))
+    even = float((((value - np.average(value, weights=count)) * weight) ** 2).sum() / max(len(value) - 1, 1))
+    flat_field = FlatField(
+        rows_px=tuple(rows_px.tolist()), columns_px=tuple(columns_px.tolist()), gain=_rows(gain / mean)
+    )
+    chi_square = even / variance if variance > 0 else 1.0
+    return Evenness(flat_field, _rows(std / mean), chi_square, float(np.sqrt(variance)))
+
+
+def _blocks(relative: Floats, usable: Mask) -> tuple[Floats, Floats, Floats, Floats]:
+    """Mean position (px), mean value and number of pixels of blocks that hold enough."""
+    rows, columns = np.nonzero(usable)
+    down, across = (BLOCKS_PER_NODE * k for k in NODES)
+    block = (rows * down // relative.shape[0]) * across + columns * across // relative.shape[1]
+    count = np.bincount(block, minlength=down * across).astype(float)
+    keep = count > 0.2 * count.max()
+    sums = [
+        np.bincount(block, v, down * across)[keep] / count[keep] for v in (rows, columns, relative[usable])
+    ]
+    return sums[0], sums[1], sums[2], count[keep]
+
+
+def _roughness() -> Floats:
+    """Third differences of the grid along rows and columns, one a row."""
+    down, across = NODES
+    d, a = np.diff(np.eye(down), 3, axis=0), np.diff(np.eye(across), 3, axis=0)
+    return np.concatenate([np.kron(d, np.eye(across)), np.kron(np.eye(down), a)])
+
+
+def _rows(values: Floats) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in values.reshape(NODES).tolist())
+
+
+def match_whites(rig: Rig, white: WhiteSignals, reflectance: SpectralCurve) -> Rig:
+    """The rig with responses and white scale that reproduce white signals, nothing else changed.
+
+    Each response is multiplied by the smoothest factor (least squared gradient of its logarithm) that gives
+    the channel's signal under every LED; the three responses keep the sum of their integrals, and the white
+    scale takes the rest. A rig that gives the signals already comes back as it is.
+    """
+    emission = np.stack([curve.at(FINE_NM) for curve in rig.emission]) * reflectance.at(FINE_NM)
+    start = np.stack([curve.at(FINE_NM) for curve in rig.response])
+    matched = np.stack(
+        [
+            _matched(start[c], rig.white_scale * emission, white.array[c], np.array(white.rel_std[c]))
+            for c in range(3)
+        ]
+    )
+    scale = float(matched.sum() / start.sum())
+    red, green, blue = (SpectralCurve.of(FINE_NM, curve / scale) for curve in matched)
+    response: Rgb = (red, green, blue)
+    # Where white is not the sum of its LEDs, by noise or else, no signal is better known than that.
+    std = float(np.hypot(_white_std(white).mean(), _rms(np.array(white.white_over_sum) - 1)))
+    return rig.model_copy(
+        update={"response": response, "white_scale": rig.white_scale * scale, "white_scale_rel_std": std}
+    )
+
+
+def _white_std(white: WhiteSignals) -> Floats:
+    """Relative deviation of each channel's signal under all LEDs, shape (3,)."""
+    spread = white.array * np.array(white.rel_std)
+    return np.asarray(np.linalg.norm(spread, axis=1) / white.array.sum(1))
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _matched(response: Floats, lights: Floats, wanted: Floats, rel_std: Floats) -> Floats:
+    """A response (wavelengths,) times the smoothest factor that gives ``wanted`` under ``lights``."""
+    hats = hat_functions(FINE_NM, NODES_NM).T
+    used = (wanted > 0) & (rel_std < TRUSTED) & (lights @ response > 0)
+    gradient = np.diff(np.eye(len(NODES_NM)), axis=0)
+    stiff = np.linalg.inv(gradient.T @ gradient + LEVEL_WEIGHT * np.eye(len(NODES_NM)))
+    factor = np.zeros(len(NODES_NM))
+    for _ in range(ITERATIONS):
+        density = lights[used] * (response * np.exp(factor @ hats))
+        signal = density.sum(1)
+        miss = np.log(wanted[used] / signal)
+        if np.abs(miss).max(initial=0.0) < 1e-12:
+            break
+        share = density @ hats.T / signal[:, None]
+        # The smoothest factor that meets all signals to first order, seen from the start.
+        factor = stiff @ share.T @ np.linalg.solve(share @ stiff @ share.T, miss + share @ factor)
+    return np.asarray(response * np.exp(factor @ hats))

@@ -17,9 +17,9 @@ from dsl_core.calibration.orders.efficiency import (
     second_order_share,
 )
 from dsl_core.calibration.orders.filter_check import PlacedFilter, effective_nm, found_wavelengths, verdict
-from dsl_core.calibration.orders.narrow_band import BandSample, fit_response
-from dsl_core.calibration.orders.order_graph import MIN_PIXELS, PlanePixels, by_cell
 from dsl_core.calibration.orders.order_light import FilterLight
+from dsl_core.calibration.orders.order_place import MIN_PIXELS, PlanePixels, by_cell
+from dsl_core.calibration.orders.response import BandSample, fit_response
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
 from dsl_core.model.rig import Rig
@@ -203,9 +203,7 @@ def _second(
 def _scaled(curve: SpectralCurve, share: float, share_std: float) -> SpectralCurve:
     values = np.array(curve.values)
     std = np.hypot(share * np.array(curve.std), share_std * values)
-    return SpectralCurve.of(curve.wavelengths_nm, share * values).model_copy(
-        update={"std": tuple(std.tolist())}
-    )
+    return SpectralCurve.of(curve.wavelengths_nm, share * values, std=std)
 
 
 def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Floats]:

@@ -14,15 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.spectral_nodes import NODES_NM
 from dsl_core.errors import CalibrationError
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM
-from dsl_core.solve.smooth_functions import Equations, SmoothPrior, solve_smooth
+from dsl_core.solve.smooth_functions import Equations, SmoothPrior, hat_functions, solve_smooth
 
 Floats = NDArray[np.float64]
 
-#: Nodes of the logarithm, nm, and prior deviations of its level and its rise over all nodes.
-NODES_NM = np.arange(400.0, 701.0, 10.0)
+#: Prior deviations of the logarithm's level and of its rise over all nodes.
 LEVEL_STD, RISE_STD = 4.0, 2.0
 AMPLITUDES, LENGTHS, NOISE_FACTORS = (
     (0.003, 0.01, 0.03, 0.1, 0.3),
@@ -59,7 +59,7 @@ def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
             f"Order {order:+d} was found through {len(used)} filters; {MIN_SAMPLES} of different wavelengths"
             " are needed. Choose a place of the target where the order's light reaches it, and more filters."
         )
-    hats = np.stack([np.interp(FINE_NM, NODES_NM, row) for row in np.eye(len(NODES_NM))], 1)
+    hats = hat_functions(FINE_NM, NODES_NM)
     light = np.stack([s.light / s.light.sum() for s in used])
     ratio = np.array([s.ratio for s in used])
     std = np.hypot([s.std / s.ratio for s in used], LEAST_STD)
@@ -89,7 +89,7 @@ def _curve(log_values: Floats, log_std: Floats) -> SpectralCurve:
     nm = np.arange(NODES_NM[0], NODES_NM[-1] + 1, 2.0)
     values = np.exp(CubicSpline(NODES_NM, log_values)(nm))
     std = values * np.interp(nm, NODES_NM, log_std)
-    return SpectralCurve.of(nm, values).model_copy(update={"std": tuple(std.tolist())})
+    return SpectralCurve.of(nm, values, std=std)
 
 
 def _centre(sample: RatioSample) -> float:

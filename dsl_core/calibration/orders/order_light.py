@@ -13,20 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.orders.order_graph import (
-    MIN_PIXELS,
-    ZERO_HALF_PX,
-    Graph,
-    PlanePixels,
-    by_cell,
-    line_graph,
-)
 from dsl_core.calibration.orders.order_place import (
+    MIN_PIXELS,
     ORDER_HALF_PX,
     SECOND_HALF_PX,
+    ZERO_HALF_PX,
+    LineGraph,
     OrderPlace,
+    PlanePixels,
+    by_cell,
     find_order,
     find_second,
+    line_graph,
 )
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
@@ -103,7 +101,7 @@ def filter_light(
     return FilterLight(zero, zero_std, orders, shift, share)
 
 
-def _zero_signals(graph: Graph) -> tuple[Floats, Floats]:
+def _zero_signals(graph: LineGraph) -> tuple[Floats, Floats]:
     """Mean zero order of each colour at unit shading, and its deviation by the cells' scatter."""
     value, spread = np.full(3, np.nan), np.full(3, np.inf)
     relative = graph.amplitude / graph.pixels.shading
@@ -119,7 +117,7 @@ def _zero_signals(graph: Graph) -> tuple[Floats, Floats]:
     return value, spread
 
 
-def _light(graph: Graph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:
+def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:
     """Sum an order's light around its place, over pixels whose window lies in the frame."""
     ratio, spread = np.full(3, np.nan), np.full(3, np.inf)
     if place is None:

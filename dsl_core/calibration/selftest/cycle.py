@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.selftest.readings import Readings
-from dsl_core.model.calibration.selftest import Measured
+from dsl_core.calibration.selftest.camera import Transfer
+from dsl_core.calibration.selftest.readings import Readings, RegionSizes
+from dsl_core.model.calibration.selftest import Beat, Measured
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +32,13 @@ _AS_GOOD, _AS_GOOD_SHARE = 1.5, 0.01
 #: Gaps between time stamps must follow the waits asked for this closely to be believed.
 _TRUSTED = 0.95
 _CHUNK, _GROUPS = 1024, 8
+_SPREAD_HARMONICS = 8
+#: Relative variance below which differences between exposures are not the cycle's.
+_SPREAD_FLOOR = 1e-7
+#: Mean log-likelihood that a higher frequency may lose against the best and count as equal.
+_SPREAD_AS_GOOD = 0.1
+#: A cycle must explain the spreads better than none by this mean log-likelihood.
+_SPREAD_EXPLAINED = 0.3
 
 
 @dataclass(frozen=True)
@@ -164,3 +172,105 @@ def _design(time_s: Floats, trial_hz: Floats, harmonics: int) -> Floats:
     order = np.arange(1, harmonics + 1)
     phase = 2 * np.pi * trial_hz[:, None, None] * time_s[:, None] * order
     return np.concatenate([np.ones((*phase.shape[:2], 1)), np.cos(phase), np.sin(phase)], axis=-1)
+
+
+def find_cycle_by_spread(readings: Readings, black_dn: float) -> Cycle:
+    """The cycle in repeats at several exposures (rows of equal ``exposure_ms``), taken at any times."""
+    exposures, spreads, counts = _spreads(readings, black_dn)
+    modulation = float(np.sqrt(2 * spreads.max()))
+    measured = Measured(value=modulation, std=modulation / np.sqrt(2 * max(int(counts.min()) - 1, 1)))
+    if modulation < STEADY:
+        return Cycle(None, measured)
+    trial = np.geomspace(LOWEST_HZ, HIGHEST_HZ, 1 + round(np.log(HIGHEST_HZ / LOWEST_HZ) / _step(exposures)))
+    cost = np.array([_cost(hz, exposures, spreads, counts) for hz in trial])
+    none = _cost_of(np.full(spreads.shape, spreads.mean()), spreads, counts)
+    low = cost <= cost.min() + _SPREAD_AS_GOOD
+    low[1:-1] &= (cost[1:-1] <= cost[:-2]) & (cost[1:-1] <= cost[2:])
+    if none - cost.min() < _SPREAD_EXPLAINED:
+        return Cycle(None, measured)
+    hz = float(trial[np.flatnonzero(low)[-1]])
+    hz, std_hz = _refine(hz, exposures, spreads, counts)
+    return Cycle(Measured(value=1000 / hz, std=1000 / hz**2 * std_hz), measured)
+
+
+def _spreads(readings: Readings, black_dn: float) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """Exposures (n,), relative variances (n,) of the channels together, and repeats (n,)."""
+    exposures, group = np.unique(readings.exposure_ms, return_inverse=True)
+    signal = (readings.mean_dn - black_dn) / readings.exposure_ms[:, None]
+    signal = signal / signal.mean(0)
+    spreads = np.array([signal[group == i].var(0, ddof=1).mean() for i in range(len(exposures))])
+    return exposures, spreads + _SPREAD_FLOOR, np.bincount(group)
+
+
+def _step(exposures: Floats) -> float:
+    """Relative step of frequency that moves the phase of the longest exposure by a sixteenth of a cycle."""
+    return float(1 / (16 * HIGHEST_HZ * exposures.max() / 1000))
+
+
+def _cost(hz: float, exposures: Floats, spreads: Floats, counts: NDArray[np.int64]) -> float:
+    """Mean negative log-likelihood of the spreads for the best non-negative powers of the harmonics."""
+    from scipy.optimize import nnls
+
+    order = np.arange(1, _SPREAD_HARMONICS + 1)
+    design = np.sinc(exposures[:, None] / 1000 * hz * order) ** 2
+    design = np.concatenate([design, np.full((len(exposures), 1), _SPREAD_FLOOR)], 1)
+    model = np.maximum(spreads, spreads.mean() / 100)
+    for _ in range(3):
+        weight = np.sqrt(counts) / model
+        found, _ = nnls(design * weight[:, None], spreads * weight)
+        model = np.maximum(design @ found, _SPREAD_FLOOR)
+    return _cost_of(model, spreads, counts)
+
+
+def _cost_of(model: Floats, spreads: Floats, counts: NDArray[np.int64]) -> float:
+    """Of a sample variance: a gamma distribution with half as many degrees of freedom as repeats."""
+    share = (counts - 1) / 2
+    return float((share * (np.log(model) + spreads / model)).sum() / share.sum())
+
+
+def _refine(hz: float, exposures: Floats, spreads: Floats, counts: NDArray[np.int64]) -> tuple[float, float]:
+    """Frequency of least cost; standard deviation by leaving out every eighth exposure, or by curvature."""
+    step = hz * _step(exposures)
+    trial = hz + step * np.linspace(-1.5, 1.5, 61)
+
+    def costs(kept: NDArray[np.bool_]) -> Floats:
+        return np.array([_cost(each, exposures[kept], spreads[kept], counts[kept]) for each in trial])
+
+    groups = np.arange(len(exposures)) % 8
+    parts = np.array([trial[costs(groups != i).argmin()] for i in range(8)])
+    whole = costs(groups >= 0)
+    likely = np.exp(-(whole - whole.min()) * (counts - 1).sum() / 2)
+    mean = float(likely @ trial / likely.sum())
+    width = np.sqrt(likely @ (trial - mean) ** 2 / likely.sum())
+    return mean, float(max(parts.std() * np.sqrt(7), width, (trial[1] - trial[0]) / np.sqrt(12)))
+
+
+def check_beats(
+    readings: Readings, black_dn: float, transfer: Transfer, sizes: RegionSizes
+) -> tuple[Beat, ...]:
+    """A `Beat` for each exposure, in the order of first use."""
+    exposures = list(dict.fromkeys(readings.exposure_ms.tolist()))
+    return tuple(
+        _beat(readings[readings.exposure_ms == exposure], exposure, black_dn, transfer, sizes)
+        for exposure in exposures
+    )
+
+
+def _beat(
+    repeats: Readings, exposure_ms: float, black_dn: float, transfer: Transfer, sizes: RegionSizes
+) -> Beat:
+    signal = repeats.mean_dn - black_dn
+    mean = signal.mean(0)
+    ratios = signal[:, [0, 2]] / signal[:, [1]]
+    channels = 100 * signal.std(0, ddof=1) / mean
+    ratio = float((100 * ratios.std(0, ddof=1) / ratios.mean(0)).max())
+    # Relative standard deviation of a standard deviation of normal numbers.
+    share = 1 / np.sqrt(2 * (len(repeats) - 1))
+    measured = [Measured(value=float(value), std=float(share * value)) for value in channels]
+    floor = 100 * transfer.mean_std(mean, sizes.pixels) / mean
+    return Beat(
+        exposure_ms=exposure_ms,
+        channels_percent=(measured[0], measured[1], measured[2]),
+        ratio_percent=Measured(value=ratio, std=share * ratio),
+        floor_percent=float(floor.max()),
+    )

@@ -1,4 +1,4 @@
-"""From all readings of a self-test to its record."""
+"""From all readings of a self-test to its record, and to the points that its curves are drawn from."""
 
 from __future__ import annotations
 
@@ -8,14 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.selftest.beat import check_beats
-from dsl_core.calibration.selftest.camera import check_camera, count_hot_pixels, fit_dark, fit_transfer
-from dsl_core.calibration.selftest.cycle import Cycle, advised_exposures, find_cycle, has_trusted_times
+from dsl_core.calibration.selftest.camera import (
+    ExposureLine,
+    check_camera,
+    count_hot_pixels,
+    exposure_line,
+    fit_dark,
+    fit_transfer,
+)
+from dsl_core.calibration.selftest.cycle import (
+    Cycle,
+    advised_exposures,
+    check_beats,
+    find_cycle,
+    find_cycle_by_spread,
+    has_trusted_times,
+)
 from dsl_core.calibration.selftest.focus import BarFrames, check_focus
-from dsl_core.calibration.selftest.latency import check_latency
-from dsl_core.calibration.selftest.projector import check_projector
+from dsl_core.calibration.selftest.latency import check_latency, is_right, trials
+from dsl_core.calibration.selftest.projector import RAMPS, Colour, check_projector, ramp_of
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes, joined
-from dsl_core.calibration.selftest.spread import find_cycle_by_spread
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
 
@@ -23,6 +35,10 @@ from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
 PUBLISHED_MS = (160.0, 320.0)
 #: Exposures wanted for scans; what is advised are the nearest that hold whole cycles.
 WANTED_MS = (500.0 / 3.0, 1000.0 / 3.0)
+Floats = NDArray[np.float64]
+
+#: Drive levels that tell the power law well.
+BRIGHT = 0.2
 
 
 @dataclass(frozen=True)
@@ -105,3 +121,57 @@ def cycle_of(cycle: Readings, spread: Readings | None, black_dn: float) -> tuple
 def needs_spread(cycle: Readings, found: Cycle) -> bool:
     """Whether the cycle has to be looked for without time stamps."""
     return not found.is_steady and (found.period_ms is None or not has_trusted_times(cycle))
+
+
+@dataclass(frozen=True)
+class RampPoints:
+    """Light of one colour ramp over that at full drive: drive levels 0..1 and light, both (n,)."""
+
+    colour: Colour
+    level: Floats
+    light: Floats
+
+
+@dataclass(frozen=True)
+class SelfTestCurves:
+    """Lines of red, green and blue; ramps; and the share of right pictures after each wait, both (waits,)."""
+
+    lines: tuple[ExposureLine, ExposureLine, ExposureLine]
+    full_scale_dn: float
+    ramps: tuple[RampPoints, ...]
+    waits_ms: Floats
+    right_share: Floats
+
+
+def selftest_curves(capture: SelfTestCapture) -> SelfTestCurves:
+    """The points behind linearity, gamma and latency; raises `CalibrationError` as the analysis does."""
+    parts, sizes = capture.parts, capture.sizes
+    dark = fit_dark(parts["dark"], sizes)
+    transfer = fit_transfer(joined(parts["dark"], parts["series"]), dark.level_dn.value, sizes)
+    red, green, blue = (exposure_line(parts["series"], c, dark, transfer, sizes) for c in range(3))
+    latency = parts["latency"]
+    judged, asked, _ = trials(latency, is_right(latency))
+    right = is_right(latency)[judged]
+    waits, which = np.unique(asked, return_inverse=True)
+    return SelfTestCurves(
+        (red, green, blue),
+        sizes.full_scale_dn,
+        tuple(_ramp(capture, colour, dark.level_dn.value, dark.rate) for colour in RAMPS),
+        waits,
+        np.bincount(which, right) / np.bincount(which),
+    )
+
+
+def _ramp(capture: SelfTestCapture, colour: Colour, black_dn: float, dark_rate: Floats) -> RampPoints:
+    """In the channel that sees most of the colour; clipped frames are left out.
+
+    Light at full drive is that of the power law through the points, as full drive itself may be clipped.
+    """
+    ramp = ramp_of(capture.parts["ramps"], colour)
+    rate = (ramp.mean_dn - black_dn) / ramp.exposure_ms[:, None] - dark_rate
+    channel = int(rate[ramp.drive.max(1).argmax()].argmax())
+    used = ramp.unclipped[:, channel]
+    level, light = ramp.drive.max(1)[used] / 255, rate[used, channel]
+    bright = (level > BRIGHT) & (light > 0)
+    _, full = np.polyfit(np.log(level[bright]), np.log(light[bright]), 1)
+    return RampPoints(colour, level, light / np.exp(full))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.colour.chart_colours import patch_colours
+from dsl_core.calibration.colour.color_checker import patch_colours
 from dsl_core.calibration.colour.patches import chart_picture
 from dsl_core.campaign.common.flat_target import WHITE
 from dsl_core.campaign.common.recipe import Bench, Step

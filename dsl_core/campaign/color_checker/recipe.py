@@ -8,11 +8,11 @@ import numpy as np
 
 from dsl_core.calibration.colour.color_checker import (
     ChartPictures,
+    color_checker_figures,
     expected_colours,
     measure_patches,
     refine_on_chart,
 )
-from dsl_core.calibration.colour.figures import color_checker_figures
 from dsl_core.calibration.colour.patches import ChartPose, find_chart, orient_chart, patch_samples
 from dsl_core.campaign.common.exposures import measure_white
 from dsl_core.campaign.common.flat_target import (

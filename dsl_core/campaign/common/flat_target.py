@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.common.plane import PlaneFit, fit_plane
+from dsl_core.calibration.common.plane import TargetPlane, fit_plane
 from dsl_core.campaign.common.exposures import bracket, measure_white
 from dsl_core.campaign.common.recipe import Bench
 from dsl_core.campaign.common.step_scan import scan_of, scan_step
@@ -37,7 +37,9 @@ class FlatTarget:
     depth_mm: NDArray[np.float64]
     lit: NDArray[np.bool_]
 
-    def plane(self, rig: Rig, start: NDArray[np.bool_], within: NDArray[np.bool_] | None = None) -> PlaneFit:
+    def plane(
+        self, rig: Rig, start: NDArray[np.bool_], within: NDArray[np.bool_] | None = None
+    ) -> TargetPlane:
         """The plane of the target, which ``start`` surely belongs to and which lies ``within`` a region.
 
         Raises `CalibrationError` when there is none.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibrate_depth_stage
-from dsl_core.calibration.film.line_samples import LineFrames
+from dsl_core.calibration.film.order_paths import LineFrames
 from dsl_core.campaign.common.exposures import LONGEST_MS, WhiteLevel, bracket, bright_setting, measure_white
 from dsl_core.campaign.common.filter_in_beam import note_of_filter
 from dsl_core.campaign.common.light_look import film_light

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dsl_core.calibration.common.tiles import ColumnSamples, tile_columns
-from dsl_core.calibration.film.line_samples import LineFrames, thinned
+from dsl_core.calibration.film.order_paths import LineFrames, thinned
 from dsl_core.errors import CalibrationError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import ScanLines

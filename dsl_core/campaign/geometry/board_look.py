@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dsl_core.calibration.geometry.boards import find_corners, grey_of
-from dsl_core.calibration.geometry.diagnosis import board_normal
-from dsl_core.calibration.geometry.projector_corners import refine_corners
+from dsl_core.calibration.geometry.boards import find_corners, grey_of, refine_corners
+from dsl_core.calibration.geometry.pose_series import board_normal
 from dsl_core.campaign.common.exposures import WhiteLevel
 from dsl_core.campaign.common.light_look import other_light
 from dsl_core.model.board import Board, corner_positions_mm

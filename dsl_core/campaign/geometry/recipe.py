@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.calibration.geometry.bundle import SHARED
-from dsl_core.calibration.geometry.diagnosis import MIN_POSES, exposure_warning
-from dsl_core.calibration.geometry.pose_series import observe_series
+from dsl_core.calibration.geometry.pose_series import MIN_POSES, exposure_warning, observe_series
 from dsl_core.calibration.geometry.projector_corners import observe_pose
 from dsl_core.calibration.geometry.solve import calibrate_geometry
 from dsl_core.campaign.common.exposures import bracket, measure_white

@@ -6,9 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_core.calibration.light.emission import measured_emission
-from dsl_core.calibration.light.spectralon import UniformPictures, measure_white, spectralon_calibration
+from dsl_core.calibration.light.spectralon import (
+    UniformPictures,
+    match_whites,
+    measure_white,
+    spectralon_calibration,
+)
 from dsl_core.calibration.light.spectralon_figures import spectralon_figures, unevenness_of_middle
-from dsl_core.calibration.light.white_match import match_whites
 from dsl_core.campaign.common import exposures
 from dsl_core.campaign.common.flat_target import capture_flat_target, middle, read_flat_target
 from dsl_core.campaign.common.light_look import brightness, other_light

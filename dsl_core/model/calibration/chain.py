@@ -63,6 +63,5 @@ def _times(curve: SpectralCurve, factor: SpectralCurve) -> SpectralCurve:
     value = curve.at(nm)
     std = None
     if factor.std is not None:
-        std = tuple((np.abs(value) * np.interp(nm, factor.wavelengths_nm, factor.std)).tolist())
-    product = SpectralCurve.of(nm, value * factor.at(nm), unit=curve.unit)
-    return product.model_copy(update={"std": std})
+        std = np.abs(value) * np.interp(nm, factor.wavelengths_nm, factor.std)
+    return SpectralCurve.of(nm, value * factor.at(nm), curve.unit, std)

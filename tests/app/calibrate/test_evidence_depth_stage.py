@@ -12,7 +12,7 @@ from dsl_app.calibrate.evidence import depth_stage as depth_stage_evidence
 from dsl_app.shared.theme import Theme
 from pytestqt.qtbot import QtBot
 
-from dsl_core.calibration.film.stage_curves import stage_curves
+from dsl_core.calibration.film.depth_stage import stage_curves
 from dsl_core.campaign.depth_stage import figures as depth_stage_figures
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.calibration.depth_stage import (

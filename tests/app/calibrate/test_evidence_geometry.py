@@ -12,7 +12,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QStyle, QStyleOptionViewItem
 from pytestqt.qtbot import QtBot
 
-from dsl_core.calibration.geometry.diagnosis import CELLS, GOOD_RMS_PX, MIN_POSES
+from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
 from dsl_core.campaign.geometry.recipe import GeometryRecipe
 from dsl_core.campaign.recipes import load_recipe
 from dsl_core.model.board import Checkerboard

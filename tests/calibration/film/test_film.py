@@ -11,10 +11,10 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import tile_of_pixels
-from dsl_core.calibration.film.film import COMMON_PX, FIELDS, OrderSamples, fit_film, grating_columns
-from dsl_core.calibration.film.peaks import TileShifts
+from dsl_core.calibration.film.correspondence import fit_stage_grid
+from dsl_core.calibration.film.fit import COMMON_PX, FIELDS, OrderSamples, fit_film, grating_columns
+from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.calibration.film.residual import choose_residual, correction_px, fit_residual
-from dsl_core.calibration.film.stage_grid import fit_stage_grid
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.correspondence import GratingModel, HybridModel, correspondence
@@ -67,7 +67,7 @@ def samples_of(rig: Rig, noise_px: float, bend: Bend = unbent, seed: int = 0) ->
                 std = np.full(len(pixels), max(noise_px, 1e-4))
                 depth = np.full(len(pixels), z)
                 parts.append(
-                    (position, name, TileShifts(order, nm, tiles[pixels], pixels, depth, columns, std))
+                    (position, name, TileColumns(order, nm, tiles[pixels], pixels, depth, columns, std))
                 )
     return OrderSamples.of(parts)
 

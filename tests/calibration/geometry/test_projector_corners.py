@@ -9,10 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from dsl_core.calibration.geometry.board_code import decode_pose
 from dsl_core.calibration.geometry.boards import Corners, find_corners, grey_of
-from dsl_core.calibration.geometry.diagnosis import exposure_warning
-from dsl_core.calibration.geometry.projector_corners import corners_on_projector, observe_pose
+from dsl_core.calibration.geometry.pose_series import exposure_warning
+from dsl_core.calibration.geometry.projector_corners import corners_on_projector, decode_pose, observe_pose
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Charuco
 from dsl_core.model.calibration.pose_frames import PoseFrames

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.calibration.geometry.code_model import Window, code_light, refine_maps
+from dsl_core.calibration.geometry.code_model import CornerWindow, code_light, refine_maps
 from dsl_core.calibration.geometry.corner_model import even_mosaic, fit_corners
 from dsl_core.calibration.geometry.projector_corners import PoseObservation, observe_pose
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -74,7 +74,7 @@ def test_pixels_that_are_read_wrongly_do_no_harm(frames: PoseFrames, seen: PoseO
 
 
 def test_a_coarse_map_is_refined_from_half_a_pixel_away(frames: PoseFrames, seen: PoseObservation) -> None:
-    windows = [Window.around(point, 9.0, np.shape(frames.white)) for point in seen.camera_px]
+    windows = [CornerWindow.around(point, 9.0, np.shape(frames.white)) for point in seen.camera_px]
     linear = seen.slopes[:, 0] * 9.0
     start = np.concatenate([seen.projector_px[:, :1] + 0.5, linear, np.zeros((77, 3))], 1)
     found = refine_maps(code_light(frames, PROJECTOR_PX)[0], windows, start)

@@ -5,9 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.geometry.bundle import CAMERA, PROJECTOR, SHARED, STEREO, move, project, vector_of
+from dsl_core.calibration.geometry.bundle import (
+    CAMERA,
+    PROJECTOR,
+    SHARED,
+    STEREO,
+    flatness,
+    move,
+    project,
+    triangulate,
+    vector_of,
+)
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
-from dsl_core.calibration.geometry.triangulation import flatness, triangulate
 from dsl_core.model.board import corner_positions_mm
 from tests.cases import board_poses as case
 

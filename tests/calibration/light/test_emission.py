@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.light.curve_smoothing import smooth_curve
-from dsl_core.calibration.light.emission import measured_emission
+from dsl_core.calibration.light.emission import measured_emission, smooth_curve
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import COLOURS, EMISSION_SUM_NM, EmissionReadings, LightColour
 from dsl_core.model.spectral import SpectralCurve

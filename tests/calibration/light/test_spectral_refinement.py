@@ -16,7 +16,7 @@ from dsl_core.calibration.light.spectral_refinement import (
     refined_curves,
     residuals,
 )
-from dsl_core.calibration.light.white_match import match_whites
+from dsl_core.calibration.light.spectralon import match_whites
 from dsl_core.errors import Cancelled
 from dsl_core.model.calibration.spectralon import WhiteSignals
 from dsl_core.model.rig import Rgb, Rig

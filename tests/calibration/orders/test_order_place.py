@@ -3,13 +3,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.orders.order_graph import Graph, PlanePixels
-from dsl_core.calibration.orders.order_place import find_order
+from dsl_core.calibration.orders.order_place import LineGraph, PlanePixels, find_order
 
 FRAME_PX, LINE_PX, REACH_PX = 640, 5, (150.0, 400.0)
 
 
-def graph_of(distance_px: float, bend_px: float, width_px: float = 3.0) -> Graph:
+def graph_of(distance_px: float, bend_px: float, width_px: float = 3.0) -> LineGraph:
     """White pixels all over the image that see one order ``distance_px`` to the right of the zero order."""
     down, across = np.meshgrid(np.linspace(0.01, 0.99, 60), np.linspace(0.01, 0.99, 160), indexing="ij")
     place = np.stack([down.ravel(), across.ravel()])
@@ -18,7 +17,7 @@ def graph_of(distance_px: float, bend_px: float, width_px: float = 3.0) -> Graph
     at = distance_px + bend_px * (place[1] - 0.5) ** 2
     signal = np.exp(-0.5 * ((lines[:, None] - column - at) / width_px) ** 2)
     pixels = PlanePixels(column, np.ones(len(column)), np.zeros(len(column), int), place, {})
-    return Graph(
+    return LineGraph(
         signal, np.full(signal.shape, 1e-6), lines[:, None] - column, np.ones(len(column)), pixels, FRAME_PX
     )
 
@@ -36,4 +35,4 @@ def test_an_order_that_leaves_the_frame_is_placed_by_the_pixels_that_see_all_of_
 
 def test_light_that_is_none_has_no_place() -> None:
     dark = graph_of(200.0, 0.0)
-    assert find_order(Graph(dark.signal * 0, *list(vars(dark).values())[1:]), 1, REACH_PX) is None
+    assert find_order(LineGraph(dark.signal * 0, *list(vars(dark).values())[1:]), 1, REACH_PX) is None

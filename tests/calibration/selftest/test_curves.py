@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.selftest.curves import selftest_curves
-from dsl_core.calibration.selftest.record import analyse
+from dsl_core.calibration.selftest.record import analyse, selftest_curves
 from dsl_core.campaign.selftest.capture import SelfTestRun
 from dsl_core.progress import NoProgress
 from tests.cases.light_rig import LightWorld, light_rig

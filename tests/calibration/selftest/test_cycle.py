@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.selftest.cycle import advised_exposures, find_cycle, has_trusted_times
-from dsl_core.calibration.selftest.spread import find_cycle_by_spread
+from dsl_core.calibration.selftest.cycle import (
+    advised_exposures,
+    find_cycle,
+    find_cycle_by_spread,
+    has_trusted_times,
+)
 from tests.cases.cycle_readings import BLACK_DN, MIX, led_time_ms, short_exposures, table
 
 

@@ -19,7 +19,7 @@ from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
 
 if TYPE_CHECKING:
-    from dsl_core.calibration.film.stage_curves import StageCurve
+    from dsl_core.calibration.film.depth_stage import StageCurve
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -122,7 +122,7 @@ class DepthStageEvidence(Evidence):
         self._draw()
 
         def read() -> tuple[StageCurve, ...]:
-            from dsl_core.calibration.film.stage_curves import stage_curves
+            from dsl_core.calibration.film.depth_stage import stage_curves
 
             return stage_curves(record, rig)
 

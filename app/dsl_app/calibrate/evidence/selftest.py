@@ -16,7 +16,7 @@ from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
 
 if TYPE_CHECKING:
-    from dsl_core.calibration.selftest.curves import SelfTestCurves
+    from dsl_core.calibration.selftest.record import SelfTestCurves
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -81,7 +81,7 @@ class SelfTestEvidence(Evidence):
         folder = session.bench.step_folder(session.steps[0])
 
         def read() -> SelfTestCurves:
-            from dsl_core.calibration.selftest.curves import selftest_curves
+            from dsl_core.calibration.selftest.record import selftest_curves
             from dsl_core.campaign.selftest.store import load_capture
 
             return selftest_curves(load_capture(folder))

@@ -13,13 +13,14 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.peaks import TileShifts
+from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.shading import Plane
 from dsl_core.progress import NoProgress, Progress
+from dsl_core.solve.robust import huber_weights
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,7 +53,7 @@ class OrderSamples:
     std_px: Floats
 
     @classmethod
-    def of(cls, parts: Sequence[tuple[int, int, TileShifts]]) -> OrderSamples:
+    def of(cls, parts: Sequence[tuple[int, int, TileColumns]]) -> OrderSamples:
         """One table of (position, filter, shifts); raises `CalibrationError` when there are none."""
         if not parts:
             raise CalibrationError("No first orders were captured. Capture the lines through filters first.")
@@ -129,9 +130,7 @@ def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUN
         residual = samples.column_px - here
         ahead = [grating_columns(_with(rig, values + step), samples) for step in np.diag(STEPS)]
         jacobian = (np.stack(ahead, 1) - here[:, None]) / STEPS * PRIOR_STD
-        scale = max(1.0, 1.4826 * float(np.median(np.abs(residual / sigma))))
-        off = np.abs(residual) / (scale * sigma)
-        weight = np.minimum(1.0, HUBER_SIGMAS / np.maximum(off, 1e-12)) / (scale * sigma) ** 2
+        weight, scale = huber_weights(residual, sigma, HUBER_SIGMAS)
         information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(FIELDS))
         gradient = jacobian.T @ (weight * residual) + (centre - values) / PRIOR_STD
         covariance = np.linalg.inv(information)

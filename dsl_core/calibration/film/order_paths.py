@@ -1,4 +1,4 @@
-"""Samples of projected lines on a known plane: which pixel, in which line frame, how far from its column."""
+"""Light of a first order through a bandpass filter: its passband, its paths to a plane, and what is seen."""
 
 from __future__ import annotations
 
@@ -9,13 +9,15 @@ import torch
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import tile_of_pixels
-from dsl_core.calibration.film.filter_template import FilterTemplate
+from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, zero_order
 from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.shading import Plane, plane_shading
+from dsl_core.optics.spectra import chain_response
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -26,6 +28,10 @@ NEAR_NM = 4.0
 COLUMN_MARGIN_PX, ROW_MARGIN_PX = 8.0, 3.0
 #: Pixels used of one capture at most, and pixels that a tile needs.
 MAX_PIXELS, MIN_PIXELS = 140_000, 6
+#: Fine grid for integrals over a filter, nm.
+STEP_NM = 0.5
+#: Light below this share of the brightest wavelength is left out of a filter's extent.
+EXTENT_SHARE = 0.01
 
 
 @dataclass(frozen=True)
@@ -46,7 +52,7 @@ class Paths:
     """How light of one order reaches those pixels whose light comes from inside the projector's frame.
 
     All arrays are (n,): ``at`` are indices into the frames' pixels, ``column_px`` the model's columns at the
-    template's centroid, ``per_nm`` and ``per_nm2`` their derivatives over wavelength, ``zero_px`` the
+    passband's centroid, ``per_nm`` and ``per_nm2`` their derivatives over wavelength, ``zero_px`` the
     columns of the zero order.
     """
 
@@ -69,7 +75,7 @@ class Paths:
 
 
 @dataclass(frozen=True)
-class Window:
+class LineValues:
     """Values near the columns of the model, flat: index into `Paths`, line centre (px), value, variance."""
 
     sample: Ints
@@ -77,9 +83,9 @@ class Window:
     value: Floats
     variance: Floats
 
-    def only(self, keep: NDArray[np.bool_]) -> Window:
+    def only(self, keep: NDArray[np.bool_]) -> LineValues:
         """The values where ``keep`` is true."""
-        return Window(self.sample[keep], self.line_px[keep], self.value[keep], self.variance[keep])
+        return LineValues(self.sample[keep], self.line_px[keep], self.value[keep], self.variance[keep])
 
 
 def thinned(size_px: tuple[int, int]) -> Ints:
@@ -95,17 +101,15 @@ def tile_count(rig: Rig) -> int:
     return int(tile_of_pixels((rig.camera.width_px, rig.camera.height_px)).max()) + 1
 
 
-def trace_paths(
-    rig: Rig, plane: Plane, pixels: Ints, template: FilterTemplate, model: Correspondence
-) -> Paths:
+def trace_paths(rig: Rig, plane: Plane, pixels: Ints, passband: Passband, model: Correspondence) -> Paths:
     """The paths of an order to pixels of a plane, by a model of the film."""
     width = rig.camera.width_px
     light = plane_shading(rig, plane) * relative_gain(rig)
     depth, shade = (image.ravel()[pixels] for image in (plane.depth_mm(rig), light))
     z, where = torch.as_tensor(depth), torch.as_tensor(pixels)
-    nm = template.centroid_nm
-    wavelengths = np.array([nm - NEAR_NM, nm, nm + NEAR_NM, *template.extent_nm])
-    traced = model.trace(where, z, template.order, wavelengths)
+    nm = passband.centroid_nm
+    wavelengths = np.array([nm - NEAR_NM, nm, nm + NEAR_NM, *passband.extent_nm])
+    traced = model.trace(where, z, passband.order, wavelengths)
     columns, rows = traced.columns.numpy(), traced.rows.numpy()
     inside = (columns > COLUMN_MARGIN_PX) & (columns < rig.projector.width_px - 1 - COLUMN_MARGIN_PX)
     inside &= (rows > ROW_MARGIN_PX) & (rows < rig.projector.height_px - 1 - ROW_MARGIN_PX)
@@ -127,14 +131,14 @@ def trace_paths(
     )
 
 
-def reach_px(lines: ScanLines, paths: Paths, template: FilterTemplate) -> float:
+def reach_px(lines: ScanLines, paths: Paths, passband: Passband) -> float:
     """How far from its column a line's profile reaches."""
     dispersion = float(np.abs(paths.per_nm).mean()) if len(paths.at) else 0.5
-    widest = max(abs(end - template.centroid_nm) for end in template.extent_nm)
+    widest = max(abs(end - passband.centroid_nm) for end in passband.extent_nm)
     return lines.width_px / 2 + widest * dispersion
 
 
-def window(frames: LineFrames, paths: Paths, within_px: float) -> Window:
+def values_near(frames: LineFrames, paths: Paths, within_px: float) -> LineValues:
     """All known values of lines within a distance of the model's columns."""
     lines = frames.lines
     first = (lines.width_px - 1) / 2
@@ -146,7 +150,7 @@ def window(frames: LineFrames, paths: Paths, within_px: float) -> Window:
     which, sample = np.nonzero(usable & (np.abs(centre - paths.column_px) <= within_px))
     frame, pixel = number[which, sample], paths.at[sample]
     value, std = (part[frame, pixel].astype(float) for part in (frames.radiance, frames.std))
-    every = Window(sample, np.asarray(centre[which, sample], float), value, std**2 + 1e-30)
+    every = LineValues(sample, np.asarray(centre[which, sample], float), value, std**2 + 1e-30)
     return every.only(np.isfinite(std) & np.isfinite(value))
 
 
@@ -161,3 +165,65 @@ def _middles(tiles: Ints, pixels: Ints, width: int) -> tuple[Ints, Ints]:
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     enough = counts >= MIN_PIXELS
     return found[enough], ranked[starts][enough]
+
+
+@dataclass(frozen=True)
+class Passband:
+    """Light of one order through one filter, for each colour of the camera.
+
+    ``density`` (3, wavelengths) integrates to one for each colour, ``cumulative`` is its running integral and
+    ``signal`` (3,) what was divided out, DN per ms. ``centroid_nm`` is that of all colours together.
+    """
+
+    order: int
+    centroid_nm: float
+    extent_nm: tuple[float, float]
+    wavelengths_nm: Floats
+    density: Floats
+    cumulative: Floats
+    signal: Floats
+
+    def between(self, start_nm: Floats, stop_nm: Floats, colour: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Light between two wavelengths, and the density at the second less that at the first."""
+        light, slope = np.zeros(start_nm.shape), np.zeros(start_nm.shape)
+        nm = self.wavelengths_nm
+        for c in range(3):
+            mine = colour == c
+            a, b = start_nm[mine], stop_nm[mine]
+            light[mine] = np.interp(b, nm, self.cumulative[c]) - np.interp(a, nm, self.cumulative[c])
+            slope[mine] = np.interp(b, nm, self.density[c], 0, 0) - np.interp(a, nm, self.density[c], 0, 0)
+        return light, slope
+
+
+def filter_passband(
+    rig: Rig, transmission: SpectralCurve, order: int, dispersion_px_per_nm: float
+) -> Passband:
+    """The light of a line through a filter: transmission x response x emission x efficiency, blurred.
+
+    The centroid of that product is the effective wavelength, not the filter's nominal centre. The
+    projector's blur is put into the spectrum, by the dispersion. Raises `CalibrationError` when the chain has
+    no light at all there.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    nm = np.arange(transmission.wavelengths_nm[0] - 20, transmission.wavelengths_nm[-1] + 20, STEP_NM)
+    passed = np.interp(nm, transmission.wavelengths_nm, transmission.values, 0, 0)
+    spectrum = chain_response(rig, order, nm).sum(1) * passed
+    total = spectrum.sum()
+    if not total > 0:
+        raise CalibrationError(
+            f"No light of order {order:+d} passes the filter from {transmission.wavelengths_nm[0]:g} to"
+            f" {transmission.wavelengths_nm[-1]:g} nm by the calibration so far. Check the filter's curve."
+        )
+    centroid = float((spectrum.sum(0) * nm).sum() / total)
+    lit = nm[spectrum.sum(0) > EXTENT_SHARE * spectrum.sum(0).max()]
+    sigma = rig.projector_response.blur_px / dispersion_px_per_nm / STEP_NM
+    signal = spectrum.sum(1) * STEP_NM
+    # A colour that is blind to this filter has the profile of all of them, with no light.
+    shape = np.where((signal > 1e-6 * signal.max())[:, None], spectrum, spectrum.sum(0))
+    density = gaussian_filter1d(
+        shape / (shape.sum(1, keepdims=True) * STEP_NM), sigma, axis=1, mode="constant"
+    )
+    middle = 0.5 * (density[:, 1:] + density[:, :-1]) * STEP_NM
+    cumulative = np.concatenate([np.zeros((3, 1)), np.cumsum(middle, 1)], 1)
+    return Passband(order, centroid, (float(lit[0]), float(lit[-1])), nm, density, cumulative, signal)

@@ -13,9 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.filter_template import FilterTemplate
-from dsl_core.calibration.film.line_samples import LineFrames, Paths, reach_px, trace_paths, window
-from dsl_core.calibration.film.line_samples import tile_count as count_tiles
+from dsl_core.calibration.film.order_paths import (
+    LineFrames,
+    Passband,
+    Paths,
+    reach_px,
+    trace_paths,
+    values_near,
+)
+from dsl_core.calibration.film.order_paths import tile_count as count_tiles
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import Correspondence
 from dsl_core.optics.shading import Plane
@@ -36,7 +42,7 @@ MODEL_ERROR = 0.005
 
 
 @dataclass(frozen=True)
-class TileShifts:
+class TileColumns:
     """Columns of one order at one wavelength: a pixel for each tile, its depth, column (px) and deviation."""
 
     order: int
@@ -51,22 +57,22 @@ class TileShifts:
         return len(self.tiles)
 
 
-def find_shifts(
-    rig: Rig, plane: Plane, frames: LineFrames, template: FilterTemplate, model: Correspondence
-) -> TileShifts:
+def fit_columns(
+    rig: Rig, plane: Plane, frames: LineFrames, passband: Passband, model: Correspondence
+) -> TileColumns:
     """Fit every tile's shift, from within a few columns of the model; tiles without light are left out."""
-    paths = trace_paths(rig, plane, frames.pixels, template, model)
-    near = window(frames, paths, reach_px(frames.lines, paths, template) + FLANK_PX)
+    paths = trace_paths(rig, plane, frames.pixels, passband, model)
+    near = values_near(frames, paths, reach_px(frames.lines, paths, passband) + FLANK_PX)
     count, sample = count_tiles(rig), near.sample
     tiles, colour = paths.tiles[sample], paths.colour[sample]
     shading, per_nm = paths.shading[sample], paths.per_nm[sample]
-    fitted = _Fit(np.zeros((count, 5)), np.zeros((count, 5)), np.ones(count))
+    fitted = _TileFit(np.zeros((count, 5)), np.zeros((count, 5)), np.ones(count))
     shift, weight = np.zeros(count), 1 / near.variance
     half, sign = frames.lines.width_px / 2, np.sign(per_nm)
     for _ in range(ROUNDS):
         off = near.line_px - paths.column_px[sample] - shift[tiles]
-        start, stop = (template.centroid_nm + paths.wavelength(sample, off + side * half) for side in (-1, 1))
-        light, slope = template.between(start, stop, colour)
+        start, stop = (passband.centroid_nm + paths.wavelength(sample, off + side * half) for side in (-1, 1))
+        light, slope = passband.between(start, stop, colour)
         brightness = fitted.values[tiles, colour]
         along = -sign * slope / per_nm * shading * brightness
         fitted = _fit_tiles(tiles, count, colour, sign * light * shading, along, near.value, weight)
@@ -77,11 +83,11 @@ def find_shifts(
     lit = (fitted.values[chosen, :3] / fitted.std[chosen, :3].clip(1e-30)).max(1) > LIT_SIGMAS
     std = fitted.std[chosen, 4] * np.sqrt(fitted.chi_square[chosen].clip(1))
     good = lit & (np.abs(fitted.values[chosen, 4]) < 0.2) & np.isfinite(std) & (std > 0) & (std < 1)
-    return _shifts(paths, template, chosen[good], at[good], shift, std[good])
+    return _shifts(paths, passband, chosen[good], at[good], shift, std[good])
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _TileFit:
     """Brightness of R, G, B, dark offset and shift of every tile (tiles, 5), deviations, chi-square."""
 
     values: Floats
@@ -91,7 +97,7 @@ class _Fit:
 
 def _fit_tiles(
     tiles: Ints, count: int, colour: Ints, g: Floats, along: Floats, y: Floats, weight: Floats
-) -> _Fit:
+) -> _TileFit:
     """Weighted linear least squares of each tile; ``along`` is the derivative by the shift, zero: unknown."""
     normal, right = np.zeros((count, 5, 5)), np.zeros((count, 5))
 
@@ -116,21 +122,21 @@ def _fit_tiles(
     values[normal[:, 4, 4] <= 0, 4] = 0.0
     left = y - values[tiles, colour] * g - values[tiles, 3] - values[tiles, 4] * along
     chi = total(weight * left**2) / np.maximum(np.bincount(tiles, minlength=count) - 5, 1)
-    return _Fit(values, np.sqrt(np.diagonal(inverse, axis1=1, axis2=2).clip(0)) / size, chi)
+    return _TileFit(values, np.sqrt(np.diagonal(inverse, axis1=1, axis2=2).clip(0)) / size, chi)
 
 
-def find_coarsely(
-    rig: Rig, plane: Plane, frames: LineFrames, template: FilterTemplate, model: Correspondence
-) -> TileShifts:
+def search_columns(
+    rig: Rig, plane: Plane, frames: LineFrames, passband: Passband, model: Correspondence
+) -> TileColumns:
     """The same from as far off as `SEARCH_PX`, to a few columns: the brightest place along the columns."""
-    paths = trace_paths(rig, plane, frames.pixels, template, model)
-    near = window(frames, paths, SEARCH_PX)
+    paths = trace_paths(rig, plane, frames.pixels, passband, model)
+    near = values_near(frames, paths, SEARCH_PX)
     near = near.only(np.abs(near.line_px - paths.zero_px[near.sample]) > ZERO_ORDER_PX)
     count, bins = count_tiles(rig), int(2 * SEARCH_PX) + 1
     off = np.rint(near.line_px - paths.column_px[near.sample] + SEARCH_PX).astype(np.int64)
     cell = paths.tiles[near.sample] * bins + off.clip(0, bins - 1)
-    light = (template.signal / template.signal.max())[paths.colour[near.sample]] * paths.shading[near.sample]
-    kernel = np.ones(2 * round(reach_px(frames.lines, paths, template) / 2) + 1)
+    light = (passband.signal / passband.signal.max())[paths.colour[near.sample]] * paths.shading[near.sample]
+    kernel = np.ones(2 * round(reach_px(frames.lines, paths, passband) / 2) + 1)
 
     def profile(values: Floats) -> Floats:
         table = np.bincount(cell, values, count * bins).reshape(count, bins)
@@ -150,15 +156,15 @@ def find_coarsely(
     # A peak at the end of the search is the flank of something else.
     good = (sigmas[chosen] > LIT_SIGMAS) & (np.abs(best[chosen] - SEARCH_PX) < SEARCH_PX - 3)
     width = np.full(int(good.sum()), 1 + frames.lines.step_px / 8)
-    return _shifts(paths, template, chosen[good], at[good], middle - SEARCH_PX, width)
+    return _shifts(paths, passband, chosen[good], at[good], middle - SEARCH_PX, width)
 
 
 def _shifts(
-    paths: Paths, template: FilterTemplate, tiles: Ints, at: Ints, shift: Floats, std: Floats
-) -> TileShifts:
-    return TileShifts(
-        template.order,
-        template.centroid_nm,
+    paths: Paths, passband: Passband, tiles: Ints, at: Ints, shift: Floats, std: Floats
+) -> TileColumns:
+    return TileColumns(
+        passband.order,
+        passband.centroid_nm,
         tiles,
         paths.pixels[at],
         paths.depth_mm[at],

@@ -16,20 +16,25 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM
 from dsl_core.optics.spectra import chain_response
-from dsl_core.solve.smooth_functions import Equations, SmoothPrior, SmoothSolution, solve_smooth
+from dsl_core.solve.smooth_functions import (
+    Equations,
+    SmoothPrior,
+    SmoothSolution,
+    hat_functions,
+    solve_smooth,
+)
 
 Floats = NDArray[np.float64]
 
-NODES_NM = np.arange(400.0, 701.0, 10.0)
 #: Prior deviations of each function's level and rise; of a measured and a nominal transmission; of the
 #: drive level; of the white scale.
 LEVEL_STD, RISE_STD = 0.1, 0.1
 MEASURED_STD, NOMINAL_STD, DRIVE_STD, SCALE_STD = 0.005, 0.15, 0.01, 0.3
-AMPLITUDES, LENGTHS, NOISE_FACTORS = (0.003, 0.01, 0.03, 0.1), (20.0, 40.0, 80.0, 160.0), (1.0, 2.0, 4.0, 8.0)
 #: Least relative deviation of a signal, and the share of the brightest colour below which one is not used.
 LEAST_STD, LEAST_SHARE = 1e-3, 0.01
 ROUNDS = 3
@@ -62,7 +67,7 @@ def fit_response(
 ) -> ResponseFit:
     """Refine the response; ``white`` (3,) is the zero order of white at unit shading, DN per ms."""
     nm = FINE_NM
-    hats = np.stack([np.interp(nm, NODES_NM, row) for row in np.eye(len(NODES_NM))], 1)
+    hats = hat_functions(nm, NODES_NM)
     in_white = chain_response(rig, 0, nm).sum(1) * reflectance
     change = np.zeros((3, len(NODES_NM)))
     for _ in range(ROUNDS):
@@ -83,9 +88,7 @@ def fit_response(
             Equations.of(np.array(design), np.array(target), np.array(std)),
             [SmoothPrior(NODES_NM, LEVEL_STD, RISE_STD)] * 3,
             [*known, DRIVE_STD, SCALE_STD],
-            amplitudes=AMPLITUDES,
-            lengths=LENGTHS,
-            noise_factors=NOISE_FACTORS,
+            **SMOOTHNESS,
         )
         change = solution.values[: 3 * len(NODES_NM)].reshape(3, -1)
     return _result(rig, solution, in_white[1] @ hats / in_white[1].sum())
@@ -143,4 +146,4 @@ def _refined(curve: SpectralCurve, change: Floats, std: Floats) -> SpectralCurve
     nm = np.union1d(curve.wavelengths_nm, NODES_NM)
     values = curve.at(nm) * np.exp(np.interp(nm, NODES_NM, change))
     spread = np.abs(values) * np.interp(nm, NODES_NM, std)
-    return SpectralCurve.of(nm, values, curve.unit).model_copy(update={"std": tuple(spread.tolist())})
+    return SpectralCurve.of(nm, values, curve.unit, spread)
