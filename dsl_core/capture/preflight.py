@@ -1,4 +1,4 @@
-"""Whether a plan is possible on a rig, asked before anything moves."""
+"""A plan fitted to a rig, and whether it is possible there, asked before anything moves."""
 
 from __future__ import annotations
 
@@ -8,6 +8,25 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import on_cycles
+
+
+def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
+    """The plan for the image sizes of a rig's camera and projector.
+
+    Exposures that nobody chose become whole colour cycles, as the calibration measured them or else as the
+    projector claims; others are left as they are.
+    """
+    camera, projector = rig.camera.info, rig.projector.info
+    if plan.settings == CapturePlan().settings:
+        known = rig.calibration or projector
+        plan = on_cycles(plan, known.frame_period_ms)
+    return plan.model_copy(
+        update={
+            "camera_size_px": (camera.width_px, camera.height_px),
+            "projector_size_px": (projector.width_px, projector.height_px),
+        }
+    )
 
 
 def find_obstacles(rig: DeviceRig, plan: CapturePlan) -> list[str]:

@@ -81,14 +81,15 @@ def check(
     import tempfile
 
     from dsl_core.campaign.drift import PLACEMENT, measure_drift
-    from dsl_core.devices.conditions import use_calibration
+    from dsl_core.devices.conditions import with_calibration
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.model.figure import failures
 
     output, known = Output(json), load_calibration(name)
     with open_rig(rig, parse_options(option)) as devices, tempfile.TemporaryDirectory() as spare:
-        for clause in use_calibration(devices, known, override):
+        own, overridden = with_calibration(devices, known, override)
+        for clause in overridden:
             output.say(f"Overridden: {clause}.")
         if devices.place is not None:
             devices.place(PLACEMENT)
@@ -96,7 +97,7 @@ def check(
             target = "the Spectralon" if spectralon else "a flat, matt target"
             answer(output, f"Place {target}, film on. Then press Enter: ")
         with output.progress() as progress:
-            figures = measure_drift(devices, known, keep or Path(spare) / "check.dsl", spectralon, progress)
+            figures = measure_drift(own, known, keep or Path(spare) / "check.dsl", spectralon, progress)
     print_figures(output, figures)
     output.put(name=name, figures=figures_json(figures), stable=not failures(figures))
     wrong = failures(figures)

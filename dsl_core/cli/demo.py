@@ -97,10 +97,10 @@ def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str,
 
 def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
     from dsl_core.io.result.result_file import save_result
-    from dsl_core.workflows.sessions import reconstruct_session
+    from dsl_core.workflows.scans import reconstruct_scan
 
     with output.progress() as progress:
-        result = reconstruct_session(folder / SCAN, progress=progress, timer=timer)
+        result = reconstruct_scan(folder / SCAN, progress=progress, timer=timer)
     with timer.stage("save the result"):
         save_result(result, folder / RESULT)
     return result
@@ -113,10 +113,10 @@ def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Datase
     from dsl_core.evaluation.report.content import report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export
-    from dsl_core.workflows import sessions
+    from dsl_core.workflows import scans
 
     with timer.stage("evaluate"):
-        truth = sessions.truth_of(result)
+        truth = scans.truth_of(result)
         evaluation = pipeline.evaluate(result, truth)
     with timer.stage("export PLY, PNG, ENVI"):
         for form, name in (("ply", "points.ply"), ("png", "picture.png"), ("envi", "cube.hdr")):

@@ -92,7 +92,7 @@ class PlanChoice:
         return _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
 
     def _fields(self) -> dict[str, object]:
-        from dsl_core.model.code_choices import CODE_CHOICES, code_of
+        from dsl_core.model.presets import CODE_CHOICES, code_of
 
         fields: dict[str, object] = {}
         if self.code is not None:

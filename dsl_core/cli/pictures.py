@@ -49,10 +49,9 @@ class PictureOptions:
 
 def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, options: PictureOptions) -> None:
     """Calibrate from a folder of pose folders, print what was found and write it where asked."""
-    from dsl_core import pipeline
-    from dsl_core.io.geometry_file import as_stereo, save_geometry
-    from dsl_core.io.published.stereo import save_stereo
-    from dsl_core.io.staging import check_targets
+    from dsl_core.io.published.stereo import save_stereo, stereo_of
+    from dsl_core.io.staging import check_targets, write_record
+    from dsl_core.workflows.pictures import calibrate_geometry
 
     files = [path for path in (options.target, options.xml) if path is not None]
     check_targets(files, overwrite=options.force)
@@ -61,13 +60,13 @@ def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, option
         raise CalibrationError("Pictures need --board COLUMNSxROWS and --square-mm of the printed board.")
     size, mosaic = parse_size("--projector", options.projector), _bayer(options.bayer)
     with output.progress() as progress:
-        found = pipeline.calibrate_geometry(
+        found = calibrate_geometry(
             folder, printed, size, mosaic, options.binning, options.baseline_mm, progress
         )
     if options.target is not None:
-        save_geometry(found, options.target, overwrite=options.force)
+        write_record(options.target, found, overwrite=options.force)
     if options.xml is not None:
-        save_stereo(as_stereo(found), options.xml, overwrite=options.force)
+        save_stereo(stereo_of(found), options.xml, overwrite=options.force)
     print_geometry(output, found)
     output.say(f"Written: {', '.join(map(str, files))}" if files else "Nothing is written without --output.")
     output.put(calibration=found.model_dump(mode="json"), files=[str(path) for path in files])

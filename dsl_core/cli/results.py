@@ -49,10 +49,10 @@ def reconstruct(
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
     from dsl_core.io.staging import check_targets
-    from dsl_core.model.spectral_choices import MODELS, SOLVERS, names
+    from dsl_core.model.options import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
     from dsl_core.reconstruction.torch_device import DEVICES, torch_device
-    from dsl_core.workflows.sessions import reconstruct_session
+    from dsl_core.workflows.scans import reconstruct_scan
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
     _require_one_of("--model", model, names(MODELS))
@@ -63,7 +63,7 @@ def reconstruct(
     rig = load_calibration(calibration) if calibration else None
     options = Options(grid, model, refine, not depth_only, torch_device(device), solver=solver)
     with output.progress() as progress:
-        result = reconstruct_session(session, rig, options, progress, timer, override)
+        result = reconstruct_scan(session, rig, options, progress, timer, override)
         with timer.stage("save the result"):
             save_result(result, target, overwrite=force)
     output.costs(timer.stages)
@@ -91,12 +91,12 @@ def evaluate(
     from dsl_core.evaluation.verdict import deviations, figures
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.staging import check_targets
-    from dsl_core.workflows import sessions
+    from dsl_core.workflows import scans
 
     output, report = Output(json), report or path.with_suffix(".html")
     check_targets([report], overwrite=force)
     result = load_result(path)
-    truth = sessions.truth_of(result, truth_rig, parse_options(option))
+    truth = scans.truth_of(result, truth_rig, parse_options(option))
     evaluation = pipeline.evaluate(result, truth)
     pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
     print_figures(output, evaluation)
@@ -134,7 +134,6 @@ def export(
 def _export(
     output: Output, path: Path, form: str, target: Path, pixels: list[tuple[int, int]], force: bool
 ) -> list[Path]:
-    from dsl_core import pipeline
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.export import export as export_result
     from dsl_core.io.export import export_csv
@@ -142,6 +141,7 @@ def _export(
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.session import SessionReader
     from dsl_core.workflows import exchange
+    from dsl_core.workflows.scans import calibration_of
 
     if pixels and form != "csv":
         raise PlanError(f"--pixel is for csv; {form} holds all pixels. Leave it out.")
@@ -150,7 +150,7 @@ def _export(
             return exchange.export_scan(path, target, force, progress)
     if form == "calibration":
         is_scan = path.is_dir()
-        rig = pipeline.calibration_of(SessionReader(path)) if is_scan else load_calibration(str(path))
+        rig = calibration_of(SessionReader(path)) if is_scan else load_calibration(str(path))
         return export_calibration(rig, target, overwrite=force)
     if form == "csv":
         return export_csv(load_result(path), target, overwrite=force, pixels=pixels)

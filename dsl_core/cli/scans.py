@@ -120,12 +120,13 @@ def scan(
             f" Go on with it by 'dsl-scan resume {target}', or choose a new name."
         )
     with open_rig(rig, options) as devices:
-        notes = rig_notes(rig, options) | _calibrate(output, devices, calibration, override)
-        fitted = choice if plan else pipeline.fit_plan(choice, devices)
+        calibrated, overridden = _calibrate(output, devices, calibration, override)
+        fitted = choice if plan else pipeline.fit_plan(choice, calibrated)
         _require_patterns(fitted)
-        _state(output, fitted, target, devices)
+        _state(output, fitted, target, calibrated)
+        notes = rig_notes(rig, options) | overridden
         with output.progress() as progress, _resumable(target):
-            status = pipeline.scan(devices, fitted, target, progress, notes)
+            status = pipeline.scan(calibrated, fitted, target, progress, notes)
     _done(output, target, status.total, status.elapsed_s)
 
 
@@ -139,15 +140,14 @@ def resume(
     json: Json = False,
 ) -> None:
     """Go on with a scan that was stopped, or killed, at its next missing frame."""
-    from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
-    from dsl_core.workflows import sessions
+    from dsl_core.workflows import scans
 
     output = Output(json)
     _say_gaps(output, target)
-    opened = open_rig(rig, parse_options(option)) if rig else sessions.reopen_rig(target)
+    opened = open_rig(rig, parse_options(option)) if rig else scans.reopen_rig(target)
     with opened as devices, output.progress() as progress, _resumable(target):
-        status = pipeline.resume(devices, target, progress, drift)
+        status = scans.resume(devices, target, progress, drift)
     _done(output, target, status.total, status.elapsed_s)
 
 
@@ -163,17 +163,19 @@ def _say_gaps(output: Output, target: Path) -> None:
     output.put(missing=missing, damaged=damaged)
 
 
-def _calibrate(output: Output, devices: DeviceRig, name: str | None, override: bool) -> dict[str, str]:
-    """Let the devices scan with the calibration named, if any; what was overridden, as notes of the scan."""
-    from dsl_core.devices.conditions import use_calibration
+def _calibrate(
+    output: Output, devices: DeviceRig, name: str | None, override: bool
+) -> tuple[DeviceRig, dict[str, str]]:
+    """The rig with the calibration named, if any; what was overridden, as notes of the scan."""
+    from dsl_core.devices.conditions import with_calibration
     from dsl_core.io.calibration_library import load_calibration
 
     if name is None:
-        return {}
-    overridden = use_calibration(devices, load_calibration(name), override)
+        return devices, {}
+    calibrated, overridden = with_calibration(devices, load_calibration(name), override)
     for clause in overridden:
         output.say(f"Overridden: {clause}.")
-    return {"calibration_overridden": "; ".join(overridden)} if overridden else {}
+    return calibrated, {"calibration_overridden": "; ".join(overridden)} if overridden else {}
 
 
 def _require_patterns(plan: CapturePlan) -> None:

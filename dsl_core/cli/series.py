@@ -38,8 +38,8 @@ def depth_test(
     """Test depth with a flat target at positions of a stage: planes, and how straight they follow it."""
     from dsl_core.evaluation.report.series_page import stage_page, stage_rows
     from dsl_core.evaluation.stage_test import stage_table, stage_test
-    from dsl_core.io.staging import check_targets
-    from dsl_core.workflows.series import read_targets, write_page
+    from dsl_core.io.staging import check_targets, write_text
+    from dsl_core.workflows.series import read_targets
 
     output = Output(json)
     given = None if positions is None else parse_numbers("--positions", positions)
@@ -61,7 +61,7 @@ def depth_test(
         straightness_mm={"slope_free": found.free.rms_mm, "slope_1": found.fixed.rms_mm},
     )
     if report is not None:
-        output.put(report=write_page(lambda: stage_page(names, targets, found), report, force))
+        output.put(report=write_text(report, lambda: stage_page(names, targets, found), overwrite=force))
         output.say(f"The report lies in {report}")
     output.finish()
 
@@ -81,8 +81,8 @@ def sweep(
     """Compare scans of one scene: error against the seconds of the capture, and which are worth them."""
     from dsl_core.evaluation.report.series_page import sweep_page, sweep_rows
     from dsl_core.evaluation.time_sweep import FIGURES, best_points
-    from dsl_core.io.staging import check_targets
-    from dsl_core.workflows.series import read_sweep, write_page
+    from dsl_core.io.staging import check_targets, write_text
+    from dsl_core.workflows.series import read_sweep
 
     output = Output(json)
     check_targets([] if report is None else [report], overwrite=force)
@@ -96,7 +96,7 @@ def sweep(
         best={each.field: [points[i].name for i in best_points(points, each)] for each in FIGURES},
     )
     if report is not None:
-        output.put(report=write_page(lambda: sweep_page(points, reference.name), report, force))
+        output.put(report=write_text(report, lambda: sweep_page(points, reference.name), overwrite=force))
         output.say(f"The report lies in {report}")
     output.finish()
 

@@ -1,6 +1,8 @@
-"""The settings in force on a rig's devices, and a calibration set on a rig only where they agree."""
+"""The settings in force on a rig's devices, and a calibration for them only where they agree."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 from dsl_core.errors import CalibrationError
@@ -46,11 +48,13 @@ def check_conditions(rig: Rig, devices: DeviceRig) -> tuple[str, ...]:
     return differences(rig.conditions, current_conditions(devices))
 
 
-def use_calibration(devices: DeviceRig, rig: Rig, override: bool = False) -> tuple[str, ...]:
-    """Let a rig's devices scan with a calibration; returns the differences that were overridden.
+def with_calibration(
+    devices: DeviceRig, rig: Rig, override: bool = False
+) -> tuple[DeviceRig, tuple[str, ...]]:
+    """The same devices with a calibration to scan with, and the differences that were overridden.
 
-    Raises `CalibrationError` naming every difference, unless ``override``: then the calibration is used as
-    one that does not say how it was captured.
+    ``devices`` stays as it is. Raises `CalibrationError` naming every difference, unless ``override``: then
+    the calibration is used as one that does not say how it was captured.
     """
     found = check_conditions(rig, devices)
     if found and not override:
@@ -58,5 +62,4 @@ def use_calibration(devices: DeviceRig, rig: Rig, override: bool = False) -> tup
             f"The calibration {rig.name!r} is not for these devices: {'; '.join(found)}."
             " Set them back, calibrate again, or use it all the same with --override-calibration."
         )
-    devices.calibration = rig.model_copy(update={"conditions": None}) if found else rig
-    return found
+    return replace(devices, calibration=rig.model_copy(update={"conditions": None}) if found else rig), found

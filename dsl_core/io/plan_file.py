@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from dsl_core.errors import PlanError
-from dsl_core.io.staging import staged
+from dsl_core.io.staging import write_record
 from dsl_core.model.plan import CapturePlan
 
 _MOST_PROBLEMS = 3
@@ -15,9 +15,7 @@ _MOST_PROBLEMS = 3
 
 def save_plan(plan: CapturePlan, path: Path, *, overwrite: bool = False) -> Path:
     """Write a plan, whole or not at all, and return its path; raises `StoreError`."""
-    with staged([path], overwrite=overwrite) as (draft,):
-        draft.write_text(plan.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    return path
+    return write_record(path, plan, overwrite=overwrite)
 
 
 def load_plan(path: Path) -> CapturePlan:

@@ -8,8 +8,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.staging import staged
-from dsl_core.model.plan import CapturePlan
+from dsl_core.io.staging import write_record
 from dsl_core.model.rig import Rig
 
 _MOST_PROBLEMS = 5
@@ -21,9 +20,7 @@ def save_rig(rig: Rig, path: Path, *, overwrite: bool = False) -> Path:
 
     Raises `StoreError` when the file exists already (unless ``overwrite``) or cannot be written.
     """
-    with staged([path], overwrite=overwrite) as (draft,):
-        draft.write_bytes((rig.model_dump_json(indent=1) + "\n").encode())
-    return path
+    return write_record(path, rig, overwrite=overwrite)
 
 
 def load_rig(path: Path) -> Rig:
@@ -41,25 +38,6 @@ def load_rig(path: Path) -> Rig:
         raise CalibrationError(
             f"The calibration {path} is not valid: {_sentence(error)}. Correct the fields or calibrate again."
         ) from error
-
-
-def check_rig_fits(rig: Rig, plan: CapturePlan) -> None:
-    """Raise `CalibrationError` when a rig was calibrated for other image sizes than the plan's."""
-    pairs = (
-        ("camera", (rig.camera.width_px, rig.camera.height_px), plan.camera_size_px),
-        ("projector", (rig.projector.width_px, rig.projector.height_px), plan.projector_size_px),
-    )
-    wrong = [
-        f"the {part} of the calibration has {ours[0]} x {ours[1]} px,"
-        f" that of the scan {theirs[0]} x {theirs[1]} px"
-        for part, ours, theirs in pairs
-        if ours != tuple(theirs)
-    ]
-    if wrong:
-        raise CalibrationError(
-            f"The calibration {rig.name!r} does not fit the scan {plan.name!r}: {' and '.join(wrong)}."
-            " Use the calibration made with the scan's binning and crop, or calibrate again with them."
-        )
 
 
 def _check_version(text: str, path: Path) -> None:

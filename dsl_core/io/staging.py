@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import shutil
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import PARTIAL_SUFFIX, store_error, sync_folder
 from dsl_core.io.folder_kind import FolderKind
+from dsl_core.model.base import Record
 
 
 @contextmanager
@@ -42,6 +43,21 @@ def staged(
         raise store_error(targets[0], error) from error
     finally:
         _clear(room, targets)
+
+
+def write_text(path: Path, text: str | Callable[[], str], *, overwrite: bool = False) -> Path:
+    """Write a text file in UTF-8, whole or not at all, and return its path; raises `StoreError`.
+
+    Text that takes long to make is given as a function, which is called once the path is known to be free.
+    """
+    with staged([path], overwrite=overwrite) as (draft,):
+        draft.write_bytes((text if isinstance(text, str) else text()).encode())
+    return path
+
+
+def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path:
+    """Write a record as JSON, whole or not at all, and return its path; raises `StoreError`."""
+    return write_text(path, record.model_dump_json(indent=1) + "\n", overwrite=overwrite)
 
 
 def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind | None = None) -> None:

@@ -1,11 +1,21 @@
-"""Plans by name, from a quick look to what was published, and their exposures on a rig's projector."""
+"""Plans and binary codes by name, and the exposures of a plan on a rig's projector."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting
+from dsl_core.model.plan import (
+    BinaryCode,
+    CapturePlan,
+    CodeSet,
+    EnsembleCode,
+    GrayCode,
+    LineComb,
+    ScanLines,
+    Setting,
+    XorCode,
+)
 
 #: Frame period of the published projector, ms: its exposures are whole multiples, so that every exposure
 #: holds all of its coloured light.
@@ -61,13 +71,13 @@ PRESETS: tuple[Preset, ...] = (
     Preset(
         "quick",
         "Quick",
-        "Single lines at one setting, each beside the last.",
+        "Single lines at one setting, each next to the last.",
         _plan("quick", ScanLines(step_px=5), _setting(20, 0.4)),
     ),
     Preset(
         "coarse",
         "Coarse",
-        "Single lines, each beside the last, at both settings.",
+        "Single lines, each next to the last, at both settings.",
         _plan("coarse", ScanLines(step_px=5), _DARK, _BRIGHT),
     ),
     Preset(
@@ -106,3 +116,40 @@ def _on_cycles(setting: Setting, period_ms: float) -> Setting:
     if math.isclose(exposure_ms, setting.exposure_ms):
         return setting
     return Setting(exposure_ms=exposure_ms, level=setting.level)
+
+
+@dataclass(frozen=True)
+class CodeChoice:
+    """A binary code with its name on the command line and its title in the window."""
+
+    name: str
+    title: str
+    code: BinaryCode
+
+
+CODE_CHOICES: tuple[CodeChoice, ...] = (
+    CodeChoice("full", "Columns and rows", GrayCode()),
+    CodeChoice("columns", "Columns only", GrayCode(rows=False)),
+    CodeChoice("xor-04", "Columns, XOR, 4 px", XorCode(rows=False, base_px=4)),
+    CodeChoice("xor-02", "Columns, XOR, 2 px", XorCode(rows=False, base_px=2)),
+    CodeChoice("ensemble-04", "Columns, Gray and XOR, 4 px", EnsembleCode(rows=False, base_px=4)),
+    CodeChoice("ensemble-02", "Columns, Gray and XOR, 2 px", EnsembleCode(rows=False, base_px=2)),
+    CodeChoice("full-xor-04", "Columns and rows, XOR, 4 px", XorCode(base_px=4)),
+    CodeChoice("full-xor-02", "Columns and rows, XOR, 2 px", XorCode(base_px=2)),
+    CodeChoice("full-ensemble-04", "Columns and rows, Gray and XOR, 4 px", EnsembleCode(base_px=4)),
+    CodeChoice("full-ensemble-02", "Columns and rows, Gray and XOR, 2 px", EnsembleCode(base_px=2)),
+)
+
+
+def code_of(name: str) -> BinaryCode | None:
+    """The code of a name; None for a name that no code has.
+
+    >>> code_of("xor-02").base_px
+    2
+    """
+    return next((choice.code for choice in CODE_CHOICES if choice.name == name), None)
+
+
+def name_of(code: CodeSet) -> str | None:
+    """The name of a code; None for no code."""
+    return next((choice.name for choice in CODE_CHOICES if choice.code == code), None)

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Literal
 from dsl_core.errors import DslError, StoreError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
-from dsl_core.pipeline import calibration_of, scan
+from dsl_core.pipeline import scan
 from dsl_core.progress import Progress
+from dsl_core.workflows.scans import calibration_of
 
 if TYPE_CHECKING:
     from dsl_core.io.published import FileRecord

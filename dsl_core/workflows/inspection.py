@@ -131,7 +131,7 @@ def _calibration(reader: SessionReader, result: ResultArrays) -> Rig:
     """The calibration that a result was made with: the scan's own, or one of the library."""
     from dsl_core.io.calibration_library import CalibrationLibrary
     from dsl_core.io.scan.origin import calibration_digest, model_of_notes
-    from dsl_core.pipeline import calibration_of
+    from dsl_core.workflows.scans import calibration_of
 
     digest, _ = model_of_notes(result.attributes)
     own = reader.calibration

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -140,7 +140,7 @@ class TruthReference:
 
     def _truth(self, path: Path, result: Any) -> Truth:
         from dsl_core.io.scan.origin import rig_of_notes
-        from dsl_core.workflows.sessions import truth_of
+        from dsl_core.workflows.scans import truth_of
 
         bands = result["wavelength_nm"].values if "wavelength_nm" in result.coords else ()
         key = repr((rig_of_notes(result.attrs), tuple(bands)))
@@ -213,17 +213,3 @@ def _require_same_scene(path: Path, known: Truth, truth: Truth) -> None:
         f"{path.name} shows another scene, or by another camera, than the results before it."
         " A sweep compares scans of one scene."
     )
-
-
-# Report --------------------------------------------------------------------------------------------
-
-
-def write_page(render: Callable[[], str], target: Path, overwrite: bool = False) -> Path:
-    """Write the page of a series whole or not at all; raises `StoreError`."""
-    from dsl_core.io.staging import check_targets, staged
-
-    check_targets([target], overwrite=overwrite)
-    page = render()
-    with staged([target], overwrite=overwrite) as (draft,):
-        draft.write_text(page, encoding="utf-8")
-    return target

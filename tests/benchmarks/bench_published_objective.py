@@ -23,7 +23,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectral.spectra import Pixels, SpectralReconstruction
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 from tests.cases.twin_scan import solver_input, twin_scan
 
 SIZE = "445x290"
@@ -65,7 +65,7 @@ def compare(scene: str, thin: int, steps: int) -> None:
     """Scan a scene, solve it twice, print errors and times."""
     grid = WavelengthGrid()
     devices, scan = twin_scan(size=SIZE, scene=scene)
-    rig, truth = devices.calibration, sessions.twin_truth(devices, grid)
+    rig, truth = devices.calibration, scans.twin_truth(devices, grid)
     assert rig is not None
     assert truth is not None
     stack, pixels = solver_input(rig, scan)

@@ -27,7 +27,7 @@ from dsl_core import pipeline
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import open_twin
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 from tests.benchmarks.common import options, print_table, write_json
 
 ROOT = Path(__file__).parents[2]
@@ -79,7 +79,7 @@ def save_all(folder: Path, step_nm: float) -> dict[str, Any]:
     from dsl_core.io.result.result_file import save_result
 
     timer = StageTimer()
-    result = sessions.reconstruct_session(folder, timer=timer)
+    result = scans.reconstruct_scan(folder, timer=timer)
     with timer.stage("save the result"), tempfile.TemporaryDirectory(dir=folder.parent) as place:
         save_result(result, Path(place) / "result.zarr")
     return {"stages": [[s.name, s.seconds, s.peak_bytes / MB] for s in timer.stages]}
@@ -98,7 +98,7 @@ def grow(folder: Path, step_nm: float) -> dict[str, Any]:
     cpu_s = 0.0
     for timer in (first, second):
         start = time.process_time()
-        sessions.reconstruct_session(folder, options=choice, timer=timer)
+        scans.reconstruct_scan(folder, options=choice, timer=timer)
         cpu_s = time.process_time() - start
     used = max(first.peak_bytes, second.peak_bytes) - first.stages[0].start_bytes
     return {"seconds": second.total_seconds, "cpu_s": cpu_s, "used_mb": used / MB}

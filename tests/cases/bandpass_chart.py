@@ -21,13 +21,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.evaluation.narrowband import band_means, centroid_nm, flat_field, pass_band
 from dsl_core.evaluation.spectral import spectral_errors
 from dsl_core.model.rig import Sensor
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.demosaic import demosaic
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.reconstruction.hdr import HdrMerger, black_frame
+from tests.cases.narrowband import band_means, centroid_nm, flat_field, pass_band
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[3] / "shared"))
 FOLDER = SHARED / "data" / "colorchecker_bandpass"

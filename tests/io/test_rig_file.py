@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.rig_file import check_rig_fits, load_rig, save_rig
-from dsl_core.model.plan import CapturePlan
+from dsl_core.io.rig_file import load_rig, save_rig
 from tests.cases.small_rig import small_rig
 
 
@@ -80,11 +79,3 @@ def test_files_that_are_no_rig(tmp_path: Path, content: bytes, says: str) -> Non
 def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match=r"nowhere\.json cannot be read"):
         load_rig(tmp_path / "nowhere.json")
-
-
-def test_a_rig_for_another_size_is_refused_with_both_sizes() -> None:
-    check_rig_fits(small_rig(), CapturePlan())
-    with pytest.raises(CalibrationError, match=r"camera .* 890 x 580 px, .* 445 x 290 px\. Use"):
-        check_rig_fits(small_rig(), CapturePlan(camera_size_px=(445, 290)))
-    with pytest.raises(CalibrationError, match=r"camera .* 890 x 580 .* and the projector .* 1024 x 768 px"):
-        check_rig_fits(small_rig(), CapturePlan(camera_size_px=(1, 1), projector_size_px=(1024, 768)))

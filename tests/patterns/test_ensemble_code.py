@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError, PlanError
-from dsl_core.model.code_choices import CODE_CHOICES, CodeChoice, code_of, name_of
 from dsl_core.model.plan import BinaryCode, CapturePlan, EnsembleCode, GrayCode, NoCode, XorCode
+from dsl_core.model.presets import CODE_CHOICES, CodeChoice, code_of, name_of
 from dsl_core.patterns.binary_code import binary_image, decoder_of
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.patterns.images import pattern_image

@@ -23,7 +23,7 @@ from dsl_core.reconstruction.columns import maps as column_maps
 from dsl_core.reconstruction.columns.maps import ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
 GRID = WavelengthGrid(step_nm=10.0)
@@ -47,7 +47,7 @@ def grid_rig(rig: Rig) -> Rig:
 
 
 def evaluate(scanned: tuple[DeviceRig, MemoryScan], cube: NDArray[np.float32]) -> Evaluation:
-    truth = sessions.twin_truth(scanned[0], GRID)
+    truth = scans.twin_truth(scanned[0], GRID)
     assert truth is not None
     return pipeline.evaluate(build_result({"reflectance": cube}, GRID.centres_nm, {}), truth)
 

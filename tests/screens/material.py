@@ -14,7 +14,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.io.result.result_file import save_result
 from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.presets import PRESETS
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 from tests.cases.tiny_campaign import command_all, give
 
 #: The rig of the scans: large enough to look at, small enough to be made while one waits.
@@ -73,7 +73,7 @@ def _scan(folder: Path, name: str, preset: str) -> None:
     session = folder / f"{name}.dsl"
     with open_rig("twin", CHART) as rig:
         pipeline.scan(rig, pipeline.fit_plan(plan, rig), session, notes=rig_notes("twin", CHART))
-    save_result(sessions.reconstruct_session(session), session.with_suffix(".zarr"))
+    save_result(scans.reconstruct_scan(session), session.with_suffix(".zarr"))
 
 
 def _calibrate(made: Material) -> None:

@@ -20,7 +20,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral import spectra
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 from tests.cases.crop import cropped_twin, one_torch_thread
 from tests.cases.twin_scan import MemoryScan, capture, solver_input, twin_scan
 
@@ -49,7 +49,7 @@ def scan(
     devices = cropped_twin(scene, corner_px, size_px)
     with one_torch_thread():
         frames = capture(devices, plan)
-    truth = sessions.twin_truth(devices, GRID)
+    truth = scans.twin_truth(devices, GRID)
     assert truth is not None
     assert devices.calibration is not None
     return Scanned(devices.calibration, frames, truth)
@@ -128,7 +128,7 @@ def test_noise_model_explains_what_the_spectra_leave(maps: SpectralMaps) -> None
 def test_half_as_many_bands(chart: Scanned) -> None:
     grid = WavelengthGrid(step_nm=10.0)
     devices = cropped_twin("color-checker", CHART)
-    truth = sessions.twin_truth(devices, grid)
+    truth = scans.twin_truth(devices, grid)
     assert truth is not None
     result = chart.reconstruct(grid)
     assert result.sizes["wavelength_nm"] == 24

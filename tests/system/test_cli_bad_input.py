@@ -284,7 +284,7 @@ def test_force_replaces_no_scan_and_nobodys_folder(
     give: Give, scan_copy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "dsl_core.workflows.sessions.reconstruct_session", lambda *_: 1 / 0
+        "dsl_core.workflows.scans.reconstruct_scan", lambda *_: 1 / 0
     )  # told before long work
     onto_itself = give("reconstruct", scan_copy, "-o", scan_copy, "--force")
     assert (onto_itself.code, "holds a scan and is not replaced" in onto_itself.sentence) == (2, True)

@@ -16,7 +16,7 @@ from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.workflows.inspection import find_session, intensity_graph, read_block
-from dsl_core.workflows.sessions import reconstruct_session
+from dsl_core.workflows.scans import reconstruct_scan
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> ResultArrays:
             rig,
         )
         pipeline.scan(rig, plan, folder / "a.dsl", None, rig_notes("twin", options))
-    made = reconstruct_session(folder / "a.dsl", options=pipeline.Options(WavelengthGrid(step_nm=10)))
+    made = reconstruct_scan(folder / "a.dsl", options=pipeline.Options(WavelengthGrid(step_nm=10)))
     return load_arrays(save_result(made, folder / "other-name.zarr"))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
@@ -132,13 +132,13 @@ class LibraryController:
 
         def work(progress: Progress) -> DriftVerdict | _Differs:
             from dsl_core.campaign.drift import PLACEMENT, measure_drift
-            from dsl_core.devices.conditions import check_conditions, use_calibration
+            from dsl_core.devices.conditions import check_conditions, with_calibration
 
-            known, own = self._library.find(key).rig, replace(devices)
-            found = check_conditions(known, own)
+            known = self._library.find(key).rig
+            found = check_conditions(known, devices)
             if found and not override:
                 return _Differs(found)
-            use_calibration(own, known, override)
+            own, _ = with_calibration(devices, known, override)
             if own.place is not None:
                 own.place(PLACEMENT)
             with tempfile.TemporaryDirectory(prefix="dsl-scan-check-") as spare:

@@ -65,7 +65,7 @@ class DemoController:
 
     def _make(self, progress: Progress) -> Path:
         from dsl_core.io.result.result_file import save_result
-        from dsl_core.workflows.sessions import reconstruct_session
+        from dsl_core.workflows.scans import reconstruct_scan
 
         session = self._folder / SCAN
         try:
@@ -77,7 +77,7 @@ class DemoController:
             shutil.rmtree(session, ignore_errors=True)
             take_demo(session, progress)
         target = self._folder / RESULT
-        save_result(reconstruct_session(session, progress=progress), target)
+        save_result(reconstruct_scan(session, progress=progress), target)
         return target
 
     def _made(self, result: Path) -> None:

@@ -76,9 +76,9 @@ class ResultsController:
 
         def work(progress: Progress) -> ResultArrays:
             from dsl_core.io.result.result_file import save_result
-            from dsl_core.workflows.sessions import reconstruct_session
+            from dsl_core.workflows.scans import reconstruct_scan
 
-            save_result(reconstruct_session(session, progress=progress), target)
+            save_result(reconstruct_scan(session, progress=progress), target)
             return load_arrays(target, progress)
 
         self._start(f"Reconstruct {session.name}", work)

@@ -234,9 +234,9 @@ class ScanController:
 
         def work(progress: Progress) -> Path:
             from dsl_core.io.result.result_file import save_result
-            from dsl_core.workflows.sessions import reconstruct_session
+            from dsl_core.workflows.scans import reconstruct_scan
 
-            save_result(reconstruct_session(session, progress=progress), target)
+            save_result(reconstruct_scan(session, progress=progress), target)
             return target
 
         def done(path: Path) -> None:

@@ -55,15 +55,16 @@ class ScanJob:
     def work(self, progress: Progress) -> Status:
         """Take every missing frame; raises what the engine raises."""
         from dsl_core import pipeline
+        from dsl_core.workflows import scans
 
         order = self.order
-        # A copy, so that the rig of the window keeps its own calibration.
-        devices = replace(order.devices)
         if order.is_resumed:
             progress.report("compare with before", 0, 0)
-            plan, notes = pipeline.prepare_resume(devices, order.folder, order.check_drift), {}
+            devices, plan = scans.prepare_resume(order.devices, order.folder, order.check_drift)
+            notes = {}
         else:
-            plan, notes = order.plan, {**order.notes, **self._calibrate(devices)}
+            devices, overridden = self._calibrated()
+            plan, notes = order.plan, order.notes | overridden
         graphs = IntensityGraphs(plan, devices.camera.info.bayer)
         if order.is_resumed:
             self._read_before(graphs, progress)
@@ -80,14 +81,15 @@ class ScanJob:
                     runner.pause()
             return runner.run()
 
-    def _calibrate(self, devices: DeviceRig) -> dict[str, str]:
-        from dsl_core.devices.conditions import use_calibration
+    def _calibrated(self) -> tuple[DeviceRig, dict[str, str]]:
+        """The devices with the calibration ordered, and what was overridden, as notes of the scan."""
+        from dsl_core.devices.conditions import with_calibration
 
-        if self.order.calibration is None:
-            devices.calibration = None
-            return {}
-        overridden = use_calibration(devices, self.order.calibration, self.order.override)
-        return {"calibration_overridden": "; ".join(overridden)} if overridden else {}
+        order = self.order
+        if order.calibration is None:
+            return replace(order.devices, calibration=None), {}
+        devices, overridden = with_calibration(order.devices, order.calibration, order.override)
+        return devices, {"calibration_overridden": "; ".join(overridden)} if overridden else {}
 
     def _read_before(self, graphs: IntensityGraphs, progress: Progress) -> None:
         """Take the frames of earlier runs into the graphs."""

@@ -9,9 +9,8 @@ from dsl_app.scan.setting_rows import SettingRows
 from dsl_app.scan.state import preset_of
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_core.model.code_choices import CODE_CHOICES, code_of, name_of
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines
-from dsl_core.model.presets import PRESETS
+from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of
 
 OWN = "Own plan"
 OWN_PURPOSE = "Not one of the presets; the table beside says what to expect of it."

@@ -10,8 +10,8 @@ from pathlib import Path
 from dsl_app.connection.state import RigChoice
 from dsl_core.io.scan.origin import rig_of_notes
 from dsl_core.io.scan.session import SUFFIX
-from dsl_core.model.code_choices import name_of
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
+from dsl_core.model.presets import name_of
 
 
 def plan_words(plan: CapturePlan) -> list[str]:

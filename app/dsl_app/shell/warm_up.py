@@ -40,7 +40,7 @@ STEPS = (
     "dsl_app.calibrate.wizard.window",
     "pandas",
     "xarray",
-    "dsl_core.workflows.sessions",
+    "dsl_core.workflows.scans",
     "dsl_core.campaign.recipes",
     "dsl_app.calibrate.evidence.selftest",
     "dsl_app.calibrate.evidence.geometry",

@@ -19,6 +19,7 @@ from pydantic import ValidationError
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.staging import staged
 from dsl_core.model.base import Record
+from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.geometry import Lens, Pose
 
 Dialect = Literal["dsl", "procam", "moreno-taubin"]
@@ -88,6 +89,11 @@ def load_stereo(path: Path, projector_size_px: Size, camera_size_px: Size | None
             f"{path} is not a valid calibration: {'.'.join(map(str, first['loc']))}: {first['msg']}."
             " Calibrate again or correct the file."
         ) from error
+
+
+def stereo_of(found: GeometryCalibration) -> Stereo:
+    """Lenses and pose of a geometric calibration in the published dialect."""
+    return Stereo(camera=found.camera, projector=found.projector, pose=found.pose, rms_px=found.rms_px)
 
 
 def save_stereo(stereo: Stereo, path: Path, *, overwrite: bool = False) -> Path:

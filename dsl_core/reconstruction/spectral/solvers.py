@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dsl_core.errors import PlanError
+from dsl_core.model.options import SOLVERS, names
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.model.spectral_choices import SOLVERS, names
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.merge import LineStack

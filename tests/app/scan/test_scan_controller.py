@@ -23,7 +23,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 from tests.app.support.scan_bench import (
     FRAMES,
     PATTERNS,
@@ -154,7 +154,7 @@ def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
     def ending(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr(sessions, "reconstruct_session", ending)
+    monkeypatch.setattr(scans, "reconstruct_scan", ending)
     bench.state.then_reconstruct.set(True)
     bench.scans.start()
     note = bench.state.note.value
@@ -529,18 +529,18 @@ def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     states: list[State] = []
-    calibrate, listen = ScanJob._calibrate, ScanJob._listen
+    calibrated, listen = ScanJob._calibrated, ScanJob._listen
 
-    def prepare(job: ScanJob, devices: DeviceRig) -> dict[str, str]:
+    def prepare(job: ScanJob) -> tuple[DeviceRig, dict[str, str]]:
         job.pause()
         threading.Timer(0.3, job.go_on).start()
-        return calibrate(job, devices)
+        return calibrated(job)
 
     def hear(job: ScanJob, status: Status) -> None:
         states.append(status.state)
         listen(job, status)
 
-    monkeypatch.setattr(ScanJob, "_calibrate", prepare)
+    monkeypatch.setattr(ScanJob, "_calibrated", prepare)
     monkeypatch.setattr(ScanJob, "_listen", hear)
     bench.scans.start()
     assert states.index(State.PAUSED) < states.index(State.RUNNING)

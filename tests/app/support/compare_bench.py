@@ -9,7 +9,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.io.result.result_file import save_result
 from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.presets import PRESETS
-from dsl_core.workflows import sessions
+from dsl_core.workflows import scans
 
 QUICK = next(preset.plan for preset in PRESETS if preset.key == "quick")
 
@@ -21,5 +21,5 @@ def make_result(folder: Path, name: str, scene: str = "color-checker", size: str
         session = folder / f"{name}.dsl"
         pipeline.scan(rig, pipeline.fit_plan(QUICK, rig), session, notes=rig_notes("twin", options))
     target = folder / f"{name}.zarr"
-    save_result(sessions.reconstruct_session(session), target)
+    save_result(scans.reconstruct_scan(session), target)
     return target

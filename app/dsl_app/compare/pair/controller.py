@@ -84,7 +84,7 @@ class CompareController:
 
         def work(progress: Progress) -> Side:
             from dsl_core.io.result.result_file import load_result
-            from dsl_core.workflows.sessions import truth_of
+            from dsl_core.workflows.scans import truth_of
 
             progress.report("ask the twin", 0, 1)
             truth = truth_of(load_result(first.arrays.path))

@@ -258,12 +258,12 @@ class SeriesController:
 
         def work(progress: Progress) -> Path:
             from dsl_core.evaluation.report.series_page import stage_page, sweep_page
-            from dsl_core.workflows.series import write_page
+            from dsl_core.io.staging import write_text
 
             progress.report("write the report", 0, 1)
             if kind is Kind.STAGE and test is not None:
-                return write_page(lambda: stage_page(names, targets, test), target, overwrite=True)
-            return write_page(lambda: sweep_page(points, reference), target, overwrite=True)
+                return write_text(target, lambda: stage_page(names, targets, test), overwrite=True)
+            return write_text(target, lambda: sweep_page(points, reference), overwrite=True)
 
         def failed(error: Exception) -> None:
             self._notifier.tell("error", str(error))

@@ -95,7 +95,7 @@ def reconstruct(
     from dsl_core.io.staging import check_targets
     from dsl_core.pipeline import Options
     from dsl_core.reconstruction.torch_device import torch_device
-    from dsl_core.workflows.sessions import reconstruct_session
+    from dsl_core.workflows.scans import reconstruct_scan
 
     check_targets([target], overwrite=order.replace, kind=RESULT_FOLDER)
     rig = None if order.calibration == OWN else load_calibration(order.calibration, library)
@@ -108,7 +108,7 @@ def reconstruct(
         device=torch_device(order.device),
         solver=order.solver,
     )
-    result = reconstruct_session(source.session, rig, options, progress, override_calibration=order.override)
+    result = reconstruct_scan(source.session, rig, options, progress, override_calibration=order.override)
     progress.report("save the result", 0, 0)
     return save_result(result, target, overwrite=order.replace)
 

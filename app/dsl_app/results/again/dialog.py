@@ -20,7 +20,7 @@ from dsl_app.results.again.state import OWN, AgainOrder, AgainState
 from dsl_app.shared.widgets.dialogs import OrderCommands, OrderDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
-from dsl_core.model.spectral_choices import MODELS, SOLVERS, SpectralChoice
+from dsl_core.model.options import MODELS, SOLVERS, SpectralChoice
 
 LOW_NM, HIGH_NM = 380.0, 780.0
 DEVICES = (("cpu", "Processor (CPU)"), ("cuda", "Graphics card (CUDA)"))

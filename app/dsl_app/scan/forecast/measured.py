@@ -19,7 +19,7 @@ def measure(scan: Measured, result: Path) -> Measured:
     """The scan with what its reconstruction took and, where a truth is known, its errors."""
     from dsl_core.evaluation.summary import evaluate
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.workflows.sessions import truth_of
+    from dsl_core.workflows.scans import truth_of
 
     found = load_result(result)
     costs = json.loads(str(found.attrs.get("stage_costs", "[]")))

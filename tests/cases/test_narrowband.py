@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.narrowband import band_means, centroid_nm, flat_field, pass_band
 from dsl_core.model.spectral import SpectralCurve
+from tests.cases.narrowband import band_means, centroid_nm, flat_field, pass_band
 
 GRID_NM = np.arange(350.0, 901.0)
 

@@ -1,4 +1,4 @@
-"""A scan goes on over damaged frames: they are taken again, and the rest still tells what moved."""
+"""A scan resumes over damaged frames: they are taken again, and the rest still tells what moved."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core import pipeline
 from dsl_core.capture.drift import pick_reference_shots
 from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.replay import replay_rig
@@ -15,6 +14,8 @@ from dsl_core.errors import DeviceError
 from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.workflows.scans import prepare_resume, resume
+from tests.cases.small_rig import small_rig
 
 PLAN = CapturePlan(
     camera_size_px=(24, 16),
@@ -55,17 +56,30 @@ def test_a_damaged_frame_that_would_show_drift_is_taken_again(folder: Path) -> N
     for shot in pick_reference_shots(PLAN.shots()):
         _damage(folder, shot.index)
     SessionReader(folder).store.path(PLAN.shot_count - 1).unlink()
-    pipeline.resume(replay_rig(_taken(1)), folder)
+    resume(replay_rig(_taken(1)), folder)
     assert SessionReader(folder).sound() == set(range(PLAN.shot_count))
 
 
 def test_damage_alone_calls_for_a_look_at_the_scene(folder: Path) -> None:
     _damage(folder, PLAN.shot_count - 1)
     with pytest.raises(DeviceError, match="changed since the scan stopped"):
-        pipeline.resume(replay_rig(_taken(2)), folder)
+        resume(replay_rig(_taken(2)), folder)
     assert SessionReader(folder).sound() == set(range(PLAN.shot_count - 1))
 
 
+def test_a_resumed_scan_has_its_own_calibration_and_the_rig_of_the_caller_stays(tmp_path: Path) -> None:
+    own, other = (small_rig().model_copy(update={"name": name}) for name in ("own", "other"))
+    taken = _taken(1)
+    with SessionWriter.create(tmp_path / "scan.dsl", PLAN, replay_rig(taken, own)):
+        pass
+    mine = replay_rig(taken, other)
+    resumed, plan = prepare_resume(mine, tmp_path / "scan.dsl")
+    assert resumed.calibration == own
+    assert resumed.camera is mine.camera
+    assert plan == PLAN
+    assert mine.calibration is other
+
+
 def test_a_whole_scan_is_left_as_it_is(folder: Path) -> None:
-    pipeline.resume(replay_rig(_taken(2)), folder)
+    resume(replay_rig(_taken(2)), folder)
     assert SessionReader(folder).sound() == set(range(PLAN.shot_count))

@@ -1,8 +1,10 @@
-"""Ways to spectra by name, as the command line and the window offer them."""
+"""How to reconstruct: options, and the choices that the command line and the window offer by name."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from dsl_core.model.spectral import WavelengthGrid
 
 
 @dataclass(frozen=True)
@@ -40,3 +42,21 @@ def names(choices: tuple[SpectralChoice, ...]) -> tuple[str, ...]:
     ('auto', 'grating', 'hybrid', 'grid')
     """
     return tuple(choice.name for choice in choices)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to reconstruct: bands, correspondence (auto, grating, hybrid, grid), refinement, torch device.
+
+    ``solver`` is ``best`` or, to compare with it, ``published`` (Adam on the published objective),
+    ``nearest-line`` or ``colour-basis``. ``surface_window_px`` is the window of normals; None takes it from
+    the image's width, which is wrong for a piece cut out of a larger image.
+    """
+
+    grid: WavelengthGrid = field(default_factory=WavelengthGrid)
+    correspondence: str = "auto"
+    refine_columns: bool = True
+    spectra: bool = True
+    device: str = "cpu"
+    surface_window_px: int | None = None
+    solver: str = "best"

@@ -1,12 +1,12 @@
-"""Exposures that nobody chose suit the projector at hand; chosen ones stay."""
+"""Exposures that nobody chose suit the projector; chosen ones stay."""
 
 from __future__ import annotations
 
 import pytest
 
+from dsl_core.capture.preflight import fit_plan
 from dsl_core.devices.registry import open_rig
 from dsl_core.model.plan import CapturePlan, Setting
-from dsl_core.pipeline import fit_plan
 
 TWIN = {"size": "160x104", "scene": "plane"}
 

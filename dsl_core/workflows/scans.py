@@ -1,22 +1,25 @@
-"""Scans and results that know where they come from: reopened, reconstructed and compared with their truth."""
+"""Scans on disk, which know where they come from: resumed, reconstructed and compared with their truth."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.errors import CalibrationError, DecodeError, StoreError
+from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreError
+from dsl_core.model.frames import FrameSource
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.pipeline import Options, calibration_of, reconstruct
+from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from dsl_core.capture.status import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.evaluation.summary import Truth
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
-    """The rig that a session was started with; raises `StoreError` when the session does not say which."""
+    """The rig that a scan was started with; raises `StoreError` when the scan does not say which."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.scan.manifest import read_manifest
     from dsl_core.io.scan.origin import rig_of_notes
@@ -37,7 +40,35 @@ def reopen_rig(folder: Path) -> DeviceRig:
     return open_rig(*origin)
 
 
-def reconstruct_session(
+def resume(
+    rig: DeviceRig, folder: Path, progress: Progress | None = None, check_drift: bool = True
+) -> Status:
+    """Resume a scan after a check whether anything moved; raises `DriftError` if it did."""
+    return scan(*prepare_resume(rig, folder, check_drift), folder, progress)
+
+
+def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tuple[DeviceRig, CapturePlan]:
+    """Rig and plan to resume a scan with; raises `DriftError` if anything moved since it stopped.
+
+    The rig returned has the same devices and the scan's own calibration, whatever ``rig`` has, which stays as
+    it is.
+    """
+    from dsl_core.capture import drift
+    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.patterns.images import pattern_image
+
+    reader = SessionReader(folder)
+    rig = replace(rig, calibration=reader.calibration or rig.calibration)
+    sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
+    done = [shot for shot in reader.plan.shots() if shot.index in sound]
+    if check_drift and 0 < len(done) < reader.plan.shot_count:
+        report = drift.check_drift(rig, reader, drift.pick_reference_shots(done), pattern_image)
+        if not report.is_stable:
+            raise DriftError(report.message)
+    return rig, reader.plan
+
+
+def reconstruct_scan(
     folder: Path,
     calibration: Rig | None = None,
     options: Options | None = None,
@@ -45,7 +76,7 @@ def reconstruct_session(
     timer: StageTimer | None = None,
     override_calibration: bool = False,
 ) -> xr.Dataset:
-    """The result of a complete session, with its origin and the cost of each stage among its attributes.
+    """The result of a complete scan, with its origin and the cost of each stage among its attributes.
 
     Raises `CalibrationError` when the scan was taken with other settings than the calibration given, unless
     that is overridden.
@@ -72,6 +103,16 @@ def reconstruct_session(
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:
+    """The calibration to use: the one given, else the one stored with the scan; raises `CalibrationError`."""
+    rig = given or getattr(source, "calibration", None)
+    if rig is None:
+        raise CalibrationError(
+            "The scan holds no calibration and none was given. Name one with --calibration FILE."
+        )
+    return rig
 
 
 def _capture_seconds(manifest: Manifest) -> float:

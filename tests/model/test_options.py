@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from dsl_core.errors import CalibrationError, PlanError
+from dsl_core.model.options import MODELS, SOLVERS, SpectralChoice
 from dsl_core.model.plan import CapturePlan, LineComb
-from dsl_core.model.spectral_choices import MODELS, SOLVERS, SpectralChoice
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral.solvers import check_solver
 from dsl_core.simulation.published_rig import published_rig

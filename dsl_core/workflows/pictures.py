@@ -1,20 +1,69 @@
-"""Folders of calibration pictures: one folder a board pose, pictures numbered in the order of the code."""
+"""Geometry from folders of pictures: one folder a board pose, pictures numbered in the order of the code."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.pose_frames import PoseFrames
+from dsl_core.model.plan import GrayCode
 from dsl_core.model.rig import BayerPattern
+from dsl_core.progress import NoProgress, Progress
+
+if TYPE_CHECKING:
+    from dsl_core.model.board import Board
+    from dsl_core.model.calibration.geometry import GeometryCalibration
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
+
+
+def calibrate_geometry(
+    folder: Path,
+    board: Board,
+    projector_size_px: tuple[int, int],
+    bayer: BayerPattern | None = None,
+    camera_binning: float = 1.0,
+    baseline_mm: float | None = None,
+    progress: Progress | None = None,
+) -> GeometryCalibration:
+    """Lenses and pose of camera and projector from folders of pictures, one a board pose, film off.
+
+    Leaves out poses whose board or code cannot be read, and says so. Raises `CalibrationError` that
+    names the picture that is missing, or the poses that are wrong when too few are left.
+    """
+    from dsl_core.calibration.geometry.pose_series import observe_series
+    from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
+    from dsl_core.patterns.gray_code import bit_counts
+
+    bits, progress = bit_counts(GrayCode(), projector_size_px), progress or NoProgress()
+    sizes: dict[str, tuple[int, int]] = {}
+    folders = pose_folders(folder)
+
+    def pictures() -> Iterator[PoseFrames]:
+        for index, pose_folder in enumerate(folders):
+            progress.report("find the board", index, len(folders))
+            frames = read_pose(pose_folder, bits, bayer)
+            sizes[frames.name] = (frames.white.shape[1], frames.white.shape[0])
+            require_one_size(sizes)
+            yield frames
+
+    series = observe_series(pictures(), board, projector_size_px)
+    return calibrate(
+        series.seen,
+        board,
+        sizes[folders[0].name],
+        projector_size_px,
+        camera_binning=camera_binning,
+        baseline_mm=baseline_mm,
+        left_out=series.left_out,
+        warnings=series.warnings,
+    )
 
 
 def pose_folders(folder: Path) -> list[Path]:
