@@ -12,6 +12,8 @@ from dsl_core.model.rig import BayerPattern
 
 #: Bins of the histogram over the whole range of counts.
 BINS = 256
+#: Share of saturated pixels that deserves a warning (as in comparable programs).
+MANY_SATURATED = 0.005
 #: Positions of red, the two greens and blue in a cell of two by two pixels: (row, column).
 _SITES: dict[BayerPattern, tuple[tuple[int, int], ...]] = {
     "RGGB": ((0, 0), (0, 1), (1, 0), (1, 1)),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from dsl_app.calibrate.drift_window import DriftWindow
+from dsl_app.calibrate.library_panel import DriftWindow
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.calibrate.state import DriftVerdict
 from dsl_app.connection.state import RigChoice

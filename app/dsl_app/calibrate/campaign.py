@@ -1,57 +1,26 @@
-"""Which campaign is open, where its calibrations stand, and whether it is this rig's. No Qt."""
+"""Which campaign is open, where its calibrations stand, and whether it belongs to this rig. No Qt."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
-from dsl_app.calibrate.rows import read_rows
+from dsl_app.calibrate.campaign_status import Kinds
 from dsl_app.calibrate.state import CalibrateState, CampaignFacts, Row
-from dsl_app.calibrate.wizard.work import Recipes
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import RigChoice
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
-from dsl_core.campaign.assembly import campaign_recipes
-from dsl_core.campaign.recipes import recipe_names
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import DslError
+from dsl_core.io.atomic import store_error
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.model.conditions import CaptureConditions
+from dsl_core.io.scan.lock import SessionLock
 from dsl_core.progress import Progress
-
-#: Older calibrations are ageing, days.
-AGEING_DAYS = 90
-
-
-def _utc_now() -> datetime:
-    return datetime.now(UTC)
-
-
-@dataclass(frozen=True)
-class Kinds:
-    """Which calibrations there are: their names in order, and how a campaign makes their recipes."""
-
-    names: tuple[str, ...] = ()
-    recipes: Recipes = campaign_recipes
-    ageing_days: int = AGEING_DAYS
-    clock: Callable[[], datetime] = _utc_now
-
-    @property
-    def order(self) -> tuple[str, ...]:
-        """The names, those of this installation if none are given."""
-        return self.names or recipe_names()
-
-    def rows(self, folder: Path, conditions: CaptureConditions | None = None) -> tuple[Row, ...]:
-        """Where every calibration of a campaign stands, read from disk; raises `StoreError`."""
-        campaign = CampaignFolder.open(folder)
-        return read_rows(campaign, self.order, conditions, self.ageing_days, self.clock())
 
 
 class CampaignController:
-    """Opens campaigns and keeps the rows of the one at hand up to date."""
+    """Opens campaigns and keeps the rows of the open one up to date."""
 
     def __init__(
         self, state: CalibrateState, rig: RigController, runner: JobRunner, notifier: Notifier, kinds: Kinds
@@ -68,7 +37,7 @@ class CampaignController:
         self._take(lambda: CampaignFolder.open(folder))
 
     def begin(self, folder: Path) -> None:
-        """Begin a campaign of the rig that is chosen, in a new folder."""
+        """Begin a campaign of the chosen rig in a new folder."""
         choice = self._rig.state.choice.value
         self._take(lambda: CampaignFolder.begin(folder, choice.name, dict(choice.options)))
 
@@ -85,7 +54,7 @@ class CampaignController:
         self.refresh()
 
     def refresh(self) -> None:
-        """Read anew where every calibration stands."""
+        """Read again where every calibration stands."""
         facts, devices = self.state.campaign.value, self._rig.state.devices.value
         self.state.foreign.set(facts is not None and devices is not None and not self._fits(facts))
         self.state.trouble.set(self.obstacle())
@@ -101,14 +70,17 @@ class CampaignController:
             if self.state.campaign.value == facts:
                 self.state.rows.set(rows)
 
-        self._runner.submit(Job("Read the campaign", work, done, self._tell, is_minor=True))
+        def failed(error: Exception) -> None:
+            self._notifier.tell("error", sentence_of(error))
+
+        self._runner.submit(Job("Read the campaign", work, done, failed, is_minor=True))
 
     def _fits(self, facts: CampaignFacts) -> bool:
         choice = self._rig.state.choice.value
         return (choice.name, dict(choice.options)) == (facts.rig.name, dict(facts.rig.options))
 
     def obstacle(self) -> str:
-        """What keeps from calibrating, empty for nothing."""
+        """Why nothing can be calibrated now, empty if it can."""
         facts, devices = self.state.campaign.value, self._rig.state.devices.value
         if facts is None:
             return ""
@@ -120,10 +92,27 @@ class CampaignController:
             )
         return NO_RIG if devices is None else ""
 
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
-
     def close(self) -> None:
-        """Follow the rig no more."""
+        """Stop following the rig."""
         for stop in self._stops:
             stop()
+
+
+class CampaignLock:
+    """One writer for each campaign, among all windows and commands of this computer."""
+
+    def __init__(self) -> None:
+        self._lock: SessionLock | None = None
+
+    def take(self, folder: Path) -> None:
+        """Lock it; raises `StoreError` when another process writes it, or the folder is read-only."""
+        try:
+            self._lock = SessionLock(folder / "lock")
+        except OSError as error:
+            raise store_error(folder / "lock", error) from error
+
+    def release(self) -> None:
+        """Unlock it; a second call does nothing."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QDialog,
     QDialogButtonBox,
@@ -19,16 +20,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.calibrate.commands import CalibrateCommands
-from dsl_app.calibrate.state import CalibrateState, CampaignFacts
+from dsl_app.calibrate.presentation import campaign_head
+from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
-from dsl_app.shared.widgets.forms import label, push_button, set_role
-from dsl_core.devices.base import DeviceRig
+from dsl_app.shared.widgets.forms import label, push_button, set_role, show_button
 
-NOTHING = (
-    "No campaign is open. A campaign is a folder that keeps all captures, fits and verdicts of one rig;"
-    " begin one, or open one that was begun."
-)
+if TYPE_CHECKING:
+    from dsl_app.calibrate.controller import CalibrateController
 
 
 class NewCampaignDialog(QDialog):
@@ -40,10 +38,10 @@ class NewCampaignDialog(QDialog):
         self.resize(540, 200)
         self.name = QLineEdit(_free_name(home))
         self.name.setAccessibleName("Name of the campaign")
-        self.name.setToolTip("Name of the folder; the calibrated rig gets it in the library")
+        self.name.setToolTip("Name of the folder, and of the calibrated rig in the library")
         self.folder = QLineEdit(str(home))
         self.folder.setAccessibleName("Folder of campaigns")
-        self.folder.setToolTip("Folder in which the campaign's own folder is made")
+        self.folder.setToolTip("Folder that will contain the campaign's own folder")
         self.browse = QPushButton("Choose…")
         self.browse.setToolTip("Choose the folder of campaigns")
         self.browse.clicked.connect(self._browse)
@@ -85,7 +83,7 @@ class NewCampaignDialog(QDialog):
         if not self.name.text().strip() or "/" in self.name.text():
             trouble = "Give the campaign a name without slashes."
         elif self.target.exists():
-            trouble = f"{self.target.name} exists already in this folder. Choose another name, or open it."
+            trouble = f"{self.target.name} already exists in this folder. Choose another name, or open it."
         self._text.setText(trouble)
         self.begin.setEnabled(not trouble)
 
@@ -93,25 +91,24 @@ class NewCampaignDialog(QDialog):
 class CampaignBox(QFrame):
     """Which campaign is open; buttons for a new one, another one, everything, and the library.
 
-    ``folder`` is where new campaigns are proposed; ``begun`` tells that a person began one.
+    ``home`` is the folder where new campaigns are proposed.
     """
 
-    begun = Signal()
-
-    def __init__(self, state: CalibrateState, rig: RigState, commands: CalibrateCommands, home: Path) -> None:
+    def __init__(
+        self, state: CalibrateState, rig: RigState, commands: CalibrateController, home: Path
+    ) -> None:
         super().__init__()
         self._state, self._rig, self._commands, self._home = state, rig, commands, home
         self._name, self._where = label("", "title"), label("", "muted")
         self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._where.setWordWrap(True)
-        self.new = push_button("&New campaign…", "Begin a campaign of the rig at hand in a folder of its own")
-        self.open = push_button("&Open campaign…", "Go on with a campaign that was begun before")
+        self.new = push_button("&New campaign…", "Begin a campaign of the chosen rig in a new folder")
+        self.open = push_button("&Open campaign…", "Continue a campaign that was begun before")
         self.everything = push_button(
             "Calibrate &everything",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
         )
-        self.everything.setProperty("role", "primary")
-        self.cancel = push_button("&Stop", "End at the next safe point; everything captured is kept")
+        self.cancel = push_button("&Stop", "Stop at the next safe point; everything captured is kept")
         self.keep = push_button(
             "&Keep in library", "Assemble the rig as far as it is calibrated and keep it in the library"
         )
@@ -140,21 +137,21 @@ class CampaignBox(QFrame):
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
         self.stops = [
-            state.campaign.follow(self._show_campaign),
-            state.everything.follow(lambda _: self._show_work()),
-            state.rows.follow(lambda _: self._show_work()),
-            state.foreign.follow(lambda _: self._show_work()),
-            self._rig.devices.follow(lambda _: self._show_work()),
+            state.campaign.follow(lambda _: self._show()),
+            state.everything.changed.connect(lambda _: self._show()),
+            state.rows.changed.connect(lambda _: self._show()),
+            state.foreign.changed.connect(lambda _: self._show()),
+            self._rig.devices.changed.connect(lambda _: self._show()),
         ]
 
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""
         dialog = NewCampaignDialog(self._home, self._rig.choice.value.words, self)
         before = self._state.campaign.value
-        wanted, target = dialog.exec() == QDialog.DialogCode.Accepted, dialog.target
-        # Else it would stay as long as the page; before its answer is read, it must not go.
+        accepted, target = dialog.exec() == QDialog.DialogCode.Accepted, dialog.target
+        # Otherwise it would live as long as the page; it must not go before its answer is read.
         dialog.deleteLater()
-        if not wanted:
+        if not accepted:
             return False
         self._commands.begin_campaign(target)
         return self._state.campaign.value != before
@@ -166,39 +163,19 @@ class CampaignBox(QFrame):
         if name:
             self._commands.open_campaign(Path(name))
 
-    def _show_campaign(self, facts: CampaignFacts | None) -> None:
-        if facts is None:
-            self._name.setText("Calibrate")
-            self._where.setText(NOTHING)
-        else:
-            self._name.setText(facts.path.name)
-            # Zero-width spaces let long paths break at their slashes.
-            place = str(facts.path.parent).replace("/", "/" + chr(0x200B))
-            self._where.setText(f"in {place}  ·  rig {facts.rig.words}")
-        self._show_work()
-
-    def _show_work(self) -> None:
-        state, devices = self._state, self._rig.devices.value
-        running, open_ = bool(state.everything.value), state.campaign.value is not None
-        usable = open_ and devices is not None and not state.foreign.value and not running
-        self.everything.setVisible(not running)
-        self.everything.setEnabled(usable and _places_itself(devices))
-        self.keep.setVisible(open_ and not running)
-        self.keep.setEnabled(usable and any(row.state.is_accepted for row in state.rows.value))
-        self.cancel.setVisible(running)
-        for button in (self.new, self.open):
-            button.setEnabled(not running)
-        self._progress.setText(state.everything.value)
-        self._progress.setVisible(running)
-        set_role(self._progress, "warn" if state.everything.value == "stopping" else "muted")
-
-
-def _places_itself(devices: DeviceRig | None) -> bool:
-    return devices is not None and devices.place is not None
+    def _show(self) -> None:
+        head = campaign_head(self._state, self._rig.devices.value)
+        self._name.setText(head.title)
+        self._where.setText(head.place)
+        self._progress.setText(head.progress)
+        self._progress.setVisible(bool(head.progress))
+        set_role(self._progress, head.progress_role)
+        for name in ("new", "open", "keep", "cancel", "everything"):
+            show_button(getattr(self, name), getattr(head, name))
 
 
 def _free_name(home: Path) -> str:
-    """A name by the day that is not taken in a folder."""
+    """A name with today's date that is free in a folder."""
     stem = f"campaign-{datetime.now():%Y%m%d}"
     name, count = stem, 1
     while (home / name).exists():

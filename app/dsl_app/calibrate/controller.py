@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
 
-from dsl_app.calibrate.campaign import CampaignController, Kinds
-from dsl_app.calibrate.campaign_lock import CampaignLock
-from dsl_app.calibrate.everything import Everything, words_of
+from dsl_app.calibrate.calibrate_all import CANNOT_PLACE, CalibrateAll, products_text
+from dsl_app.calibrate.campaign import CampaignController, CampaignLock
+from dsl_app.calibrate.campaign_status import Kinds
 from dsl_app.calibrate.library import LibraryController
 from dsl_app.calibrate.state import ABOUT, CalibrateState, CampaignFacts
 from dsl_app.calibrate.wizard.controller import WizardController
 from dsl_app.calibrate.wizard.state import WizardState
-from dsl_app.calibrate.words import calibrate_command
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
@@ -48,12 +48,12 @@ class CalibrateController:
         self.wizard_ready: Event[tuple[WizardState, WizardController]] = Event()
         self._wizard: WizardController | None = None
         self._lock = CampaignLock()
-        self._everything = Everything(state, rig, self._kinds, self._store, self._ended)
+        self._everything = CalibrateAll(state, rig, self._kinds, self._store, self._ended)
 
     # Campaign --------------------------------------------------------------------------------------
 
     def open(self, path: Path) -> bool:
-        """Open a campaign by its folder or a file in it, or take a calibration's file into the library.
+        """Open a campaign by its folder or a file in it, or import a calibration's file into the library.
 
         False for anything else.
         """
@@ -69,12 +69,12 @@ class CalibrateController:
             self._campaign.open(folder)
 
     def begin_campaign(self, folder: Path) -> None:
-        """Begin a campaign of the rig that is chosen, in a new folder."""
+        """Begin a campaign of the chosen rig in a new folder."""
         if not self._is_busy():
             self._campaign.begin(folder)
 
     def refresh(self) -> None:
-        """Read anew where every calibration stands."""
+        """Read again where every calibration stands."""
         self._campaign.refresh()
 
     def connect_rig(self) -> None:
@@ -86,7 +86,7 @@ class CalibrateController:
     # One calibration -------------------------------------------------------------------------------
 
     def run(self, name: str) -> None:
-        """Open the wizard of a calibration, which goes on where it was left."""
+        """Open the wizard of a calibration, which continues where it was left."""
         facts = self._ready()
         if facts is None or not self._take_lock(facts.path):
             return
@@ -128,25 +128,23 @@ class CalibrateController:
     # Everything ------------------------------------------------------------------------------------
 
     def run_everything(self) -> None:
-        """Run all calibrations in order on a rig that places its targets itself; goes on where it stood."""
+        """Run all calibrations in order where the rig places its targets; continues where it stopped."""
         facts, devices = self._ready(), self._rig.state.devices.value
         if facts is None or devices is None:
             return
         if devices.place is None:
-            self._notifier.tell(
-                "info", "This rig cannot place its targets itself. Run the calibrations one by one."
-            )
+            self._notifier.tell("info", CANNOT_PLACE)
             return
         if not self._take_lock(facts.path):
             return
         self._everything.run(facts.path, devices, library_name(facts.path))
 
     def cancel_everything(self) -> None:
-        """Stop it at the next safe point; everything captured stays."""
+        """Stop at the next safe point; everything captured is kept."""
         self._everything.cancel()
 
     def take_news(self) -> None:
-        """Say how far everything is; called by the window's clock."""
+        """Update how far it is; called by the window's timer."""
         self._everything.take_news()
 
     def _ended(self, note: str, error: Exception | None) -> None:
@@ -176,15 +174,15 @@ class CalibrateController:
             return write_products(campaign, rig, name, recipes=recipes, library=self._store)
 
         def done(made: Products) -> None:
-            self.state.note.set(words_of(made))
+            self.state.note.set(products_text(made))
             self.library.load()
 
         self._runner.submit(Job("Keep the rig", work, done, self._tell))
 
-    # What keeps from it ----------------------------------------------------------------------------
+    # Obstacles --------------------------------------------------------------------------------------
 
     def _ready(self) -> CampaignFacts | None:
-        """The campaign, when a calibration may run now; else the person is told why not."""
+        """The campaign, when a calibration may run now; otherwise the person is told why not."""
         facts = self.state.campaign.value
         if self._is_busy():
             return None
@@ -219,12 +217,18 @@ class CalibrateController:
         self._notifier.tell("error", sentence_of(error))
 
     def command_line(self, name: str = "") -> str:
-        """The command that runs a calibration, or all of them."""
+        """The command that runs one calibration, or all of them for an empty name.
+
+        A campaign that was begun knows its rig; a new one is told.
+        """
         facts = self.state.campaign.value
-        return calibrate_command(name, facts, self._rig.state.choice.value)
+        verb = name if name == "selftest" else f"calibrate {name or 'all'}"
+        folder = "CAMPAIGN" if facts is None else shlex.quote(str(facts.path))
+        rig = self._rig.state.choice.value if facts is None else facts.rig
+        return f"dsl-scan {verb} {folder} {rig.command}".rstrip()
 
     def close(self) -> None:
-        """End what runs and follow the rig no more."""
+        """Stop what runs, and following the rig."""
         self._campaign.close()
         if self._wizard is not None:
             self._wizard.leave()

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHeaderView, QTableWidgetItem
 
+from dsl_app.calibrate.presentation import value_words
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.model.figure import Figure
@@ -56,16 +57,3 @@ class FiguresTable(ReadTable):
             cell(figure.limits.replace("-", "−"), theme.muted),
             cell(advice, theme.text),
         )
-
-
-def value_words(figure: Figure) -> str:
-    """Value ± standard deviation and unit, with a typographic minus.
-
-    >>> value_words(Figure(name="shift", value=-1.25, std=0.04, unit="nm"))
-    '−1.250 ± 0.040 nm'
-    >>> value_words(Figure(name="corners", value=77.0, unit=""))
-    '77'
-    """
-    if figure.std is None and figure.unit == "" and figure.value == round(figure.value):
-        return f"{figure.value:.0f}".replace("-", "−")
-    return str(figure).removeprefix(figure.name).strip().replace("-", "−")

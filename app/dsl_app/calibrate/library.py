@@ -1,4 +1,4 @@
-"""What the library's panel decides: list, restore, export, import, report, drift check, use. No Qt."""
+"""What the library's panel decides: list, use, restore, export, import, report, drift check. No Qt."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
-from dsl_core.model.figure import failures
 from dsl_core.progress import Progress
 
 #: A file without this is neither a rig nor an entry of the library.
@@ -55,16 +54,16 @@ class LibraryController:
         self._state.note.set(f"Scans use the calibration {key}.")
 
     def restore(self, name: str, stamp: str) -> None:
-        """Make a version the current one; the one that was stays."""
+        """Make a version the current one; no version is lost."""
 
         def done(entry: LibraryEntry) -> None:
-            self._state.note.set(f"{name} is version {entry.stamp} from now on.")
+            self._state.note.set(f"The current version of {name} is now {entry.stamp}.")
             self.load()
 
         self._submit(f"Restore {name}", lambda progress: self._library.restore(name, stamp), done)
 
     def export(self, key: str, target: Path, form: str, overwrite: bool) -> None:
-        """Write a calibration for another computer or program."""
+        """Export a calibration for another computer or program; ``form`` is entry, rig or published."""
 
         def work(progress: Progress) -> list[Path]:
             from dsl_core.campaign.entry_files import export_entry
@@ -72,22 +71,22 @@ class LibraryController:
             return export_entry(self._library.find(key), target, form, overwrite)
 
         def done(files: list[Path]) -> None:
-            self._notifier.tell("info", f"Written: {', '.join(map(str, files))}.")
+            self._notifier.tell("info", f"Exported to {', '.join(map(str, files))}.")
 
         self._submit(f"Export {key}", work, done)
 
     def offer(self, path: Path) -> bool:
-        """Take a file into the library if it looks like a calibration; False when it does not."""
+        """Import a file if it looks like a calibration; False if it does not."""
         try:
             is_one = path.suffix.lower() == ".json" and path.is_file() and _MARK in path.read_bytes()
         except OSError:
             is_one = False
         if is_one:
-            self.take_in(path)
+            self.import_file(path)
         return is_one
 
-    def take_in(self, path: Path) -> None:
-        """Take an exported calibration, or a rig's file, into the library."""
+    def import_file(self, path: Path) -> None:
+        """Import an exported calibration, or a rig's file."""
 
         def work(progress: Progress) -> LibraryEntry:
             from dsl_core.campaign.entry_files import import_entry
@@ -123,7 +122,8 @@ class LibraryController:
     def check(self, key: str, spectralon: bool = True, override: bool = False) -> None:
         """Take one quick shot of a flat target and compare it with a calibration.
 
-        Where camera or projector are set otherwise than in the calibration, checking all the same is offered.
+        Where camera or projector have other settings than in the calibration, the person is offered to check
+        anyway (``override``).
         """
         devices = self._rig.state.devices.value
         if devices is None:
@@ -149,13 +149,11 @@ class LibraryController:
             if isinstance(said, _Differs):
                 self._notifier.offer(
                     f"{key} is not for these settings: {'; '.join(said.clauses)}. Set them back or calibrate"
-                    " again. A check all the same shows what the change does.",
-                    {"Check all the same": lambda: self.check(key, spectralon, override=True)},
+                    " again. Checking anyway shows what the change does.",
+                    {"Check anyway": lambda: self.check(key, spectralon, override=True)},
                 )
                 return
-            wrong = failures(said.figures)
-            text = f"The rig is not as {key} says." if wrong else f"The rig is as {key} says."
-            self._state.note.set(text)
+            self._state.note.set(said.sentence)
             self._state.drift.set(said)
 
         self._rig.run(Job(f"Check {key} for drift", work, done, self._tell, exclusive=RIG))

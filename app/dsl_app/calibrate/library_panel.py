@@ -3,29 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QDialog,
+    QDialogButtonBox,
     QFileDialog,
     QGroupBox,
     QHBoxLayout,
     QMessageBox,
-    QPushButton,
     QSplitter,
     QTableWidgetItem,
     QTextBrowser,
     QVBoxLayout,
+    QWidget,
 )
 
-from dsl_app.calibrate.commands import LibraryCommands
-from dsl_app.calibrate.library_words import NOTHING, details_of
-from dsl_app.calibrate.state import CalibrateState
-from dsl_app.shared.widgets.forms import label
+from dsl_app.calibrate.figures_table import FiguresTable
+from dsl_app.calibrate.presentation import library_selection, version_texts
+from dsl_app.calibrate.state import CalibrateState, DriftVerdict
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
+
+if TYPE_CHECKING:
+    from dsl_app.calibrate.library import LibraryController
 
 _COLUMNS = ("Name", "Stored", "Use", "Camera", "Projector", "Outside limits")
 #: Filters of the export dialog, and the forms they mean.
@@ -34,46 +42,52 @@ FORMS = {
     "The rig alone (*.json)": "rig",
     "Published layout, a folder (*)": "published",
 }
+WHAT_TO_DO = (
+    "The table says what to do about each figure that misses its limit. Correct it and check again, or repeat"
+    " the calibration that it names. You can still scan with this calibration, but scans share its error."
+)
 
 
 class LibraryPanel(QGroupBox):
-    """Lists every version, tells of the selected one, and acts on it."""
+    """Lists every version, describes the selected one, and acts on it."""
 
-    def __init__(self, state: CalibrateState, commands: LibraryCommands) -> None:
+    def __init__(self, state: CalibrateState, commands: LibraryController) -> None:
         super().__init__("Library of calibrations")
-        self._state, self._commands = state, commands
+        self._state, self._commands, self._theme = state, commands, DARK
         self.table = _table()
         self.details = QTextBrowser()
         self.details.setAccessibleName("Details of the calibration")
         self.details.setToolTip("Conditions, dates and figures of the selected calibration")
         self._note = label("", "muted")
         self._note.setWordWrap(True)
-        self.use = self._button("&Use for scans", "Scan with this calibration from now on", self._use)
-        self.report = self._button("Show &report", "Open its report in the browser", self._report)
-        self.restore = self._button(
-            "Ma&ke current", "Let this older version be the current one; none is lost", self._restore
+        self.use = push_button("&Use for scans", "Scan with this calibration from now on")
+        self.report = push_button("Show &report", "Open its report in the browser")
+        self.restore = push_button("Ma&ke current", "Make this older version the current one; none is lost")
+        self.check = push_button(
+            "Check for &drift…", "Check by one quick shot of a flat target whether the rig is as calibrated"
         )
-        self.check = self._button(
-            "Check for &drift…",
-            "One quick shot of a flat target: is the rig as calibrated?",
-            self._check,
-        )
-        self.export = self._button("E&xport…", "Write it for another computer or program", self._export)
-        self.import_ = self._button("&Import…", "Take a calibration's file into the library", self._import)
+        self.export = push_button("E&xport…", "Export it for another computer or program")
+        self.import_ = push_button("&Import…", "Import a calibration's file into the library")
         self._lay_out()
+        self._connect()
+
+    def _connect(self) -> None:
+        state = self._state
+        self.use.clicked.connect(lambda: self._commands.use(self.key))
+        self.report.clicked.connect(lambda: self._commands.report(self.key))
+        self.restore.clicked.connect(self._restore)
+        self.check.clicked.connect(self._check)
+        self.export.clicked.connect(self._export)
+        self.import_.clicked.connect(self._import)
         self.table.itemSelectionChanged.connect(self._select)
-        self.table.itemActivated.connect(lambda _: self._report())
+        self.table.itemActivated.connect(lambda _: self.report.click())
         self.stops: list[Callable[[], None]] = [
             state.library.follow(self._list),
-            state.in_use.follow(lambda _: self._list(state.library.value)),
+            state.in_use.changed.connect(lambda _: self._list(state.library.value)),
             state.note.follow(self._show_note),
+            state.drift.changed.connect(self._show_drift),
+            state.opened.connect(lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))),
         ]
-
-    def _button(self, text: str, tip: str, act: Callable[[], None]) -> QPushButton:
-        made = QPushButton(text)
-        made.setToolTip(tip)
-        made.clicked.connect(lambda: act())
-        return made
 
     def _lay_out(self) -> None:
         split = QSplitter(Qt.Orientation.Horizontal)
@@ -110,10 +124,7 @@ class LibraryPanel(QGroupBox):
     @property
     def key(self) -> str:
         """What names the selected version: its name, with the stamp unless it is the current one."""
-        line = self.line
-        if line is None:
-            return ""
-        return line.name if line.is_current else f"{line.name}@{line.stamp}"
+        return library_selection(self.line).key
 
     def _list(self, lines: tuple[LibraryLine, ...]) -> None:
         selected = max(self.table.currentRow(), 0)
@@ -123,45 +134,24 @@ class LibraryPanel(QGroupBox):
         self._select()
 
     def _items(self, line: LibraryLine) -> list[QTableWidgetItem]:
-        items = [cell(text) for text in self._texts(line)]
+        items = [cell(text) for text in version_texts(line, self._state.in_use.value)]
         if line.error:
             for item in items:
                 item.setToolTip(line.error)
         return items
 
-    def _texts(self, line: LibraryLine) -> tuple[str, ...]:
-        used = self._state.in_use.value in (f"{line.name}@{line.stamp}", line.name if line.is_current else "")
-        use = "scans" if used else ("current" if line.is_current else "")
-        stored = _date_of(line.stamp)
-        if line.entry is None:
-            return line.name, stored, use, "damaged", "", ""
-        rig = line.entry.rig
-        missed = [str(figure) for note in rig.calibrations for figure in note.failed]
-        return (
-            line.name,
-            stored,
-            use,
-            f"{rig.provenance.camera_serial or '–'}, {rig.camera.width_px} × {rig.camera.height_px} px",
-            rig.provenance.projector_serial or "–",
-            ", ".join(missed) or "none",
-        )
-
     def _select(self) -> None:
-        line = self.line
-        readable = line is not None and line.entry is not None
+        shown = library_selection(self.line)
         for button in (self.use, self.report, self.check, self.export):
-            button.setEnabled(readable)
-        self.restore.setEnabled(readable and line is not None and not line.is_current)
-        self.details.setHtml(NOTHING if line is None else details_of(line))
+            button.setEnabled(shown.can_use)
+        self.restore.setEnabled(shown.can_restore)
+        self.details.setHtml(shown.details)
 
-    # Acts ------------------------------------------------------------------------------------------
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme for windows that are opened from now on."""
+        self._theme = theme
 
-    def _use(self) -> None:
-        self._commands.use(self.key)
-
-    def _report(self) -> None:
-        if self.report.isEnabled():
-            self._commands.report(self.key)
+    # Actions ---------------------------------------------------------------------------------------
 
     def _restore(self) -> None:
         line = self.line
@@ -174,17 +164,19 @@ class LibraryPanel(QGroupBox):
             return
         box = QMessageBox(self)
         box.setWindowTitle("Check for drift")
-        box.setText("Mount the film, and place a flat, matt target that fills the picture. What is it?")
+        box.setText(
+            "Mount the film and place a flat, matt target that fills the picture. Which target is it?"
+        )
         spectralon = box.addButton("The &Spectralon", QMessageBox.ButtonRole.AcceptRole)
         other = box.addButton("&Another target", QMessageBox.ButtonRole.AcceptRole)
-        other.setToolTip("The light is not judged then, as nothing says how bright the target is")
+        other.setToolTip("The light is not judged then, because the brightness of the target is not known")
         box.addButton(QMessageBox.StandardButton.Cancel)
         box.exec()
-        wanted, is_spectralon = box.clickedButton() in (spectralon, other), box.clickedButton() is spectralon
-        # Else it would stay as long as the page; before its answer is read, it must not go.
+        chosen = box.clickedButton()
+        # Otherwise it would live as long as the page; it must not go before its answer is read.
         box.deleteLater()
-        if wanted:
-            self._commands.check(self.key, is_spectralon)
+        if chosen in (spectralon, other):
+            self._commands.check(self.key, chosen is spectralon)
 
     def _export(self) -> None:
         line = self.line
@@ -194,13 +186,71 @@ class LibraryPanel(QGroupBox):
             self, "Export a calibration", f"{line.name}.json", ";;".join(FORMS)
         )
         if name:
-            # The dialog asked before it named a file that exists.
+            # The dialog has asked whether to replace an existing file.
             self._commands.export(self.key, Path(name), FORMS.get(chosen, "entry"), overwrite=True)
 
     def _import(self) -> None:
         name, _ = QFileDialog.getOpenFileName(self, "Import a calibration", "", "Calibrations (*.json)")
         if name:
-            self._commands.take_in(Path(name))
+            self._commands.import_file(Path(name))
+
+    def _show_drift(self, verdict: DriftVerdict | None) -> None:
+        if verdict is None:
+            return
+        window = DriftWindow(verdict, self._theme, self)
+        window.again_requested.connect(
+            lambda: self._commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))
+        )
+        window.use_requested.connect(lambda: self._commands.use(verdict.name))
+        window.open()
+
+
+class DriftWindow(QDialog):
+    """What a quick shot of a flat target said of a calibration, and what to do about it.
+
+    ``again_requested`` asks for another check, ``use_requested`` for scans with this calibration anyway.
+    """
+
+    again_requested = Signal()
+    use_requested = Signal()
+
+    def __init__(self, verdict: DriftVerdict, theme: Theme, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setWindowTitle(f"Drift check of {verdict.name}")
+        self.resize(860, 420)
+        add_help_key(self, "calibrating#what-the-quick-check-sees")
+        self.table = FiguresTable("Figures of the drift check")
+        self.table.apply_theme(theme)
+        self.table.show_figures(verdict.figures)
+        column = QVBoxLayout(self)
+        column.addWidget(label(verdict.sentence, "good" if verdict.passed else "bad"))
+        if verdict.overridden:
+            column.addWidget(_wrapped(f"Checked although {'; '.join(verdict.overridden)}.", "warn"))
+        column.addWidget(self.table, 1)
+        if not verdict.passed:
+            column.addWidget(_wrapped(WHAT_TO_DO, "muted"))
+        column.addWidget(self._buttons(not verdict.passed))
+
+    def _buttons(self, has_drifted: bool) -> QDialogButtonBox:
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons.rejected.connect(self.reject)
+        self.again = push_button(
+            "Check &again", "Take the quick shot again; the target must still be in place"
+        )
+        self.use = push_button("&Use anyway", "Scan with this calibration from now on, despite the drift")
+        for button, requested in ((self.again, self.again_requested), (self.use, self.use_requested)):
+            buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
+            button.clicked.connect(requested)
+            button.clicked.connect(self.accept)
+            button.setVisible(has_drifted)
+        return buttons
+
+
+def _wrapped(text: str, role: str) -> QWidget:
+    made = label(text, role)
+    made.setWordWrap(True)
+    return made
 
 
 def _table() -> ReadTable:
@@ -210,12 +260,3 @@ def _table() -> ReadTable:
     table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
     table.horizontalHeader().setStretchLastSection(True)
     return table
-
-
-def _date_of(stamp: str) -> str:
-    """When a version was stored, where the reader lives."""
-    try:
-        stored = datetime.strptime(f"{stamp}+0000", "%Y%m%d-%H%M%S-%f%z")
-    except ValueError:
-        return stamp
-    return stored.astimezone().strftime("%Y-%m-%d %H:%M")

@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QTimer, QUrl
-from PySide6.QtGui import QDesktopServices, QShowEvent
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QFrame,
+    QGridLayout,
+    QLabel,
+    QPushButton,
     QScrollArea,
     QSplitter,
     QVBoxLayout,
@@ -17,28 +21,32 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.calibrate.campaign_box import CampaignBox
-from dsl_app.calibrate.commands import CalibrateCommands
-from dsl_app.calibrate.drift_window import DriftWindow
 from dsl_app.calibrate.library_panel import LibraryPanel
-from dsl_app.calibrate.row import CalibrationRow
-from dsl_app.calibrate.state import CalibrateState, DriftVerdict, Row
+from dsl_app.calibrate.presentation import row_display
+from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.connection.state import RigState
-from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import Banner
+from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import Banner, label, set_role, show_button
 from dsl_app.shared.widgets.page import PageWidget
 
-#: How often news of a calibration of everything is fetched, ms.
+if TYPE_CHECKING:
+    from dsl_app.calibrate.controller import CalibrateController
+
+#: How often the progress of a calibration of everything is fetched, ms.
 FETCH_MS = 200
 #: Height of the rows, as far as there is room.
 ROWS_PX = 316
+_NAME_PX, _STATE_PX, _DATE_PX, _BUTTON_PX = 236, 154, 118, 100
 
 
 class CalibratePage(PageWidget):
     """Follows a `CalibrateState` and asks a controller; ``home`` is where new campaigns are proposed."""
 
-    def __init__(self, state: CalibrateState, rig: RigState, commands: CalibrateCommands, home: Path) -> None:
+    def __init__(
+        self, state: CalibrateState, rig: RigState, commands: CalibrateController, home: Path
+    ) -> None:
         super().__init__()
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._commands = state, commands
         self.banner = Banner("Connect the campaign's rig")
         self.banner.action.setToolTip("Open the rig that the campaign was begun with")
         self.head = CampaignBox(state, rig, commands, home)
@@ -80,17 +88,15 @@ class CalibratePage(PageWidget):
         state = self._state
         self.banner.action.clicked.connect(self._commands.connect_rig)
         for row in self.rows.values():
-            row.wanted.connect(self.run)
+            row.run_requested.connect(self.run)
         self._stops: list[Callable[[], None]] = [
             *self.head.stops,
             *self.library.stops,
-            state.rows.follow(self._show_rows),
-            state.trouble.follow(lambda _: self._show_trouble()),
-            state.foreign.follow(lambda _: self._show_trouble()),
-            state.everything.follow(self._show_everything),
-            state.opening.follow(lambda _: self._show_everything(state.everything.value)),
-            state.drift.changed.connect(self._show_drift),
-            state.opened.connect(lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))),
+            state.trouble.follow(self.banner.say),
+            state.foreign.follow(self.banner.action.setVisible),
+            state.rows.follow(lambda _: self._show_rows()),
+            state.opening.changed.connect(lambda _: self._show_rows()),
+            state.everything.follow(lambda _: self._show_everything()),
         ]
 
     def run(self, name: str) -> None:
@@ -99,37 +105,20 @@ class CalibratePage(PageWidget):
             return
         self._commands.run(name)
 
-    def _show_rows(self, rows: tuple[Row, ...]) -> None:
-        for row in rows:
+    def _show_rows(self) -> None:
+        for row in self._state.rows.value:
             if row.name in self.rows:
-                self.rows[row.name].show_row(row)
+                self.rows[row.name].show_row(row, self._state.is_busy)
 
-    def _show_trouble(self) -> None:
-        self.banner.say(self._state.trouble.value)
-        self.banner.action.setVisible(self._state.foreign.value)
-
-    def _show_everything(self, text: str) -> None:
-        busy = bool(text) or bool(self._state.opening.value)
-        for row in self.rows.values():
-            row.run.setEnabled(not busy)
-        if text:
+    def _show_everything(self) -> None:
+        self._show_rows()
+        if self._state.everything.value:
             self._timer.start()
         else:
             self._timer.stop()
 
-    def _show_drift(self, verdict: DriftVerdict | None) -> None:
-        if verdict is not None:
-            window = DriftWindow(verdict, self._theme, self)
-            window.again_wanted.connect(
-                lambda: self._commands.library.check(
-                    verdict.name, verdict.spectralon, bool(verdict.overridden)
-                )
-            )
-            window.use_wanted.connect(lambda: self._commands.library.use(verdict.name))
-            window.open()
-
     def showEvent(self, event: QShowEvent) -> None:
-        """Folders and libraries change while nobody looks."""
+        """Read campaign and library again: other programs may have changed them."""
         super().showEvent(event)
         self._commands.refresh()
         self._commands.library.load()
@@ -146,7 +135,7 @@ class CalibratePage(PageWidget):
         }
 
     def open_path(self, path: Path) -> bool:
-        """Open a campaign, or take a calibration's file into the library."""
+        """Open a campaign, or import a calibration's file into the library."""
         return self._commands.open(path)
 
     def command_line(self) -> str:
@@ -155,11 +144,76 @@ class CalibratePage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        self._theme = theme
+        self.library.apply_theme(theme)
 
     def release(self) -> None:
-        """End what runs; everything captured is kept."""
+        """Stop what runs; everything captured is kept."""
         self._timer.stop()
         for stop in self._stops:
             stop()
         self._commands.close()
+
+
+class CalibrationRow(QFrame):
+    """One calibration: state, key figure, date, and the button that opens its wizard.
+
+    ``run_requested`` tells the name of the calibration to run.
+    """
+
+    run_requested = Signal(str)
+
+    def __init__(self, row: Row, number: int) -> None:
+        super().__init__()
+        self.setProperty("role", "card")
+        self._title = label(f"{number}   {row.about.title}", "heading")
+        self._purpose = _small("muted")
+        self._purpose.setText(row.about.purpose)
+        self._state, self._figure, self._date = label(""), label(""), label("", "muted")
+        self._figure.setWordWrap(True)
+        self._date.setToolTip("When it was accepted")
+        self._reason = _small("muted")
+        self.run = QPushButton()
+        self.run.clicked.connect(lambda: self.run_requested.emit(row.name))
+        self._lay_out()
+        self.show_row(row)
+
+    def _lay_out(self) -> None:
+        grid = QGridLayout(self)
+        grid.setContentsMargins(12, 6, 8, 6)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(1)
+        top: tuple[tuple[QWidget, int], ...] = (
+            (self._title, _NAME_PX),
+            (self._state, _STATE_PX),
+            (self._figure, 0),
+            (self._date, _DATE_PX),
+        )
+        for column, (widget, width) in enumerate(top):
+            widget.setMinimumWidth(width)
+            grid.addWidget(widget, 0, column, Qt.AlignmentFlag.AlignTop)
+        grid.setColumnStretch(2, 1)
+        grid.addWidget(self._purpose, 1, 0, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(self._reason, 1, 1, 1, 3, Qt.AlignmentFlag.AlignTop)
+        self.run.setFixedWidth(_BUTTON_PX)
+        grid.addWidget(self.run, 0, 4, 2, 1, Qt.AlignmentFlag.AlignVCenter)
+        self._purpose.setFixedWidth(_NAME_PX)
+
+    def show_row(self, row: Row, is_busy: bool = False) -> None:
+        """Show where the calibration stands; while ``is_busy`` its wizard cannot be opened."""
+        shown = row_display(row, is_busy)
+        self._state.setText(shown.state)
+        set_role(self._state, shown.state_role)
+        self._figure.setText(shown.figure)
+        set_role(self._figure, shown.figure_role)
+        self._date.setText(shown.date)
+        self._reason.setText(shown.reason)
+        self._reason.setToolTip(shown.reason)
+        show_button(self.run, shown.run)
+        self.run.setAccessibleName(shown.run_name)
+        self.setAccessibleName(shown.accessible_name)
+
+
+def _small(role: str) -> QLabel:
+    made = label("", role)
+    made.setWordWrap(True)
+    return made

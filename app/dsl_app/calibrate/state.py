@@ -35,7 +35,7 @@ class RowState(Enum):
 
 @dataclass(frozen=True)
 class About:
-    """What the page says of a calibration before anything of it is loaded."""
+    """What the page says about a calibration before anything of it is loaded."""
 
     title: str
     purpose: str
@@ -56,7 +56,7 @@ ABOUT = {
 class Row:
     """One calibration of the campaign.
 
-    ``reason`` says more of the state; ``figure`` is the one nearest to its limits, or beyond; ``captured``
+    ``reason`` explains the state; ``figure`` is the one nearest to its limits, or beyond; ``captured``
     counts finished steps; ``has_candidate`` says that a fit waits to be judged.
     """
 
@@ -82,13 +82,23 @@ class CampaignFacts:
 class DriftVerdict:
     """What a quick shot said of a calibration of the library.
 
-    ``spectralon`` says that the target was one, ``overridden`` which settings differed and were let be.
+    ``spectralon`` says that the target was one, ``overridden`` which settings differed and were ignored.
     """
 
     name: str
     figures: tuple[Figure, ...]
     spectralon: bool = True
     overridden: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether all figures are within their limits."""
+        return all(figure.passed for figure in self.figures)
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words."""
+        return f"The rig {'matches' if self.passed else 'does not match'} the calibration {self.name}."
 
 
 def empty_rows() -> tuple[Row, ...]:
@@ -99,10 +109,11 @@ def empty_rows() -> tuple[Row, ...]:
 class CalibrateState:
     """Values that the calibrations' controllers set and the page follows.
 
-    ``trouble`` is a sentence on why nothing can be calibrated (empty: nothing), ``note`` one on what was
-    done last. ``foreign`` says that the campaign is another rig's; ``everything`` says how far a calibration
-    of everything is (empty: none runs). ``in_use`` is the library's name that scans use; ``opened`` fires
-    with a file to show outside.
+    ``trouble`` is a sentence on why nothing can be calibrated (empty: nothing is wrong), ``note`` one on what
+    was done last. ``foreign`` says that the campaign belongs to another rig; ``opening`` is the title of the
+    wizard that is being opened; ``everything`` says how far a calibration of everything is (empty: none
+    runs). ``in_use`` is the library's name that scans use; ``opened`` fires with a file to open in the
+    system's program.
     """
 
     def __init__(self) -> None:
@@ -117,6 +128,11 @@ class CalibrateState:
         self.in_use = Value("")
         self.drift: Value[DriftVerdict | None] = Value(None)
         self.opened: Event[Path] = Event()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a wizard is being opened, or everything is calibrated."""
+        return bool(self.opening.value or self.everything.value)
 
     @property
     def is_complete(self) -> bool:

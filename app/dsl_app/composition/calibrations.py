@@ -30,7 +30,7 @@ class CalibrationDesk:
 
     def page(self) -> PageWidget:
         """The Calibrate page, with the campaign that was open last."""
-        from dsl_app.calibrate.campaign import Kinds
+        from dsl_app.calibrate.campaign_status import Kinds
         from dsl_app.calibrate.controller import CalibrateController
         from dsl_app.calibrate.page import CalibratePage
         from dsl_app.calibrate.state import CalibrateState

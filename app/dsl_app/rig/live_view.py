@@ -14,14 +14,12 @@ from dsl_app.connection.state import FrameCounts
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_app.shared.widgets.pictures import Region, RegionBox, arrow_step, cut, moved_within
-from dsl_core.capture.preview import BINS, Statistics, quick_picture, statistics
+from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame
 
 #: How often figures change, s; the picture follows every frame.
 FIGURES_S = 0.25
-#: Share of saturated pixels that deserves a warning (as peers have it).
-MANY_SATURATED = 0.005
 NO_RIG = "No picture yet. Connect a rig and start the live view."
 NO_PICTURE = "No picture yet. Start the live view."
 #: A shown pixel is a cell of so many raw ones a side.

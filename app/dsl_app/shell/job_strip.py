@@ -93,11 +93,3 @@ def _words_of(job: Job[Any], others: int) -> list[str]:
     if others:
         parts.append(f"and {others} more")
     return parts
-
-
-def describe_seconds(seconds: float) -> str:
-    """A duration as people say it: ``45 s``, ``3 min``, ``1 h 20 min``."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"

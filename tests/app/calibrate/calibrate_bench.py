@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from dsl_app.calibrate.campaign import Kinds
+from dsl_app.calibrate.campaign_status import Kinds
 from dsl_app.calibrate.controller import CalibrateController
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.calibrate.wizard.controller import WizardController

@@ -7,8 +7,8 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from dsl_app.calibrate.campaign_status import key_figure
 from dsl_app.calibrate.controller import library_name
-from dsl_app.calibrate.rows import key_figure
 from dsl_app.calibrate.state import RowState
 from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
 from dsl_app.connection.state import RigChoice
@@ -239,7 +239,7 @@ def test_settings_are_kept_when_right_and_refused_when_wrong(bench: CalibrateBen
     assert CampaignFolder.open(bench.campaign).info.settings == {}
 
 
-def test_settings_wanted_by_the_evidence_fit_again(bench: CalibrateBench) -> None:
+def test_settings_requested_by_the_evidence_fit_again(bench: CalibrateBench) -> None:
     state, control = bench.wizard("selftest")
     for step in (1, 2):
         control.go_to(step)

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 from dsl_app.calibrate.campaign_box import NewCampaignDialog
-from dsl_app.calibrate.drift_window import DriftWindow
 from dsl_app.calibrate.evidence.base import PlainEvidence
+from dsl_app.calibrate.library_panel import DriftWindow
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.calibrate.state import ABOUT, DriftVerdict, RowState
-from dsl_app.calibrate.wizard.board_edit import BoardEdit
-from dsl_app.calibrate.wizard.settings_page import SettingsPage
+from dsl_app.calibrate.wizard.settings_page import BoardEdit, SettingsPage
 from dsl_app.calibrate.wizard.state import Doing
 from dsl_app.calibrate.wizard.window import CalibrationWizard
 from dsl_app.shared.jobs.qt_runner import QtRunner

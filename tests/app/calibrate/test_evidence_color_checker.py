@@ -167,7 +167,7 @@ def test_a_dragged_corner_is_asked_for(qtbot: QtBot, session: CalibrationSession
     drag(widget, start, end)
     corners = widget.chart.corners_px
     assert corners[2] == pytest.approx((200, 130), abs=3)
-    with qtbot.waitSignal(widget.settings_wanted) as heard:
+    with qtbot.waitSignal(widget.settings_requested) as heard:
         QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
     recipe = load_recipe("color-checker", heard.args[0])
     assert isinstance(recipe, ColorCheckerRecipe)
@@ -184,7 +184,7 @@ def test_corners_move_by_keys(qtbot: QtBot, session: CalibrationSession) -> None
     QTest.keyClick(widget.chart, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     QTest.keyClick(widget.chart, Qt.Key.Key_Down)
     assert np.allclose(widget.chart.corners_px[1], (200, 6))
-    with qtbot.waitSignal(widget.settings_wanted) as heard:
+    with qtbot.waitSignal(widget.settings_requested) as heard:
         QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
     assert json.loads(heard.args[0]["corners_px"])[1] == [200.0, 6.0]
 
@@ -203,7 +203,7 @@ def test_corners_are_set_by_hand_where_no_chart_was_found(qtbot: QtBot, session:
     assert "Drag the four corners" in widget.words.text()
     assert not widget.again.isEnabled()
     QTest.keyClick(widget.chart, Qt.Key.Key_Right)
-    with qtbot.waitSignal(widget.settings_wanted) as heard:
+    with qtbot.waitSignal(widget.settings_requested) as heard:
         QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
     wanted = load_recipe("color-checker", heard.args[0])
     # The next attempt begins where the person left the corners.

@@ -114,7 +114,7 @@ def test_unticked_poses_are_left_out_when_solved_again(qtbot: QtBot) -> None:
     tick(widget, 3)
     assert widget.again.isEnabled()
     assert widget.again.text() == "Solve again with 3 poses"
-    with qtbot.waitSignal(widget.settings_wanted) as heard:
+    with qtbot.waitSignal(widget.settings_requested) as heard:
         QTest.mouseClick(widget.again, Qt.MouseButton.LeftButton)
     recipe = load_recipe("geometry", heard.args[0])
     assert isinstance(recipe, GeometryRecipe)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from dsl_app.calibrate.wizard.light_colour import colour_of_light
-from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
+from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing, colour_of_light
 from dsl_app.calibrate.wizard.placement_scene import Face, in_words
 from dsl_app.shared.theme import DARK, LIGHT, Theme
 from PySide6.QtGui import QColor, QImage

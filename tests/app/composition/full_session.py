@@ -15,7 +15,7 @@ from pathlib import Path
 from dsl_app.calibrate.campaign_box import NewCampaignDialog
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.calibrate.state import RowState
-from dsl_app.calibrate.wizard.board_edit import BoardEdit
+from dsl_app.calibrate.wizard.settings_page import BoardEdit
 from dsl_app.calibrate.wizard.state import Doing
 from dsl_app.calibrate.wizard.window import CalibrationWizard
 from dsl_app.composition.window import Composition, Wish

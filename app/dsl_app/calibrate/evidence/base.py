@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 class Evidence(QWidget):
     """Shows the record of a fit.
 
-    ``settings_wanted`` holds settings of the recipe, as texts, that the person changed on the evidence, such
-    as ``{"left_out": "pose-03"}``: a fit with them replaces the one that is shown.
+    ``settings_requested`` holds settings of the recipe, as texts, that the person changed on the evidence,
+    such as ``{"left_out": "pose-03"}``: a fit with them replaces the one that is shown.
     """
 
-    settings_wanted = Signal(dict)
+    settings_requested = Signal(dict)
 
     def __init__(self) -> None:
         super().__init__()

@@ -219,7 +219,7 @@ class ColorCheckerEvidence(Evidence):
 
     def _ask(self) -> None:
         corners = [[round(float(x), 2), round(float(y), 2)] for x, y in self.chart.corners_px]
-        self.settings_wanted.emit({"corners_px": json.dumps(corners)})
+        self.settings_requested.emit({"corners_px": json.dumps(corners)})
 
     def _say(self, words: str, role: str = "muted") -> None:
         self.words.setText(words)

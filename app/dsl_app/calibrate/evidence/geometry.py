@@ -160,7 +160,7 @@ class GeometryEvidence(Evidence):
 
     def _ask(self) -> None:
         keys = [self._keys[item.text()] for item in self._choices() if not self._is_ticked(item)]
-        self.settings_wanted.emit({"left_out": ",".join(keys)})
+        self.settings_requested.emit({"left_out": ",".join(keys)})
 
     def _diagnose(self, too_few: bool) -> None:
         record = self._record

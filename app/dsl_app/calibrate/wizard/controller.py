@@ -1,4 +1,4 @@
-"""What a wizard decides: one calibration, a step after the other. No Qt."""
+"""What a wizard decides: one calibration, one step after the other. No Qt."""
 
 from __future__ import annotations
 
@@ -6,22 +6,29 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from dsl_app.calibrate.campaign_status import Recipes
+from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, Opened
 from dsl_app.calibrate.wizard.jobs import WizardJobs
-from dsl_app.calibrate.wizard.look import Looking
-from dsl_app.calibrate.wizard.state import Doing, WizardState
-from dsl_app.calibrate.wizard.verdict import Library, Verdict
-from dsl_app.calibrate.wizard.work import Captured, Opened, Recipes, WizardWork
+from dsl_app.calibrate.wizard.state import Doing, Fit, Look, Seen, WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.notify import sentence_of
+from dsl_core.campaign.products import Products
+from dsl_core.capture.preview import quick_picture, statistics
 from dsl_core.devices.base import DeviceRig
+from dsl_core.io.calibration_library import CalibrationLibrary
+
+#: Under which name (None: not at all) and in which library the rig is kept; asked in a job.
+Library = Callable[[], tuple[str | None, CalibrationLibrary]]
+#: Pause between two looks, s.
+LOOK_PAUSE_S = 0.8
 
 
 class WizardController:
     """Runs one calibration on the rig; `take_news` brings what happens in jobs to the state.
 
-    ``library`` says under which name (None: not) and where a rig is kept that is complete now.
+    ``library`` says under which name (None: not at all) and where a rig is kept that is now complete.
     """
 
     def __init__(
@@ -35,12 +42,11 @@ class WizardController:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.state, self._path, self._rig = state, path, rig
-        self._recipes = recipes
-        self._work: WizardWork | None = None
+        self._recipes, self._library, self._clock = recipes, library, clock
+        self._work: BackgroundWork | None = None
         self._jobs = WizardJobs(state, rig, runner)
-        self._looking = Looking(state, self._jobs, clock)
-        self._verdict = Verdict(state, self._jobs, library)
         self._devices: DeviceRig | None = None
+        self._looked_at = 0.0
         self._unfollow: Callable[[], None] = lambda: None
 
     # Open and leave --------------------------------------------------------------------------------
@@ -60,15 +66,15 @@ class WizardController:
 
     def _attach(self, devices: DeviceRig) -> None:
         self._devices = devices
-        self._work = WizardWork(self.state.name, self._path, devices, self._recipes)
+        self._work = BackgroundWork(self.state.name, self._path, devices, self._recipes)
 
     @property
-    def _the_work(self) -> WizardWork:
+    def _the_work(self) -> BackgroundWork:
         assert self._work is not None
         return self._work
 
     def _take(self, found: Opened) -> None:
-        """Show what was read from disk, at the first page that wants something."""
+        """Show what was read from disk, at the first page where something is to be done."""
         state = self.state
         state.places_itself.set(found.places_itself)
         state.settings.set(found.settings)
@@ -76,15 +82,20 @@ class WizardController:
         state.statuses.set(found.statuses)
         state.fit.set(found.fit)
         is_new = all(each.state == "missing" for each in found.statuses)
-        state.at.set(0 if is_new else next(iter(state.lacking), state.last))
+        state.at.set(0 if is_new else self._next_lacking)
+
+    @property
+    def _next_lacking(self) -> int:
+        """The page of the first step without good captures, else that of the fit."""
+        return next(iter(self.state.lacking), self.state.last)
 
     def leave(self) -> None:
-        """End what runs and close; everything captured so far stays."""
+        """Stop what runs and close; everything captured so far is kept."""
         self._unfollow()
         self._jobs.leave()
 
     def _follow_devices(self, devices: DeviceRig | None) -> None:
-        """Go on with devices that were connected anew."""
+        """Continue with devices that were connected again."""
         if devices is None or devices is self._devices or not self._jobs.is_free:
             return
         self._attach(devices)
@@ -97,14 +108,14 @@ class WizardController:
         self.state.can_reconnect.set(False)
 
     def reconnect(self) -> None:
-        """Open the rig anew after a device was lost."""
+        """Open the rig again after a device was lost."""
         if self._jobs.is_free and self._rig.state.link.value is not Link.OPENING:
             self._rig.connect(self._rig.state.choice.value)
 
-    # Go through the pages --------------------------------------------------------------------------
+    # Move between pages ----------------------------------------------------------------------------
 
     def go_to(self, page: int) -> None:
-        """Show a page; checks follow to the step that is shown."""
+        """Show a page: 0 the settings, then the steps, then the fit; checks follow to the new step."""
         state = self.state
         if state.doing.value is Doing.OPENING:
             # Settings are being read, which takes a moment; nobody should have to click twice.
@@ -117,37 +128,64 @@ class WizardController:
         state.note.set("")
         state.at.set(page)
         status = state.status
-        # A person who goes on wants to see the next target; what is captured needs no look.
-        wanted = status is not None and status.state != "captured"
-        state.is_checking.set(wanted and (was_checking or state.places_itself.value))
+        # A captured step needs no look; at any other the person places the next target.
+        needs_look = status is not None and status.state != "captured"
+        state.is_checking.set(needs_look and (was_checking or state.places_itself.value))
+
+    # Look ------------------------------------------------------------------------------------------
 
     def check(self, on: bool) -> None:
-        """Look at the step again and again, or stop that."""
-        self._looking.check(on, self._the_work)
+        """Look at the step repeatedly, beginning now, or stop that."""
+        if self.state.status is not None:
+            self.state.is_checking.set(on)
+            self._look_if_due(self._clock() + LOOK_PAUSE_S)
 
     def take_news(self) -> None:
-        """Bring frames and progress to the state and look again when it is time; called by a clock."""
+        """Bring frames and progress to the state and look again when it is time; called by a timer."""
         self._jobs.take_news()
         if self._work is not None:
-            self._looking.take_news(self._work)
+            self._show_frame(self._work)
+            self._look_if_due(self._clock())
+
+    def _show_frame(self, work: BackgroundWork) -> None:
+        frame = work.camera.take_frame()
+        if frame is None:
+            return
+        info = work.camera.info
+        full_scale = 2**info.bit_depth - 1
+        picture = quick_picture(frame.pixels, info.bayer, full_scale, show_saturation=True)
+        self.state.seen.set(Seen(picture, max(statistics(frame.pixels, info.bayer, full_scale).saturated)))
+
+    def _look_if_due(self, now: float) -> None:
+        status, work = self.state.status, self._the_work
+        due = self.state.is_checking.value and self._jobs.is_free and now - self._looked_at >= LOOK_PAUSE_S
+        if not due or status is None:
+            return
+        step = status.step
+        self._jobs.start(Doing.LOOKING, f"Look at {step.title}", lambda p: work.look(step, p), self._looked)
+
+    def _looked(self, look: Look) -> None:
+        self._looked_at = self._clock()
+        status = self.state.status
+        if status is not None and status.step.key == look.key:
+            self.state.look.set(look)
 
     # Capture ---------------------------------------------------------------------------------------
 
     def capture(self) -> None:
-        """Capture the step that is shown, or capture it anew."""
+        """Capture the step that is shown, or capture it again."""
         if self.state.doing.value is Doing.LOOKING:
-            self.state.note.set("Captures as soon as the look at hand has ended.")
+            self.state.note.set("The capture starts as soon as the current look has ended.")
         self._jobs.after_look(self._capture)
 
     def capture_all(self) -> None:
         """Capture every step that lacks captures and fit, where the rig places targets itself."""
         if self.state.places_itself.value:
-            self._jobs.after_look(self._go_on_automatically)
+            self._jobs.after_look(self._continue_automatically)
 
-    def _go_on_automatically(self) -> None:
-        state = self.state
+    def _continue_automatically(self) -> None:
+        state, page = self.state, self._next_lacking
         state.is_automatic.set(True)
-        page = next(iter(state.lacking), state.last)
         state.look.set(None)
         state.at.set(page)
         if page == state.last:
@@ -160,12 +198,12 @@ class WizardController:
         status, work = self.state.status, self._the_work
         if status is None:
             return
-        step, anew, is_checked = status.step, status.state == "captured", self.state.is_automatic.value
+        step, again, is_checked = status.step, status.state == "captured", self.state.is_automatic.value
         self.state.note.set("")
         self._jobs.start(
             Doing.CAPTURING,
             f"Capture {step.title}",
-            lambda progress: work.capture(step, anew, is_checked, progress),
+            lambda progress: work.capture(step, again, is_checked, progress),
             lambda found: self._captured(found, step.title),
         )
 
@@ -178,38 +216,79 @@ class WizardController:
         state.fit.set(None)
         state.misfit.set(None)
         if state.is_automatic.value:
-            self._go_on_automatically()
+            self._continue_automatically()
             return
         following = next((page for page in state.lacking if page > state.at.value), None)
-        page = following or next(iter(state.lacking), state.last)
         left = len(state.lacking)
-        self.go_to(page)
+        self.go_to(following or self._next_lacking)
         state.note.set(
             f"{title} is captured. " + (f"{left} to go." if left else "All steps are captured: fit them.")
         )
 
     def stop(self) -> None:
-        """Stop a capture or fit at its next safe point; frames taken so far stay."""
+        """Stop a capture or fit at its next safe point; frames taken so far are kept."""
         self._jobs.stop()
 
     # Fit and judge ---------------------------------------------------------------------------------
 
     def fit(self) -> None:
         """Calibrate from the captures of all steps."""
-        self._verdict.fit(self._the_work)
+        work = self._the_work
+
+        def failed(error: Exception) -> None:
+            self._jobs.fail(error)
+            self.state.misfit.set(work.session)
+
+        self._jobs.after_look(
+            lambda: self._jobs.start(Doing.FITTING, "Fit", work.fit, self._fitted, failed=failed)
+        )
+
+    def _fitted(self, fit: Fit) -> None:
+        state = self.state
+        state.misfit.set(None)
+        state.fit.set(fit)
+        state.at.set(state.last)
+        state.note.set("")
 
     def accept(self) -> None:
-        """Let the fit be the campaign's calibration, and write down the rig as far as it is known."""
-        self._verdict.accept(self._the_work)
+        """Make the fit the campaign's calibration, and write the rig as far as it is calibrated."""
+        work = self._the_work
+        if self._has_candidate:
+            self._jobs.start(Doing.KEEPING, "Accept", lambda progress: work.accept(), self._accepted)
+
+    def _accepted(self, fit: Fit) -> None:
+        state, work = self.state, self._the_work
+        state.fit.set(fit)
+        state.note.set(f"{state.title} is accepted.")
+
+        def written(made: Products) -> None:
+            kept = f" In the library it is {made.entry!r}." if made.entry else ""
+            state.note.set(f"{state.title} is accepted. The rig is saved in {made.rig}.{kept}")
+
+        self._jobs.start(
+            Doing.KEEPING, "Write the rig", lambda progress: work.write(*self._library()), written
+        )
 
     def discard(self) -> None:
-        """Forget the fit that waits; captures and the accepted calibration stay."""
-        self._verdict.discard(self._the_work)
+        """Discard the fit that waits; captures and the accepted calibration are kept."""
+        work = self._the_work
+        if self._has_candidate:
+            self._jobs.start(
+                Doing.KEEPING,
+                "Discard the fit",
+                lambda progress: work.discard(),
+                lambda _: self.state.fit.set(None),
+            )
+
+    @property
+    def _has_candidate(self) -> bool:
+        fit = self.state.fit.value
+        return fit is not None and not fit.is_accepted and self._jobs.is_free
 
     # Settings --------------------------------------------------------------------------------------
 
     def change_settings(self, values: Mapping[str, str], then_fit: bool = False) -> None:
-        """Use other settings of the recipe, as texts; those not named stay. They are kept when right."""
+        """Use other settings of the recipe, as texts; the others stay. They are kept when right."""
 
         def taken(found: Opened) -> None:
             at = self.state.at.value
@@ -228,10 +307,6 @@ class WizardController:
         work = self._the_work
         self._jobs.after_look(
             lambda: self._jobs.start(
-                Doing.OPENING,
-                "Settings",
-                lambda p: work.change(values, p),
-                taken,
-                failed=refused,
+                Doing.OPENING, "Settings", lambda p: work.change(values, p), taken, failed=refused
             )
         )

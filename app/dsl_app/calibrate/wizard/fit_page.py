@@ -8,25 +8,22 @@ from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
 
 from dsl_app.calibrate.evidence.base import Evidence, make_evidence
 from dsl_app.calibrate.figures_table import FiguresTable
-from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
+from dsl_app.calibrate.wizard.presentation import fit_display
+from dsl_app.calibrate.wizard.state import Fit, WizardState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_core.campaign.session import CalibrationSession
-from dsl_core.model.figure import failures
 
 
 class FitPage(QWidget):
-    """Follows the fit of a wizard; ``settings_wanted`` passes on what a person changed on the evidence."""
+    """Follows the fit of a wizard; ``settings_requested`` passes on what a person changed on the evidence."""
 
-    settings_wanted = Signal(dict)
-    #: Tells that the person allows, or no longer allows, figures outside their limits.
-    allowed = Signal()
+    settings_requested = Signal(dict)
 
     def __init__(self, state: WizardState) -> None:
         super().__init__()
         self._state, self._theme = state, DARK
-        self._shown: Fit | None = None
         self._evidence: Evidence | None = None
         self._due: Fit | None = None
         self.verdict = label("", "heading")
@@ -35,8 +32,8 @@ class FitPage(QWidget):
         self.figures = FiguresTable("Key figures of the fit")
         self.figures.setMinimumHeight(120)
         self.allow = QCheckBox("Accept although figures are outside their limits")
-        self.allow.setToolTip("The report and the library keep showing these figures as missed")
-        self.allow.toggled.connect(lambda _: self.allowed.emit())
+        self.allow.setToolTip("The report and the library continue to show that these figures are missed")
+        self.allow.toggled.connect(self._allow)
         self._split = QSplitter(Qt.Orientation.Vertical)
         self._split.setChildrenCollapsible(False)
         self._split.addWidget(self.figures)
@@ -48,43 +45,45 @@ class FitPage(QWidget):
         self.stops = [
             state.fit.follow(self._show_fit),
             state.misfit.follow(self._show_misfit),
-            state.statuses.follow(lambda _: self._show_verdict()),
-            state.doing.follow(lambda _: self._show_verdict()),
+            state.statuses.changed.connect(lambda _: self._show()),
+            state.doing.changed.connect(lambda _: self._show()),
+            state.allowed.changed.connect(lambda _: self._show()),
         ]
 
-    @property
-    def may_accept(self) -> bool:
-        """Whether there is a fit to accept, and nothing speaks against it that nobody allowed."""
+    def _allow(self, on: bool) -> None:
         fit = self._state.fit.value
-        if fit is None or fit.is_accepted:
-            return False
-        return not failures(fit.fitted.figures) or self.allow.isChecked()
+        self._state.allowed.set(fit.fitted.figures if on and fit is not None else ())
+
+    def _show(self) -> None:
+        shown = fit_display(self._state)
+        self.verdict.setText(shown.verdict)
+        set_role(self.verdict, shown.role)
+        self.figures.setVisible(shown.has_fit)
+        self.allow.setVisible(shown.can_allow)
+        self.allow.blockSignals(True)
+        self.allow.setChecked(shown.is_allowed)
+        self.allow.blockSignals(False)
+        if self._evidence is not None:
+            self._evidence.setEnabled(shown.can_edit)
 
     def _show_fit(self, fit: Fit | None) -> None:
-        if fit is not None and fit is not self._shown:
-            self.figures.show_figures(fit.fitted.figures)
-            self._due = fit
-            if self.isVisible():
-                self._show_due_soon()
-        if fit is None or self._shown is None or fit.fitted.figures != self._shown.fitted.figures:
-            self.allow.setChecked(False)
-        self._shown = fit
-        if fit is None:
-            self._due = None
-        for widget in (self._evidence, self.figures):
-            if widget is not None:
-                widget.setVisible(fit is not None)
-        self._show_verdict()
+        self._due = fit
+        self.figures.show_figures(() if fit is None else fit.fitted.figures)
+        if self._evidence is not None:
+            self._evidence.setVisible(fit is not None)
+        if fit is not None and self.isVisible():
+            self._show_due_soon()
+        self._show()
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Make the evidence that waited for somebody to look: after the page itself, as it takes as long."""
+        """Make the evidence that waited to be seen: after the page itself, as it takes as long."""
         super().showEvent(event)
         self._show_due_soon()
 
     def _show_due_soon(self) -> None:
         call_deferred(self, self._take_turn)
 
-    def _take_turn(self) -> None:
+    def _call_deferred(self) -> None:
         # Making evidence takes as long as filling it: a turn each.
         if self._due is not None and self._evidence is None:
             self._make_evidence()
@@ -106,7 +105,7 @@ class FitPage(QWidget):
         return self._evidence
 
     def _show_misfit(self, session: CalibrationSession | None) -> None:
-        """Show captures that no fit came of, where a look at them helps."""
+        """Show captures that gave no fit, where a look at them helps."""
         if session is None or self._state.fit.value is not None:
             return
         made = self._evidence or self._make_evidence()
@@ -115,7 +114,7 @@ class FitPage(QWidget):
     def _make_evidence(self) -> Evidence:
         self._evidence = made = make_evidence(self._state.name)
         made.apply_theme(self._theme)
-        made.settings_wanted.connect(self.settings_wanted)
+        made.settings_requested.connect(self.settings_requested)
         made.setMinimumHeight(200)
         made.setEnabled(not self._state.doing.value.is_long)
         self._split.insertWidget(0, made)
@@ -123,32 +122,6 @@ class FitPage(QWidget):
         self._split.setStretchFactor(1, 1)
         self._split.setSizes([420, 150])
         return made
-
-    def _show_verdict(self) -> None:
-        fit, doing = self._state.fit.value, self._state.doing.value
-        self.allow.setVisible(fit is not None and not fit.is_accepted and bool(failures(fit.fitted.figures)))
-        if self._evidence is not None:
-            self._evidence.setEnabled(not doing.is_long)
-        text, role = self._words(fit, doing)
-        self.verdict.setText(text)
-        set_role(self.verdict, role)
-
-    def _words(self, fit: Fit | None, doing: Doing) -> tuple[str, str]:
-        if doing is Doing.FITTING:
-            return "Fitting…", "muted"
-        if fit is None:
-            lacking = self._state.lacking
-            if not lacking:
-                return "All steps are captured. Fit them to see how good they are.", "muted"
-            titles = [self._state.statuses.value[page - 1].step.title for page in lacking]
-            named = ", ".join(titles[:4]) + (f" and {len(titles) - 4} more" if len(titles) > 4 else "")
-            return f"Not all steps are captured yet: {named}.", "warn"
-        limited = [figure for figure in fit.fitted.figures if figure.limits]
-        wrong = len(failures(fit.fitted.figures))
-        count = f"{len(limited) - wrong} of {len(limited)} figures are within their limits."
-        if fit.is_accepted:
-            return f"✓ Accepted. {count}", "good" if not wrong else "warn"
-        return (f"✓ {count} Accept the fit to use it.", "good") if not wrong else (f"✗ {count}", "bad")
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

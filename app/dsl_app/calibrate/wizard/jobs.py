@@ -1,4 +1,4 @@
-"""One job at a time for a wizard, and what becomes of it. No Qt."""
+"""One job at a time for a wizard, and how it ended. No Qt."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class WizardJobs:
 
     @property
     def is_free(self) -> bool:
-        """Whether nothing runs, and the wizard is still there."""
+        """Whether nothing runs and the wizard is still open."""
         return self._job is None and not self._is_left
 
     def start(
@@ -37,7 +37,7 @@ class WizardJobs:
         done: Callable[[T], object],
         failed: Callable[[Exception], object] | None = None,
     ) -> None:
-        """Run work in a job; looks and captures have the rig for themselves."""
+        """Run work in a job; looks and captures have the rig to themselves."""
         state, on_failed = self.state, failed or self.fail
         on_rig = doing in (Doing.LOOKING, Doing.CAPTURING)
         state.trouble.set("")
@@ -51,7 +51,7 @@ class WizardJobs:
             lambda: self._over(self._stopped),
             exclusive=RIG if on_rig else "",
         )
-        # Known before anybody hears of it, who might want to leave at once.
+        # Set before any listener hears of it: it might leave at once.
         self._job = job
         state.doing.set(doing)
         if on_rig:
@@ -60,7 +60,7 @@ class WizardJobs:
             self._runner.submit(job)
 
     def after_look(self, then: Callable[[], object]) -> None:
-        """Do something now, or when the look or the reading at hand has ended; else it is ignored."""
+        """Do something now, or when the current look or reading has ended; otherwise it is ignored."""
         if self.is_free:
             self.state.is_checking.set(False)
             then()
@@ -69,11 +69,11 @@ class WizardJobs:
             self._queued = then
 
     def forget_queued(self) -> None:
-        """Do not do what waits for the end of the job at hand."""
+        """Do not do what waits for the end of the current job."""
         self._queued = None
 
     def take_news(self) -> None:
-        """Say how far the job at hand is."""
+        """Update how far the current job is."""
         if self._job is not None:
             told = self._job.progress
             self.state.progress.set(Told(told.stage, told.done, told.total, self._job.remaining_s))
@@ -99,7 +99,7 @@ class WizardJobs:
             self._job.cancel()
 
     def fail(self, error: Exception) -> None:
-        """Say what went wrong; nothing goes on by itself."""
+        """Say what went wrong; nothing continues by itself."""
         self._give_up()
         self.state.trouble.set(sentence_of(error))
         self.state.can_reconnect.set(isinstance(error, DeviceError))
@@ -126,4 +126,4 @@ class WizardJobs:
 
     def _stopped(self) -> None:
         self._give_up()
-        self.state.note.set("Stopped. Frames taken so far are kept; capture again to go on.")
+        self.state.note.set("Stopped. Frames taken so far are kept; capture again to continue.")

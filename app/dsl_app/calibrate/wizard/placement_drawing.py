@@ -1,12 +1,14 @@
-"""What stands where during a step of a calibration, drawn from above and as the camera sees it."""
+"""What to place where in a step of a calibration, drawn from above and as the camera sees it."""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
+import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from dsl_app.calibrate.wizard.light_colour import colour_of_light
 from dsl_app.calibrate.wizard.placement_scene import (
     NAMES,
     PICTURE_ASPECT,
@@ -18,16 +20,20 @@ from dsl_app.calibrate.wizard.placement_scene import (
 )
 from dsl_app.shared.theme import DARK, Theme
 from dsl_core.model.placement import Placement
+from dsl_core.optics.cie_tables import CIE_1931_XYZ, CIE_NM
+from dsl_core.optics.colour import xyz_to_srgb
 
 #: The farthest that the view from above shows, mm.
 FARTHEST_MM = 1000.0
 #: Where camera and projector stand, and half the width of a target of 400 mm, as shares of that view's width.
 CAMERA_AT, PROJECTOR_AT, TARGET_HALF = 0.3, 0.72, 0.4
 PAD = 8.0
+#: Luminance of pure colours: bright enough to tell red from violet.
+PURE_LUMINANCE = 0.55
 
 
 class PlacementDrawing(QWidget):
-    """Camera, projector, film, filter and target of a placement; says in words what it draws."""
+    """Camera, projector, film, filter and target of a placement; describes in words what it draws."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -39,7 +45,7 @@ class PlacementDrawing(QWidget):
         self.show_placement(self._placement)
 
     def sizeHint(self) -> QSize:
-        """A comfortable size beside an instruction."""
+        """A comfortable size next to an instruction."""
         return QSize(420, 300)
 
     def show_placement(self, placement: Placement) -> None:
@@ -56,7 +62,7 @@ class PlacementDrawing(QWidget):
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw from above, and beside it what the camera sees of the target."""
+        """Draw from above, and next to it what the camera sees of the target."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         area = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
@@ -248,3 +254,13 @@ class PlacementDrawing(QWidget):
 def _bar(colour: str, width: float) -> QPen:
     """A pen for thick lines that end where they end."""
     return QPen(QColor(colour), width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap)
+
+
+@lru_cache(maxsize=512)
+def colour_of_light(nm: float) -> str:
+    """The screen colour (``#rrggbb``) nearest to monochromatic light of a wavelength."""
+    xyz = np.array([np.interp(np.clip(nm, 400, 690), CIE_NM, row) for row in CIE_1931_XYZ])
+    red, green, blue = (
+        (np.clip(xyz_to_srgb(xyz / xyz.sum() * PURE_LUMINANCE), 0, 1) * 255 + 0.5).astype(int).tolist()
+    )
+    return f"#{red:02x}{green:02x}{blue:02x}"

@@ -1,4 +1,4 @@
-"""The settings of a recipe as rows of text, and what its own words say of each."""
+"""The settings of a recipe as rows of text, and what its docstring says about each. No Qt."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dsl_core.campaign.common.recipe import Recipe
 
 
 def setting_rows(recipe: Recipe, settings: Mapping[str, str]) -> tuple[SettingRow, ...]:
-    """A row for each field of a recipe, with what the campaign says of it or its default."""
+    """A row for each field of a recipe, with the value in the campaign or its default."""
     kind: type[Any] = type(recipe)
     if not is_dataclass(kind):
         return ()
@@ -82,3 +82,19 @@ def _doc(kind: type[Any], name: str) -> str:
             plain = sentence.replace(f"``{name}``", "this").strip(" ,.;")
         return f"{plain[0].upper()}{plain[1:]}."
     return ""
+
+
+#: Units that end names of settings, and how the window shows them.
+_UNITS = {"nm": "nm", "mm": "mm", "ms": "ms", "px": "px", "deg": "°"}
+
+
+def setting_title(key: str) -> str:
+    """The name of a setting as the window shows it.
+
+    >>> setting_title("filters_nm"), setting_title("stage_std_mm"), setting_title("poses")
+    ('Filters (nm)', 'Stage std (mm)', 'Poses')
+    """
+    *words, last = key.split("_")
+    if words and last in _UNITS:
+        return f"{' '.join(words).capitalize()} ({_UNITS[last]})"
+    return " ".join((*words, last)).capitalize()

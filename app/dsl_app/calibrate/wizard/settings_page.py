@@ -2,27 +2,39 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 from typing import TypeVar
 
+from pydantic import TypeAdapter, ValidationError
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QFrame, QLineEdit, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLineEdit,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
-from dsl_app.calibrate.wizard.board_edit import BoardEdit
+from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_core.model.board import Board, Charuco, Checkerboard
 
 F = TypeVar("F", bound=QWidget)
 INTRODUCTION = (
-    "What is captured follows these settings. The campaign remembers them; what was captured with others"
-    " stays on disk."
+    "Captures follow these settings, which the campaign remembers. Captures made with other settings stay on"
+    " disk."
 )
 FIELD_PX = 420
 NOTHING = "This calibration has no settings."
 
 
 class SettingsPage(QWidget):
-    """A row a setting; ``edited`` tells key and text of one that a person changed."""
+    """A row for each setting; ``edited`` tells key and text of one that a person changed."""
 
     edited = Signal(str, str)
 
@@ -57,7 +69,7 @@ class SettingsPage(QWidget):
         self._trouble.setVisible(bool(trouble))
 
     def show_settings(self, rows: tuple[SettingRow, ...]) -> None:
-        """Show settings; fields of the same keys stay, with the focus in them."""
+        """Show settings; fields of the same keys stay and keep the focus."""
         if [row.key for row in rows] != [row.key for row in self._shown]:
             self._build(rows)
         self._shown = rows
@@ -76,7 +88,7 @@ class SettingsPage(QWidget):
             self._form.removeRow(0)
         self.fields = {}
         for row in rows:
-            name = words_of(row.key)
+            name = setting_title(row.key)
             field = self._field(row, name)
             self.fields[row.key] = field
             self._form.addRow(name, field)
@@ -104,27 +116,11 @@ class SettingsPage(QWidget):
 
     def _tell(self, key: str, text: str) -> None:
         known = next(row.value for row in self._shown if row.key == key)
-        # A field that was left without its default's text means the default.
+        # An empty field means the default.
         default = next(row.default for row in self._shown if row.key == key)
-        wanted = text.strip() or default
-        if wanted != known:
-            self.edited.emit(key, wanted)
-
-
-#: Units that end names of settings, and how people write them.
-_UNITS = {"nm": "nm", "mm": "mm", "ms": "ms", "px": "px", "deg": "°"}
-
-
-def words_of(key: str) -> str:
-    """The name of a setting for people.
-
-    >>> words_of("filters_nm"), words_of("stage_std_mm"), words_of("poses")
-    ('Filters (nm)', 'Stage std (mm)', 'Poses')
-    """
-    *words, last = key.split("_")
-    if words and last in _UNITS:
-        return f"{' '.join(words).capitalize()} ({_UNITS[last]})"
-    return " ".join((*words, last)).capitalize()
+        value = text.strip() or default
+        if value != known:
+            self.edited.emit(key, value)
 
 
 def _named(field: F, name: str, tip: str) -> F:
@@ -132,3 +128,90 @@ def _named(field: F, name: str, tip: str) -> F:
     field.setToolTip(tip)
     field.setMaximumWidth(FIELD_PX)
     return field
+
+
+class BoardEdit(QWidget):
+    """A printed board: its kind, how many squares, how large they measured.
+
+    ``edited`` tells it as the text of a setting.
+    """
+
+    edited = Signal(str)
+
+    def __init__(self, name: str) -> None:
+        super().__init__()
+        self._board: Board = Checkerboard(columns=11, rows=7, square_mm=20.0)
+        self.kind = ChoiceBox(
+            f"Kind of {name}", "A checkerboard, or a ChArUco board with a marker in each white square"
+        )
+        self.kind.addItem("Checkerboard, inner corners", "checkerboard")
+        self.kind.addItem("ChArUco, squares", "charuco")
+        self.columns = WholeBox("Columns", 3, 99, 11, tip="Inner corners, or squares of a ChArUco, across")
+        self.rows = WholeBox("Rows", 3, 99, 7, tip="Inner corners, or squares of a ChArUco, down")
+        self.square = NumberBox("Side of a square", 1, 999, 20, "mm", 3, "Measured over many printed squares")
+        self.marker = NumberBox("Side of a marker", 1, 999, 15, "mm", 3, "Measured on the printed board")
+        self._marker_label = label("marker", "muted")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.kind)
+        column.addLayout(_row(self.columns, label("×", "muted"), self.rows))
+        column.addLayout(_row(label("square", "muted"), self.square, self._marker_label, self.marker))
+        self.kind.activated.connect(lambda _: self._tell())
+        for box in (self.columns, self.rows, self.square, self.marker):
+            box.setKeyboardTracking(False)
+            box.valueChanged.connect(lambda _: self._tell())
+
+    def show_text(self, text: str) -> None:
+        """Show the board of a setting's text; one that cannot be read changes nothing."""
+        try:
+            self._board = TypeAdapter[Board](Board).validate_json(text)
+        except ValidationError:
+            return
+        boxes = (self.kind, self.columns, self.rows, self.square, self.marker)
+        for box in boxes:
+            box.blockSignals(True)
+        board = self._board
+        self.kind.setCurrentIndex(self.kind.findData(board.kind))
+        self.columns.setValue(board.columns)
+        self.rows.setValue(board.rows)
+        self.square.setValue(board.square_mm)
+        if isinstance(board, Charuco):
+            self.marker.setValue(board.marker_mm)
+        for box in boxes:
+            box.blockSignals(False)
+        self._show_marker(isinstance(board, Charuco))
+
+    def _show_marker(self, on: bool) -> None:
+        self.marker.setVisible(on)
+        self._marker_label.setVisible(on)
+
+    def _tell(self) -> None:
+        values: dict[str, object] = {
+            "kind": self.kind.currentData(),
+            "columns": self.columns.value(),
+            "rows": self.rows.value(),
+            "square_mm": self.square.value(),
+        }
+        is_charuco = values["kind"] == "charuco"
+        self._show_marker(is_charuco)
+        if is_charuco:
+            values["marker_mm"] = self.marker.value()
+            if isinstance(self._board, Charuco):
+                values |= {"dictionary": self._board.dictionary, "legacy": self._board.legacy}
+        self.edited.emit(_text_of(values))
+
+
+def _row(*widgets: QWidget) -> QHBoxLayout:
+    row = QHBoxLayout()
+    for widget in widgets:
+        row.addWidget(widget)
+    row.addStretch(1)
+    return row
+
+
+def _text_of(values: dict[str, object]) -> str:
+    """A board as a setting's text; an impossible one as it is, so that the engine says what is wrong."""
+    try:
+        return TypeAdapter[Board](Board).validate_python(values).model_dump_json()
+    except ValidationError:
+        return json.dumps(values)

@@ -16,7 +16,7 @@ from dsl_core.model.figure import Figure, failures
 
 
 class Doing(Enum):
-    """What goes on now; the words are shown."""
+    """What the wizard is doing now; the words are shown."""
 
     OPENING = "opening"
     IDLE = ""
@@ -90,7 +90,8 @@ class WizardState:
 
     ``at`` counts pages: 0 are the settings, 1 to n the steps, n + 1 the fit. ``trouble`` is what went wrong
     and what to do about it, ``note`` what was done last. ``misfit`` is the session whose captures gave no
-    fit. ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work ended.
+    fit. ``allowed`` are figures that a person accepts although some are outside their limits.
+    ``is_automatic`` runs all steps without a person. ``closed`` fires once, when the last work ended.
     """
 
     def __init__(self, name: str, title: str) -> None:
@@ -107,11 +108,18 @@ class WizardState:
         self.note = Value("")
         self.fit: Value[Fit | None] = Value(None)
         self.misfit: Value[CalibrationSession | None] = Value(None)
+        self.allowed: Value[tuple[Figure, ...]] = Value(())
         self.settings: Value[tuple[SettingRow, ...]] = Value(())
         self.settings_trouble = Value("")
         self.places_itself = Value(False)
         self.is_automatic = Value(False)
         self.closed: Event[None] = Event()
+        self.fit.changed.connect(self._forget_allowed)
+
+    def _forget_allowed(self, fit: Fit | None) -> None:
+        """What was allowed of one fit is not allowed of another."""
+        if fit is None or fit.fitted.figures != self.allowed.value:
+            self.allowed.set(())
 
     @property
     def last(self) -> int:
@@ -123,6 +131,14 @@ class WizardState:
         """The step that is shown; None on the pages of settings and fit."""
         at = self.at.value
         return self.statuses.value[at - 1] if 1 <= at < self.last else None
+
+    @property
+    def may_accept(self) -> bool:
+        """Whether a fit waits whose figures are within their limits, or allowed by the person."""
+        fit = self.fit.value
+        if fit is None or fit.is_accepted:
+            return False
+        return not failures(fit.fitted.figures) or self.allowed.value == fit.fitted.figures
 
     @property
     def lacking(self) -> tuple[int, ...]:

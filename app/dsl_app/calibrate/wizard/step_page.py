@@ -1,18 +1,21 @@
-"""One step: what to place where, whether it is right, and how far its capture is."""
+"""One step: what to place where, what the camera sees, and whether it is right."""
 
 from __future__ import annotations
 
+import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
 from dsl_app.calibrate.figures_table import FiguresTable
-from dsl_app.calibrate.wizard.live_picture import LivePicture
 from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
-from dsl_app.calibrate.wizard.state import Doing, Look, WizardState
+from dsl_app.calibrate.wizard.presentation import step_display
+from dsl_app.calibrate.wizard.state import Seen, WizardState
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
+from dsl_core.capture.preview import MANY_SATURATED
 
 TABLE_PX = 166
+NO_PICTURE = "No picture yet. It appears with the first look."
 
 
 class StepPage(QWidget):
@@ -35,11 +38,11 @@ class StepPage(QWidget):
         self.figures.setFixedHeight(TABLE_PX)
         self._lay_out()
         self.stops = [
-            state.at.follow(lambda _: self._show_step()),
-            state.statuses.follow(lambda _: self._show_step()),
-            state.look.follow(lambda _: self._show_look()),
-            state.doing.follow(lambda _: self._show_look()),
-            state.is_checking.follow(lambda _: self._show_look()),
+            state.at.follow(lambda _: self._show()),
+            state.statuses.changed.connect(lambda _: self._show()),
+            state.look.changed.connect(lambda _: self._show()),
+            state.doing.changed.connect(lambda _: self._show()),
+            state.is_checking.changed.connect(lambda _: self._show()),
             state.seen.follow(self.picture.show_seen),
         ]
 
@@ -55,56 +58,60 @@ class StepPage(QWidget):
         split.addWidget(self.picture)
         split.setStretchFactor(0, 1)
         split.setStretchFactor(1, 1)
-        head = QHBoxLayout()
-        head.addWidget(self.title)
-        head.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(8, 0, 0, 0)
-        column.addLayout(head)
+        column.addWidget(self.title)
         column.addWidget(split, 1)
         column.addWidget(self.verdict)
         column.addWidget(self.figures)
 
-    def _show_step(self) -> None:
-        status = self._state.status
-        if status is None:
+    def _show(self) -> None:
+        shown = step_display(self._state)
+        if shown is None:
             return
-        self.title.setText(status.step.title)
-        self.instruction.setText(status.step.instruction)
-        self.drawing.show_placement(status.step.placement)
-        self._show_look()
-
-    def _show_look(self) -> None:
-        look = self._state.look.value
-        self.figures.show_figures(() if look is None else look.figures)
-        text, role = self._verdict(look)
-        self.verdict.setText(text)
-        set_role(self.verdict, role)
-
-    def _verdict(self, look: Look | None) -> tuple[str, str]:
-        state, status = self._state, self._state.status
-        if state.doing.value in (Doing.CAPTURING, Doing.STOPPING):
-            return "Capturing. Touch nothing until it is done.", "warn"
-        if look is not None and look.trouble:
-            return look.trouble, "bad"
-        if look is not None:
-            return (
-                ("All is right: capture.", "good")
-                if look.is_good
-                else ("Not right yet; the table says what to do.", "warn")
-            )
-        if state.is_checking.value:
-            return "Looking…", "muted"
-        if status is not None and status.state == "captured":
-            return (
-                "✓ Captured. It can be captured anew; the old one stays until the new one is whole.",
-                "good",
-            )
-        if status is not None and status.state == "refused":
-            return f"✗ Refused: {status.reason}", "bad"
-        return "Place the target, then check that it is right, or capture at once.", "muted"
+        self.title.setText(shown.title)
+        self.instruction.setText(shown.instruction)
+        self.drawing.show_placement(shown.placement)
+        self.figures.show_figures(shown.figures)
+        self.verdict.setText(shown.verdict)
+        set_role(self.verdict, shown.role)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         for part in (self.drawing, self.picture, self.figures):
             part.apply_theme(theme)
+
+
+class LivePicture(QWidget):
+    """The camera's last frame while a target is placed and captured; saturated pixels are red."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.view = pg.GraphicsLayoutWidget()
+        self.view.setAccessibleName("What the camera sees")
+        self.view.setToolTip("The camera's last bright frame; saturated pixels are red")
+        self.view.setMinimumSize(220, 150)
+        self._box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)
+        self._item = pg.ImageItem(axisOrder="row-major")
+        self._box.addItem(self._item)
+        self._text = label(NO_PICTURE, "muted")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.view, 1)
+        column.addWidget(self._text)
+
+    def show_seen(self, seen: Seen | None) -> None:
+        """Show a frame; None clears it."""
+        if seen is None:
+            self._item.clear()
+            self._text.setText(NO_PICTURE)
+            set_role(self._text, "muted")
+            return
+        self._item.setImage(seen.picture, autoLevels=False, levels=None)
+        self._box.autoRange(padding=0.01)
+        self._text.setText(f"saturated {100 * seen.saturated:.2f} %")
+        set_role(self._text, "bad" if seen.saturated > MANY_SATURATED else "muted")
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self.view.setBackground(theme.base)

@@ -1,33 +1,49 @@
-"""A calibration as a window over the page: settings, steps, fit, verdict."""
+"""A calibration as a window over the page: steps at the left, the page, and buttons below."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QMessageBox,
+    QProgressBar,
+    QPushButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
-from dsl_app.calibrate.wizard.buttons import WizardButtons
-from dsl_app.calibrate.wizard.commands import WizardCommands
 from dsl_app.calibrate.wizard.fit_page import FitPage
+from dsl_app.calibrate.wizard.presentation import Buttons, PageLine, activity, buttons, page_lines
 from dsl_app.calibrate.wizard.settings_page import SettingsPage
 from dsl_app.calibrate.wizard.state import Doing, WizardState
-from dsl_app.calibrate.wizard.step_list import StepList
 from dsl_app.calibrate.wizard.step_page import StepPage
-from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import Banner
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import Banner, label, push_button, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
+
+if TYPE_CHECKING:
+    from dsl_app.calibrate.wizard.controller import WizardController
 
 #: How often frames and progress are fetched, ms.
 FETCH_MS = 100
 SMALLEST, USUAL = QSize(900, 600), QSize(1120, 720)
 HELP = "calibrating"
+LIST_PX, BAR_PX = 250, 220
 
 
 class CalibrationWizard(QDialog):
     """Follows a `WizardState` and asks its controller; modal to the window it belongs to."""
 
-    def __init__(self, state: WizardState, commands: WizardCommands, theme: Theme, parent: QWidget) -> None:
+    def __init__(self, state: WizardState, commands: WizardController, theme: Theme, parent: QWidget) -> None:
         super().__init__(parent)
         self._state, self._commands = state, commands
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -36,8 +52,8 @@ class CalibrationWizard(QDialog):
         self.setMinimumSize(SMALLEST)
         self.resize(_fitting(parent.window().size()))
         self.banner = Banner("Connect the rig again")
-        self.banner.action.setToolTip("Open all devices of the rig anew and go on here")
-        self.steps = StepList()
+        self.banner.action.setToolTip("Open all devices of the rig again and continue here")
+        self.steps = PageList()
         self.settings, self.step, self.fit = SettingsPage(), StepPage(state), FitPage(state)
         self.stack = QStackedWidget()
         self.buttons = WizardButtons(state, commands)
@@ -65,24 +81,21 @@ class CalibrationWizard(QDialog):
         self.banner.action.clicked.connect(commands.reconnect)
         self.steps.chosen.connect(self._choose)
         self.settings.edited.connect(lambda key, text: commands.change_settings({key: text}))
-        self.fit.settings_wanted.connect(lambda values: commands.change_settings(values, then_fit=True))
-        self.fit.allowed.connect(self._show_acceptable)
-        self.buttons.left.connect(self.reject)
+        self.fit.settings_requested.connect(lambda values: commands.change_settings(values, then_fit=True))
+        self.buttons.leave.clicked.connect(self.reject)
         add_help_key(self, HELP)
         self._stops: list[Callable[[], None]] = [
             *self.step.stops,
             *self.fit.stops,
             *self.buttons.stops,
             state.statuses.follow(lambda _: self._show_steps()),
-            state.fit.follow(lambda _: self._show_steps()),
-            state.at.follow(self._show_page),
+            state.fit.changed.connect(lambda _: self._show_steps()),
+            state.at.changed.connect(lambda _: self._show_page()),
             state.settings.follow(self.settings.show_settings),
             state.settings_trouble.follow(self.settings.say),
-            state.trouble.follow(lambda _: self._show_trouble()),
-            state.can_reconnect.follow(lambda _: self._show_trouble()),
-            state.doing.follow(
-                lambda doing: self.settings.setEnabled(not doing.is_long or doing.value == "opening")
-            ),
+            state.trouble.follow(self.banner.say),
+            state.can_reconnect.follow(self.banner.action.setVisible),
+            state.doing.follow(self._show_doing),
         ]
 
     def _choose(self, page: int) -> None:
@@ -91,31 +104,22 @@ class CalibrationWizard(QDialog):
         self.steps.mark(self._state.at.value)
 
     def _show_steps(self) -> None:
-        self.steps.show_steps(self._state.statuses.value, self._state.fit.value is not None)
-        self.steps.mark(self._state.at.value)
-        self._show_page(self._state.at.value)
-        self._show_acceptable()
+        self.steps.show_pages(page_lines(self._state))
+        self._show_page()
 
-    def _show_page(self, at: int) -> None:
+    def _show_page(self) -> None:
+        at = self._state.at.value
         pages = {0: self.settings, self._state.last: self.fit}
         self.stack.setCurrentWidget(pages.get(at, self.step))
         self.steps.mark(at)
 
-    def _show_acceptable(self) -> None:
-        self.buttons.set_acceptable(self.fit.may_accept)
-
     def _show_doing(self, doing: Doing) -> None:
-        # Reading settings anew takes a moment in which a field must not lose the focus.
+        # Reading settings again takes a moment in which a field must not lose the focus.
         self.settings.setEnabled(doing is Doing.OPENING or not doing.is_long)
 
-    def _show_trouble(self) -> None:
-        self.banner.say(self._state.trouble.value)
-        self.banner.action.setVisible(self._state.can_reconnect.value)
-
     def reject(self) -> None:
-        """Leave; what runs is stopped only when the person agrees."""
-        doing = self._state.doing.value
-        if doing.is_long and not self._may_stop():
+        """Leave; what runs is stopped only if the person agrees."""
+        if self._state.doing.value.is_long and not self._may_stop():
             return
         self._timer.stop()
         for stop in self._stops:
@@ -127,7 +131,7 @@ class CalibrationWizard(QDialog):
         answer = QMessageBox.question(
             self,
             f"{self._state.title} is {self._state.doing.value.value}",
-            "Stop it and leave? Frames taken so far are kept, and the wizard goes on from here another time.",
+            "Stop it and leave? Frames taken so far are kept, and the wizard continues from here next time.",
         )
         return answer == QMessageBox.StandardButton.Yes
 
@@ -138,7 +142,145 @@ class CalibrationWizard(QDialog):
 
 
 def _fitting(room: QSize) -> QSize:
-    """A size for a wizard over a window: most of it, its edges still seen."""
+    """A size for a wizard over a window: most of it, with its edges still visible."""
     most = QSize(round(0.84 * room.width()), round(0.88 * room.height()))
     inside = QSize(room.width() - 40, room.height() - 40)
     return most.expandedTo(USUAL).boundedTo(inside).expandedTo(SMALLEST)
+
+
+class PageList(QListWidget):
+    """The pages of a wizard: settings, steps, fit; ``chosen`` tells the page that a person chose."""
+
+    chosen = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._theme, self._lines = DARK, tuple[PageLine, ...]()
+        self.setAccessibleName("Steps")
+        self.setToolTip("Steps of this calibration: ○ to capture, ✓ captured, ✗ refused")
+        self.setFixedWidth(LIST_PX)
+        self.setSpacing(2)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.currentRowChanged.connect(self._choose)
+
+    def _choose(self, row: int) -> None:
+        if row >= 0:
+            self.chosen.emit(row)
+
+    def show_pages(self, lines: tuple[PageLine, ...]) -> None:
+        """Show where every step stands; the current page stays."""
+        self._lines = lines
+        row = self.currentRow()
+        self.blockSignals(True)
+        self.clear()
+        colours = {"good": self._theme.good, "bad": self._theme.bad}
+        for line in lines:
+            item = QListWidgetItem(line.text)
+            item.setForeground(QColor(colours.get(line.role, self._theme.text)))
+            item.setToolTip(line.tip)
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, line.accessible_text)
+            self.addItem(item)
+        self.setCurrentRow(max(row, 0))
+        self.blockSignals(False)
+
+    def mark(self, page: int) -> None:
+        """Show a page as the current one."""
+        self.blockSignals(True)
+        self.setCurrentRow(page)
+        self.blockSignals(False)
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.show_pages(self._lines)
+
+
+class WizardButtons(QWidget):
+    """The buttons of every page, and above them what the wizard is doing."""
+
+    def __init__(self, state: WizardState, commands: WizardController) -> None:
+        super().__init__()
+        self._state, self._commands = state, commands
+        self.leave = _button("&Leave", "Close; captures and fits are kept, and nothing accepted changes")
+        self.back = _button("&Back", "Show the previous page")
+        self.check = _button("Chec&k", "Look repeatedly whether the target is right")
+        self.check.setCheckable(True)
+        self.all = _button("Capture a&ll", "Place, look at and capture every step that is left, then fit")
+        self.capture = _button("&Capture", "")
+        self.stop = _button("&Stop", "Stop at the next safe point; frames taken so far are kept")
+        self.next = _button("&Next", "Show the next page")
+        self.discard = _button("&Discard fit", "Discard this fit; captures and what was accepted are kept")
+        self.fit = _button("&Fit", "Calibrate from the captures of all steps")
+        self.accept = _button("&Accept", "Make this fit the campaign's calibration and write the rig")
+        self._text = label("", "muted")
+        self._text.setAccessibleName("Current activity")
+        self._bar = QProgressBar()
+        self._bar.setAccessibleName("Progress")
+        self._bar.setFixedWidth(BAR_PX)
+        # The page above must not jump when work begins.
+        policy = self._bar.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)
+        self._bar.setSizePolicy(policy)
+        self._lay_out()
+        self._connect()
+
+    def _lay_out(self) -> None:
+        work = QHBoxLayout()
+        work.addWidget(self._text, 1)
+        work.addWidget(self._bar)
+        row = QHBoxLayout()
+        row.addWidget(self.leave)
+        row.addStretch(1)
+        early = (self.back, self.check, self.discard, self.all, self.stop)
+        for button in (*early, self.capture, self.fit, self.accept, self.next):
+            row.addWidget(button)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(work)
+        column.addLayout(row)
+
+    def _connect(self) -> None:
+        state, commands = self._state, self._commands
+        self.back.clicked.connect(lambda: commands.go_to(state.at.value - 1))
+        self.next.clicked.connect(lambda: commands.go_to(state.at.value + 1))
+        self.check.clicked.connect(commands.check)
+        self.all.clicked.connect(commands.capture_all)
+        self.capture.clicked.connect(commands.capture)
+        self.stop.clicked.connect(commands.stop)
+        self.discard.clicked.connect(commands.discard)
+        self.fit.clicked.connect(commands.fit)
+        self.accept.clicked.connect(commands.accept)
+        self.stops = [
+            state.at.changed.connect(lambda _: self._show()),
+            state.doing.changed.connect(lambda _: self._show()),
+            state.statuses.changed.connect(lambda _: self._show()),
+            state.fit.changed.connect(lambda _: self._show()),
+            state.allowed.changed.connect(lambda _: self._show()),
+            state.look.changed.connect(lambda _: self._show()),
+            state.note.changed.connect(lambda _: self._show_activity()),
+            state.progress.changed.connect(lambda _: self._show_activity()),
+            state.is_checking.follow(self.check.setChecked),
+        ]
+        self._show()
+
+    def _show(self) -> None:
+        shown = buttons(self._state)
+        for each in fields(Buttons):
+            button, how = getattr(self, each.name), getattr(shown, each.name)
+            show_button(button, how)
+            if how.is_primary:
+                button.setDefault(True)
+        self._show_activity()
+
+    def _show_activity(self) -> None:
+        shown = activity(self._state)
+        self._bar.setVisible(shown.is_busy)
+        self._bar.setRange(0, shown.total)
+        self._bar.setValue(shown.done)
+        self._text.setText(shown.text)
+
+
+def _button(text: str, tip: str) -> QPushButton:
+    made = push_button(text, tip)
+    made.setAutoDefault(False)
+    return made

@@ -18,6 +18,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.shared.button_state import ButtonState
+
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
@@ -128,6 +130,17 @@ def push_button(text: str, tip: str) -> QPushButton:
     made = QPushButton(text)
     made.setToolTip(tip)
     return made
+
+
+def show_button(button: QPushButton, state: ButtonState) -> None:
+    """Draw a button as it was decided."""
+    if state.text is not None:
+        button.setText(state.text)
+    if state.tip is not None:
+        button.setToolTip(state.tip)
+    button.setVisible(state.is_visible)
+    button.setEnabled(state.is_enabled)
+    set_role(button, "primary" if state.is_primary else "")
 
 
 def set_role(widget: QWidget, role: str) -> None:

@@ -2,34 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 from dsl_app.calibrate.state import ABOUT, About, Row, RowState
+from dsl_core.campaign.assembly import campaign_recipes
 from dsl_core.campaign.common.captures import read_note
+from dsl_core.campaign.common.recipe import Recipe
+from dsl_core.campaign.recipes import recipe_names
 from dsl_core.errors import DslError
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.conditions import CaptureConditions, differences
 from dsl_core.model.figure import Figure, failures
 
+#: Calibrations older than this are ageing, days.
+AGEING_DAYS = 90
+#: Makes all recipes of a campaign, in order.
+Recipes = Callable[[CampaignFolder], Sequence[Recipe]]
 
-def read_rows(
-    campaign: CampaignFolder,
-    names: Sequence[str],
-    conditions: CaptureConditions | None,
-    ageing_days: int,
-    now: datetime,
-) -> tuple[Row, ...]:
-    """A row for each calibration of ``names``, in order; ``conditions`` are the rig's at hand, if any."""
-    rows: list[Row] = []
-    before: dict[str, str] = {}
-    for name in names:
-        row, accepted = _read(campaign, name, before, conditions, now - timedelta(days=ageing_days))
-        rows.append(row)
-        if accepted:
-            before[name] = accepted
-    return tuple(rows)
+
+def _utc_now() -> datetime:
+    return datetime.now(UTC)
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Which calibrations exist: their names in order, and how a campaign makes their recipes."""
+
+    names: tuple[str, ...] = ()
+    recipes: Recipes = campaign_recipes
+    ageing_days: int = AGEING_DAYS
+    clock: Callable[[], datetime] = _utc_now
+
+    def rows(self, folder: Path, conditions: CaptureConditions | None = None) -> tuple[Row, ...]:
+        """Where every calibration of a campaign stands, read from disk; raises `StoreError`.
+
+        ``conditions`` are those of the connected rig, if any.
+        """
+        campaign = CampaignFolder.open(folder)
+        now, ageing = self.clock(), timedelta(days=self.ageing_days)
+        rows: list[Row] = []
+        before: dict[str, str] = {}
+        for name in self.names or recipe_names():
+            row, accepted = _read(campaign, name, before, conditions, now, ageing)
+            rows.append(row)
+            if accepted:
+                before[name] = accepted
+        return tuple(rows)
 
 
 def _read(
@@ -37,7 +59,8 @@ def _read(
     name: str,
     before: Mapping[str, str],
     conditions: CaptureConditions | None,
-    oldest: datetime,
+    now: datetime,
+    ageing: timedelta,
 ) -> tuple[Row, str]:
     """The row of a calibration, and when it was accepted (empty: never)."""
     about = ABOUT.get(name, About(name, ""))
@@ -46,14 +69,14 @@ def _read(
         captured = count_captured(campaign, name)
     except DslError as error:
         return Row(name, about, RowState.DAMAGED, str(error)), ""
+    waiting = "A fit waits to be judged." if waits else ""
     if accepted is None:
         begun = captured > 0 or waits
-        reason = _candidate_words(waits) or (f"{captured} captured" if captured else "")
+        reason = waiting or (f"{captured} captured" if captured else "")
         state = RowState.BEGUN if begun else RowState.MISSING
         return Row(name, about, state, reason, captured=captured, has_candidate=waits), ""
-    state, reason = judge(accepted, before, conditions, oldest)
-    if waits:
-        reason = f"{reason} {_candidate_words(waits)}".strip()
+    state, reason = judge(accepted, before, conditions, now, ageing)
+    reason = f"{reason} {waiting}".strip()
     row = Row(name, about, state, reason, key_figure(accepted.figures), accepted.accepted, captured, waits)
     return row, accepted.accepted
 
@@ -62,9 +85,13 @@ def judge(
     accepted: AcceptedCalibration,
     before: Mapping[str, str],
     conditions: CaptureConditions | None,
-    oldest: datetime,
+    now: datetime,
+    ageing: timedelta,
 ) -> tuple[RowState, str]:
-    """How an accepted calibration stands, and why; ``before`` are those it should be based on."""
+    """How an accepted calibration stands, and why.
+
+    ``before`` says when those it should be based on were accepted; older than ``ageing`` is ageing.
+    """
     if conditions is not None and accepted.conditions is not None:
         found = differences(accepted.conditions, conditions)
         if found:
@@ -76,9 +103,9 @@ def judge(
     failed = failures(accepted.figures)
     if failed:
         return RowState.OUTSIDE, failed[0].advice
-    if accepted.accepted and datetime.fromisoformat(accepted.accepted) < oldest:
-        days = (datetime.now(UTC) - datetime.fromisoformat(accepted.accepted)).days
-        return RowState.AGEING, f"{days} days old. Check it for drift, or calibrate again."
+    age = now - datetime.fromisoformat(accepted.accepted) if accepted.accepted else timedelta(0)
+    if age > ageing:
+        return RowState.AGEING, f"{age.days} days old. Check it for drift, or calibrate again."
     return RowState.GOOD, ""
 
 
@@ -106,10 +133,6 @@ def count_captured(campaign: CampaignFolder, name: str) -> int:
         return 0
     notes = (read_note(folder) for folder in sorted(home.iterdir()) if folder.is_dir())
     return sum(note is not None and bool(note.finished) and not note.refused for note in notes)
-
-
-def _candidate_words(waits: bool) -> str:
-    return "A fit waits to be judged." if waits else ""
 
 
 def _title(name: str) -> str:

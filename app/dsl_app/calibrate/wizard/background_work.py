@@ -1,27 +1,35 @@
-"""What a wizard's jobs do in their thread: open, look, capture, fit, accept. No Qt."""
+"""What a wizard's jobs do in the background: open, look, capture, fit, accept. No Qt."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import threading
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
+from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
 from dsl_app.calibrate.wizard.state import Fit, Look, SettingRow
-from dsl_app.calibrate.wizard.watched_camera import WatchedCamera
 from dsl_core.campaign.common.recipe import Recipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession, StepStatus
-from dsl_core.devices.base import DeviceRig
+from dsl_core.capture.preview import MANY_SATURATED
+from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.figure import failures
+from dsl_core.model.frames import Frame
 from dsl_core.progress import Progress
 
-#: Makes all recipes of a campaign, in order.
-Recipes = Callable[[CampaignFolder], Sequence[Recipe]]
+#: Frames darker than this share of the brightest recent one are those between patterns; showing them flickers.
+DARK_SHARE = 0.5
+#: How long the brightest frame is remembered, s.
+MEMORY_S = 3.0
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,7 @@ class Captured:
     error: Exception | None = None
 
 
-class WizardWork:
+class BackgroundWork:
     """One calibration on open devices; `open` comes first. Only one job at a time may use it."""
 
     def __init__(self, name: str, path: Path, devices: DeviceRig, recipes: Recipes) -> None:
@@ -67,29 +75,29 @@ class WizardWork:
         return self._take(CampaignFolder.open(self._path))
 
     def change(self, values: Mapping[str, str], progress: Progress) -> Opened:
-        """Read it anew with other settings, which the campaign keeps if they are right."""
+        """Read it again with other settings, which the campaign keeps if they are right."""
         progress.report("read the campaign", 0, 0)
         campaign = CampaignFolder.open(self._path)
-        wanted = self._recipe(self._recipes(campaign))
-        rows = setting_rows(wanted, campaign.info.settings.get(self._name, {}))
+        recipe = self._recipe(self._recipes(campaign))
+        rows = setting_rows(recipe, campaign.info.settings.get(self._name, {}))
         changed = campaign.with_settings(self._name, changed_settings(rows, values))
         opened = self._take(changed)
         changed.save()
         return opened
 
     def _take(self, campaign: CampaignFolder) -> Opened:
-        everyone = self._recipes(campaign)
-        recipe = self._recipe(everyone)
-        session = CalibrationSession(recipe, self._devices, campaign, everyone)
+        recipes = self._recipes(campaign)
+        recipe = self._recipe(recipes)
+        session = CalibrationSession(recipe, self._devices, campaign, recipes)
         statuses = session.statuses()
-        # Nothing is taken over before all of it has proved right.
-        self._session, self._all = session, everyone
+        # Nothing is kept before all of it has been read.
+        self._session, self._all = session, recipes
         settings = setting_rows(recipe, campaign.info.settings.get(self._name, {}))
         places = self._devices.place is not None
         return Opened(recipe.title, statuses, settings, self._found(), places)
 
-    def _recipe(self, everyone: Sequence[Recipe]) -> Recipe:
-        return next(recipe for recipe in everyone if recipe.name == self._name)
+    def _recipe(self, recipes: Sequence[Recipe]) -> Recipe:
+        return next(recipe for recipe in recipes if recipe.name == self._name)
 
     def _found(self) -> Fit | None:
         """The fit that waits, else the accepted one that is good; None if its record cannot be read."""
@@ -103,14 +111,14 @@ class WizardWork:
             return None
 
     def place(self, step: Step) -> None:
-        """Let the rig place what it can by itself, once."""
+        """Let the rig place the target if it can, once for each step."""
         if self._placed != step.key:
             self._placed = ""
             self.session.place(step)
             self._placed = step.key
 
     def look(self, step: Step, progress: Progress) -> Look:
-        """Look once; what keeps from measuring is part of the look, a lost device is not."""
+        """Look once; a target that cannot be measured is part of the look, a lost device is an error."""
         progress.report(step.title, 0, 0)
         self.place(step)
         try:
@@ -118,16 +126,16 @@ class WizardWork:
         except CalibrationError as error:
             return Look(step.key, (), str(error))
 
-    def capture(self, step: Step, anew: bool, is_checked: bool, progress: Progress) -> Captured:
-        """Capture a step, or capture it anew; ``is_checked`` looks first and refuses what is not right.
+    def capture(self, step: Step, again: bool, is_checked: bool, progress: Progress) -> Captured:
+        """Capture a step, or capture it ``again``; ``is_checked`` looks first and refuses what is not right.
 
-        Says where all steps stand, whatever happens; only `Cancelled` passes.
+        Returns where all steps stand, whatever happens; only `Cancelled` is raised.
         """
         try:
             self.place(step)
             if is_checked:
                 _require_good(step, self.look(step, progress))
-            if anew:
+            if again:
                 self.session.redo(step, progress)
             else:
                 self.session.capture(step, progress)
@@ -154,7 +162,7 @@ class WizardWork:
         return write_products(campaign, rig, library_name, recipes=self._all, library=library)
 
     def discard(self) -> None:
-        """Forget the fit that waits."""
+        """Discard the fit that waits."""
         self.session.discard()
 
 
@@ -165,3 +173,53 @@ def _require_good(step: Step, look: Look) -> None:
     if wrong:
         advice = " ".join(f"{figure}: {figure.advice}" for figure in wrong)
         raise CalibrationError(f"The step {step.title!r} does not look right: {advice}")
+
+
+class WatchedCamera(Camera):
+    """A camera that passes every call on and keeps the latest frame worth showing."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+        self._lock = threading.Lock()
+        self._frame: Frame | None = None
+        self._best, self._best_at = 0.0, 0.0
+
+    @property
+    def info(self) -> CameraInfo:
+        """The camera's own."""
+        return self._camera.info
+
+    def configure(self, exposure_ms: float) -> float:
+        """Set the exposure."""
+        return self._camera.configure(exposure_ms)
+
+    def prepare(self, shot_index: int, attempt: int = 0) -> None:
+        """Tell the camera what the next frame is for."""
+        self._camera.prepare(shot_index, attempt)
+
+    def snap(self, timeout_ms: float = 5000.0) -> Frame:
+        """Take a frame and keep it to be shown."""
+        frame = self._camera.snap(timeout_ms)
+        worth, now = self._worth(frame), time.monotonic()
+        with self._lock:
+            if worth > self._best or now - self._best_at > MEMORY_S:
+                self._best, self._best_at = worth, now
+            if worth >= DARK_SHARE * self._best:
+                self._frame = frame
+        return frame
+
+    def _worth(self, frame: Frame) -> float:
+        """How well a frame shows the target: bright, but not saturated."""
+        thin = frame.pixels[::7, ::7]
+        saturated = float(np.mean(thin >= 2**self.info.bit_depth - 1))
+        return float(np.mean(thin)) * (0.01 if saturated > MANY_SATURATED else 1.0)
+
+    def take_frame(self) -> Frame | None:
+        """The latest frame since the last call; None without one."""
+        with self._lock:
+            frame, self._frame = self._frame, None
+        return frame
+
+    def close(self) -> None:
+        """Close the camera."""
+        self._camera.close()

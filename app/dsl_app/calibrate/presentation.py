@@ -1,0 +1,237 @@
+"""What the Calibrate page shows, computed from its state; its widgets only set it. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from html import escape
+
+from dsl_app.calibrate.state import CalibrateState, Row, RowState
+from dsl_app.shared.button_state import ButtonState
+from dsl_core.devices.base import DeviceRig
+from dsl_core.io.calibration_library import LibraryLine
+from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
+from dsl_core.model.conditions import CaptureConditions
+from dsl_core.model.figure import Figure
+
+CAMPAIGN_HINT = (
+    "No campaign is open. A campaign is a folder that keeps all captures, fits and verdicts of one rig."
+    " Begin a new one, or open one that was begun before."
+)
+NO_VERSION = (
+    "<p>The library is empty. It keeps every calibrated rig of this computer, dated and never overwritten:"
+    " calibrate everything of a campaign, keep one in the library, or import a file.</p>"
+)
+_ROLES = {
+    RowState.MISSING: "muted",
+    RowState.GOOD: "good",
+    RowState.OTHER_RIG: "bad",
+    RowState.DAMAGED: "bad",
+}
+
+
+# The campaign ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CampaignHead:
+    """The head of the page: which campaign is open, how far everything is, and the buttons."""
+
+    title: str
+    place: str
+    progress: str
+    progress_role: str
+    new: ButtonState
+    open: ButtonState
+    keep: ButtonState
+    cancel: ButtonState
+    everything: ButtonState
+
+
+def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignHead:
+    """The head of the page while these devices are connected (None: no rig is)."""
+    facts, progress = state.campaign.value, state.everything.value
+    is_running = bool(progress)
+    usable = facts is not None and devices is not None and not state.foreign.value and not is_running
+    has_accepted = any(row.state.is_accepted for row in state.rows.value)
+    places_itself = devices is not None and devices.place is not None
+    title, place = "Calibrate", CAMPAIGN_HINT
+    if facts is not None:
+        # Zero-width spaces let long paths break at their slashes.
+        folder = str(facts.path.parent).replace("/", "/" + chr(0x200B))
+        title, place = facts.path.name, f"in {folder}  ·  rig {facts.rig.words}"
+    return CampaignHead(
+        title,
+        place,
+        progress,
+        "warn" if progress == "stopping" else "muted",
+        new=ButtonState(is_enabled=not is_running),
+        open=ButtonState(is_enabled=not is_running),
+        keep=ButtonState(facts is not None and not is_running, usable and has_accepted),
+        cancel=ButtonState(is_running),
+        everything=ButtonState(not is_running, usable and places_itself, is_primary=True),
+    )
+
+
+# One calibration -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class RowDisplay:
+    """A calibration of the campaign in words; roles are those of the style sheet."""
+
+    state: str
+    state_role: str
+    figure: str
+    figure_role: str
+    date: str
+    reason: str
+    accessible_name: str
+    run: ButtonState
+    run_name: str
+
+
+def row_display(row: Row, is_busy: bool = False) -> RowDisplay:
+    """A row of the page; while ``is_busy`` no wizard can be opened."""
+    title, figure = row.about.title, row.figure
+    begun = row.state is RowState.BEGUN or row.has_candidate
+    word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
+    tip = f"Open the wizard of {title}, which continues where it was left"
+    return RowDisplay(
+        state=f"● {row.state.value}",
+        state_role=_ROLES.get(row.state, "warn"),
+        figure="" if figure is None else figure_words(figure),
+        figure_role="" if figure is None or figure.passed else "bad",
+        date=short_date(row.accepted),
+        reason=row.reason,
+        accessible_name=f"{title}: {row.state.value}. {row.reason}".strip(),
+        run=ButtonState(is_enabled=not is_busy, text=word, tip=tip),
+        run_name=f"{word.rstrip('…')} {title}",
+    )
+
+
+def figure_words(figure: Figure) -> str:
+    """A figure against its limits in one line, such as ``camera error 0.051 px (at most 0.5)``."""
+    limits = figure.limits.replace("-", "−")
+    return f"{figure.name} {value_words(figure)}" + (f"  ({limits})" if limits else "")
+
+
+def value_words(figure: Figure) -> str:
+    """Value ± standard deviation and unit, with a typographic minus.
+
+    >>> value_words(Figure(name="shift", value=-1.25, std=0.04, unit="nm"))
+    '−1.250 ± 0.040 nm'
+    >>> value_words(Figure(name="corners", value=77.0, unit=""))
+    '77'
+    """
+    if figure.std is None and figure.unit == "" and figure.value == round(figure.value):
+        return f"{figure.value:.0f}".replace("-", "−")
+    return str(figure).removeprefix(figure.name).strip().replace("-", "−")
+
+
+def short_date(time: str) -> str:
+    """A time of ISO 8601 to the minute, in local time; empty stays empty."""
+    return _local(datetime.fromisoformat(time)) if time else ""
+
+
+def _local(time: datetime) -> str:
+    return time.astimezone().strftime("%Y-%m-%d %H:%M")
+
+
+# The library -----------------------------------------------------------------------------------------
+
+
+def version_texts(line: LibraryLine, in_use: str) -> tuple[str, ...]:
+    """The cells of a version: name, date, use, camera, projector, figures outside limits.
+
+    ``in_use`` is the key of the calibration that scans use.
+    """
+    used = in_use in (f"{line.name}@{line.stamp}", line.name if line.is_current else "")
+    use = "scans" if used else ("current" if line.is_current else "")
+    stored = stamp_date(line.stamp)
+    if line.entry is None:
+        return line.name, stored, use, "damaged", "", ""
+    rig = line.entry.rig
+    missed = [str(figure) for note in rig.calibrations for figure in note.failed]
+    return (
+        line.name,
+        stored,
+        use,
+        f"{rig.provenance.camera_serial or '–'}, {rig.camera.width_px} × {rig.camera.height_px} px",
+        rig.provenance.projector_serial or "–",
+        ", ".join(missed) or "none",
+    )
+
+
+def stamp_date(stamp: str) -> str:
+    """When a version was stored, in local time; a stamp that is not a time stays."""
+    try:
+        return _local(datetime.strptime(f"{stamp}+0000", "%Y%m%d-%H%M%S-%f%z"))
+    except ValueError:
+        return stamp
+
+
+@dataclass(frozen=True)
+class LibrarySelection:
+    """The selected version: its key (a name, or NAME@STAMP), details as HTML, and what can be done."""
+
+    key: str = ""
+    details: str = NO_VERSION
+    can_use: bool = False
+    can_restore: bool = False
+
+
+def library_selection(line: LibraryLine | None) -> LibrarySelection:
+    """What is shown of a version; None for no selection."""
+    if line is None:
+        return LibrarySelection()
+    key = line.name if line.is_current else f"{line.name}@{line.stamp}"
+    is_readable = line.entry is not None
+    return LibrarySelection(key, _details(line), is_readable, is_readable and not line.is_current)
+
+
+def _details(line: LibraryLine) -> str:
+    if line.entry is None:
+        return f"<p><b>{escape(line.name)}</b></p><p>{escape(line.error)}</p>"
+    rig = line.entry.rig
+    settings = {each.name: each for each in line.entry.accepted}
+    parts = [f"<p><b>{escape(line.name)}</b><br>{escape(rig.provenance.notes)}</p>"]
+    parts.append(_conditions(rig.conditions))
+    parts += [_calibration(note, settings.get(note.name)) for note in rig.calibrations]
+    return "".join(parts)
+
+
+def _conditions(known: CaptureConditions | None) -> str:
+    if known is None:
+        return "<p>The settings of its captures were not recorded.</p>"
+    camera, projector = known.camera, known.projector
+    region = "whole sensor" if camera.region_px is None else "region {} {} {} {} px".format(*camera.region_px)
+    rows = (
+        ("Camera", f"{camera.model}, {camera.serial}"),
+        (
+            "Readout",
+            f"{camera.size_px[0]} × {camera.size_px[1]} px, {region}, binning {camera.binning},"
+            f" {camera.gain_db:g} dB, {camera.bit_depth} bits",
+        ),
+        ("Projector", f"{projector.model}, {projector.serial}"),
+        (
+            "Projected",
+            f"{projector.size_px[0]} × {projector.size_px[1]} px, {projector.frame_period_ms:.3f} ms"
+            + (f", {projector.mode}" if projector.mode else ""),
+        ),
+    )
+    cells = "".join(f"<tr><td>{name}&nbsp;&nbsp;</td><td>{escape(text)}</td></tr>" for name, text in rows)
+    return f"<table>{cells}</table>"
+
+
+def _calibration(note: CalibrationNote, accepted: AcceptedCalibration | None) -> str:
+    lines = [
+        ("✓ " if figure.passed else "✗ ") * bool(figure.limits) + escape(figure_words(figure))
+        for figure in note.figures
+    ]
+    if accepted is not None:
+        own = (f"{key} {value}" for key, value in accepted.settings.items() if key != "rig")
+        text = escape("; ".join(own))
+        lines += [f"<i>{text}</i>"] if text else []
+    head = f"<b>{escape(note.title)}</b>, {short_date(note.accepted)}"
+    return f"<p>{head}<br>{'<br>'.join(lines)}</p>"

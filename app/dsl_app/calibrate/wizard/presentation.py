@@ -1,0 +1,240 @@
+"""What a wizard's window shows, computed from its state; its widgets only set it. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from dsl_app.calibrate.wizard.state import Doing, Fit, Told, WizardState
+from dsl_app.shared.button_state import ButtonState
+from dsl_app.shared.notify import describe_seconds
+from dsl_core.campaign.session import State
+from dsl_core.model.figure import Figure, failures
+from dsl_core.model.placement import Placement
+
+#: A sentence and its role of the style sheet.
+Verdict = tuple[str, str]
+#: The buttons of which one is the main one at any time.
+Main = Literal["next", "all", "capture", "fit", "accept", "leave"]
+_MARKS: dict[State, str] = {"missing": "○", "captured": "✓", "refused": "✗"}
+_MARK_ROLES = {"✓": "good", "✗": "bad"}
+
+
+# The buttons -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Buttons:
+    """The row of buttons below every page; exactly one is primary, which the return key presses."""
+
+    leave: ButtonState
+    back: ButtonState
+    check: ButtonState
+    all: ButtonState
+    capture: ButtonState
+    stop: ButtonState
+    next: ButtonState
+    discard: ButtonState
+    fit: ButtonState
+    accept: ButtonState
+
+
+def buttons(state: WizardState) -> Buttons:
+    """The buttons of the current page."""
+    doing, fit, main = state.doing.value, state.fit.value, main_button(state)
+    on_fit, on_step, idle = state.at.value == state.last, state.status is not None, not doing.is_long
+    can_stop = doing in (Doing.CAPTURING, Doing.FITTING, Doing.STOPPING)
+    has_candidate = fit is not None and not fit.is_accepted
+    is_done = on_fit and fit is not None and fit.is_accepted
+    capture, capture_tip = _capture_text(state)
+    return Buttons(
+        leave=ButtonState(is_primary=main == "leave", text="&Close" if is_done else "&Leave"),
+        back=ButtonState(is_enabled=state.at.value > 0 and idle),
+        check=ButtonState(on_step and not can_stop, idle),
+        all=ButtonState(
+            state.places_itself.value and bool(state.lacking) and not can_stop, idle, main == "all"
+        ),
+        capture=ButtonState(on_step and not can_stop, idle, main == "capture", capture, capture_tip),
+        stop=ButtonState(can_stop, doing is not Doing.STOPPING),
+        next=ButtonState(not on_fit, idle, main == "next"),
+        discard=ButtonState(on_fit and has_candidate and not can_stop, idle),
+        fit=ButtonState(
+            on_fit and not can_stop,
+            idle and not state.lacking,
+            main == "fit",
+            "&Fit" if fit is None else "&Fit again",
+        ),
+        accept=ButtonState(on_fit and not can_stop, idle and state.may_accept, main == "accept"),
+    )
+
+
+def main_button(state: WizardState) -> Main:
+    """The button that continues from the current page."""
+    status, fit = state.status, state.fit.value
+    if status is not None and status.state != "captured":
+        return "all" if state.places_itself.value else "capture"
+    if state.at.value != state.last:
+        return "next"
+    if fit is None:
+        return "fit"
+    return "leave" if fit.is_accepted else "accept"
+
+
+def _capture_text(state: WizardState) -> tuple[str, str]:
+    status, look = state.status, state.look.value
+    if status is not None and status.state == "captured":
+        return "&Redo this step", "Capture it again; the old capture is kept until the new one is complete"
+    if look is not None and not look.is_good:
+        return "&Capture anyway", "Capture although the look found something wrong"
+    return "&Capture", "Capture this step; everything is saved to disk at once"
+
+
+@dataclass(frozen=True)
+class Activity:
+    """The line above the buttons; ``total`` 0 means that the end is not known."""
+
+    text: str
+    is_busy: bool = False
+    done: int = 0
+    total: int = 0
+
+
+def activity(state: WizardState) -> Activity:
+    """What the wizard is doing, else what it did last."""
+    doing, told = state.doing.value, state.progress.value
+    if not doing.is_long:
+        return Activity(state.note.value, done=told.done, total=told.total)
+    return Activity(_activity_text(doing, told), True, told.done, told.total)
+
+
+def _activity_text(doing: Doing, told: Told) -> str:
+    if doing is Doing.STOPPING:
+        return "stopping at the next safe point"
+    parts = [told.stage or doing.value]
+    if told.total:
+        parts.append(f"{told.done} of {told.total}")
+        if told.remaining_s is not None and told.remaining_s >= 2:
+            parts.append(f"{describe_seconds(told.remaining_s)} left")
+    return " · ".join(parts)
+
+
+# The list of pages -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PageLine:
+    """A line of the list at the left; ``role`` colours it, empty for plain text."""
+
+    text: str
+    tip: str
+    accessible_text: str
+    role: str = ""
+
+
+def page_lines(state: WizardState) -> tuple[PageLine, ...]:
+    """Settings, steps with their state, fit."""
+    has_fit = state.fit.value is not None
+    lines = [PageLine("⚙  Settings", "Settings", "Settings")]
+    for each in state.statuses.value:
+        lines.append(_line(_MARKS[each.state], each.step.title, each.state, each.reason))
+    fitted = "fitted" if has_fit else "not fitted"
+    return (*lines, _line("✓" if has_fit else "○", "Fit and judge", fitted))
+
+
+def _line(mark: str, title: str, state: str, reason: str = "") -> PageLine:
+    role = _MARK_ROLES.get(mark, "")
+    return PageLine(f"{mark}  {title}", f"{title}: {reason or state}", f"{title}, {state}", role)
+
+
+# A step ----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class StepDisplay:
+    """What to place where, what the look found, and whether that is right."""
+
+    title: str
+    instruction: str
+    placement: Placement
+    figures: tuple[Figure, ...]
+    verdict: str
+    role: str
+
+
+def step_display(state: WizardState) -> StepDisplay | None:
+    """The step that is shown; None on the pages of settings and fit."""
+    status, look = state.status, state.look.value
+    if status is None:
+        return None
+    step = status.step
+    figures = () if look is None else look.figures
+    return StepDisplay(step.title, step.instruction, step.placement, figures, *_step_verdict(state))
+
+
+def _step_verdict(state: WizardState) -> Verdict:
+    status, look = state.status, state.look.value
+    if state.doing.value in (Doing.CAPTURING, Doing.STOPPING):
+        return "Capturing. Do not touch anything until it is done.", "warn"
+    if look is not None and look.trouble:
+        return look.trouble, "bad"
+    if look is not None and look.is_good:
+        return "Everything is right: capture.", "good"
+    if look is not None:
+        return "Not right yet; the table says what to do.", "warn"
+    if state.is_checking.value:
+        return "Looking…", "muted"
+    if status is not None and status.state == "captured":
+        return "✓ Captured. If you redo it, the old capture is kept until the new one is complete.", "good"
+    if status is not None and status.state == "refused":
+        return f"✗ Refused: {status.reason}", "bad"
+    return "Place the target, then check that it is right, or capture at once.", "muted"
+
+
+# The fit ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FitDisplay:
+    """The verdict on a fit, its figures, and whether a person may allow those outside their limits."""
+
+    verdict: str
+    role: str
+    figures: tuple[Figure, ...] = ()
+    has_fit: bool = False
+    can_allow: bool = False
+    is_allowed: bool = False
+    can_edit: bool = True
+
+
+def fit_display(state: WizardState) -> FitDisplay:
+    """The page of the fit; while something runs its evidence cannot be edited."""
+    fit, can_edit = state.fit.value, not state.doing.value.is_long
+    verdict, role = _fit_verdict(state)
+    if fit is None:
+        return FitDisplay(verdict, role, can_edit=can_edit)
+    figures = fit.fitted.figures
+    can_allow = not fit.is_accepted and bool(failures(figures))
+    is_allowed = can_allow and state.allowed.value == figures
+    return FitDisplay(verdict, role, figures, True, can_allow, is_allowed, can_edit)
+
+
+def _fit_verdict(state: WizardState) -> Verdict:
+    fit, lacking = state.fit.value, state.lacking
+    if state.doing.value is Doing.FITTING:
+        return "Fitting…", "muted"
+    if fit is not None:
+        return _verdict_on(fit)
+    if not lacking:
+        return "All steps are captured. Fit them to see how good they are.", "muted"
+    titles = [state.statuses.value[page - 1].step.title for page in lacking]
+    named = ", ".join(titles[:4]) + (f" and {len(titles) - 4} more" if len(titles) > 4 else "")
+    return f"Not all steps are captured yet: {named}.", "warn"
+
+
+def _verdict_on(fit: Fit) -> Verdict:
+    limited = [figure for figure in fit.fitted.figures if figure.limits]
+    wrong = len(failures(fit.fitted.figures))
+    count = f"{len(limited) - wrong} of {len(limited)} figures are within their limits."
+    if fit.is_accepted:
+        return f"✓ Accepted. {count}", "warn" if wrong else "good"
+    return (f"✗ {count}", "bad") if wrong else (f"✓ {count} Accept the fit to use it.", "good")
