@@ -26,7 +26,7 @@ from dsl_core.model.figure import failures
 from dsl_core.model.frames import Frame
 from dsl_core.progress import Progress
 
-#: Frames darker than this share of the brightest recent one are those between patterns; showing them flickers.
+#: Frames darker than this share of the brightest recent one are those between patterns; they would flicker.
 DARK_SHARE = 0.5
 #: How long the brightest frame is remembered, s.
 MEMORY_S = 3.0

@@ -83,7 +83,7 @@ class FitPage(QWidget):
     def _show_due_soon(self) -> None:
         call_deferred(self, self._take_turn)
 
-    def _call_deferred(self) -> None:
+    def _take_turn(self) -> None:
         # Making evidence takes as long as filling it: a turn each.
         if self._due is not None and self._evidence is None:
             self._make_evidence()

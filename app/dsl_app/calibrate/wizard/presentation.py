@@ -135,8 +135,7 @@ def page_lines(state: WizardState) -> tuple[PageLine, ...]:
     """Settings, steps with their state, fit."""
     has_fit = state.fit.value is not None
     lines = [PageLine("⚙  Settings", "Settings", "Settings")]
-    for each in state.statuses.value:
-        lines.append(_line(_MARKS[each.state], each.step.title, each.state, each.reason))
+    lines += [_line(_MARKS[s.state], s.step.title, s.state, s.reason) for s in state.statuses.value]
     fitted = "fitted" if has_fit else "not fitted"
     return (*lines, _line("✓" if has_fit else "○", "Fit and judge", fitted))
 
