@@ -96,7 +96,7 @@ def fresh(stage: Stage) -> None:
     wizard.drawn()
     stage.shoot("judge")
     wizard.press("Accept")
-    stage.wait(lambda: "The rig lies" in wizard.state.note.value)
+    stage.wait(lambda: "The rig is saved" in wizard.state.note.value)
     stage.shoot("accepted")
 
 

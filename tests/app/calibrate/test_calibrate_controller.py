@@ -153,12 +153,12 @@ def test_a_look_that_is_not_good_advises_and_repeats(bench: CalibrateBench) -> N
     assert look is not None
     assert not look.is_good
     assert look.figures[0].advice == "Move the target closer."
-    control._looking._looked_at -= 10.0
+    control._looked_at -= 10.0
     control.take_news()
     assert state.look.value is not look
     control.check(False)
     now = state.look.value
-    control._looking._looked_at -= 10.0
+    control._looked_at -= 10.0
     control.take_news()
     assert state.look.value is now, "it looked although nobody wants it to"
 
@@ -485,7 +485,7 @@ def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) 
     bench.control.library.check("other")
     assert "the projector's mode was 6500 K and is not named" in bench.told
     assert bench.state.drift.value is None
-    assert set(bench.notifier.offers) == {"Check all the same"}
+    assert set(bench.notifier.offers) == {"Check anyway"}
     bench.rig.disconnect()
     bench.control.library.check("other")
     assert "No rig is connected" in bench.told
@@ -507,7 +507,7 @@ def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(plane: CalibrateB
     verdict = plane.state.drift.value
     assert verdict is not None, plane.told
     assert {figure.name for figure in verdict.figures} >= {"row drift"}
-    assert "The rig is as own says." in plane.state.note.value
+    assert "The rig matches the calibration own." in plane.state.note.value
 
 
 def test_a_check_in_spite_of_other_settings_says_which(plane: CalibrateBench) -> None:
@@ -518,7 +518,7 @@ def test_a_check_in_spite_of_other_settings_says_which(plane: CalibrateBench) ->
     plane.library.store("own", other)
     plane.control.library.check("own")
     assert "the camera's gain (dB) was 6 and is 0" in plane.told
-    plane.notifier.offers["Check all the same"]()
+    plane.notifier.offers["Check anyway"]()
     verdict = plane.state.drift.value
     assert verdict is not None, plane.told
     assert verdict.overridden == ("the camera's gain (dB) was 6 and is 0",)

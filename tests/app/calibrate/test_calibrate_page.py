@@ -131,7 +131,7 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     assert wizard.step.instruction.text() == "Place the dim target."
     assert not buttons.all.isVisible()
     click(buttons.check)
-    stage.wait(lambda: "All is right" in wizard.step.verdict.text())
+    stage.wait(lambda: "Everything is right" in wizard.step.verdict.text())
     assert wizard.step.figures.rowCount() == 1
     click(buttons.capture)
     stage.wait(lambda: state.at.value == 2 and state.doing.value is Doing.IDLE)
@@ -143,7 +143,7 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     assert cell(wizard.fit.figures, 0, 1) == "brightest"
     assert "within their limits" in wizard.fit.verdict.text()
     click(buttons.accept)
-    stage.wait(lambda: "The rig lies in" in state.note.value)
+    stage.wait(lambda: "The rig is saved in" in state.note.value)
     assert buttons.leave.text() == "&Close"
     click(buttons.leave)
     stage.wait(lambda: stage.bench.row("selftest").state is RowState.GOOD)
@@ -167,7 +167,7 @@ def test_a_calibration_by_keys_alone(stage: Stage) -> None:
     QTest.keyClick(wizard, Qt.Key.Key_Return)
     stage.wait(lambda: state.fit.value is not None and state.doing.value is Doing.IDLE)
     QTest.keyClick(wizard, Qt.Key.Key_A, Qt.KeyboardModifier.AltModifier)
-    stage.wait(lambda: "The rig lies in" in state.note.value)
+    stage.wait(lambda: "The rig is saved in" in state.note.value)
     QTest.keyClick(wizard, Qt.Key.Key_F1)
     assert any(w.windowTitle().startswith("Help") for w in wizard.findChildren(QWidget))
     QTest.keyClick(wizard, Qt.Key.Key_Escape)

@@ -151,7 +151,7 @@ class Session:
         wait(lambda: state.doing.value is Doing.IDLE, "the wizard to rest")
         assert not state.trouble.value, state.trouble.value
         click(buttons.accept)
-        wait(lambda: "The rig lies in" in state.note.value, "the rig to be written")
+        wait(lambda: "The rig is saved in" in state.note.value, "the rig to be written")
         name = state.name
         click(buttons.leave)
         page = self.window.page_of("calibrate")
