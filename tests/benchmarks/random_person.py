@@ -166,7 +166,7 @@ class RandomPerson:
         self.rest()
         state, control = page._state, self._composition._scans
         assert control is not None
-        control.leave_session()
+        control.plan_new_scan()
         control.plans.choose_preset("preview")
         control.plans.set_target(self._home / "scans" / f"scan-{self.scans}.dsl")
         state.then_reconstruct.set(True)

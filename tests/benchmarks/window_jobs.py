@@ -145,7 +145,7 @@ class WindowJobs:
         with self._job("scan, its first frames"):
             self._wait(lambda: state.status.value.done > 8)
         self._cancel("scan", control.cancel, lambda: state.phase.value is Phase.STOPPED)
-        control.leave_session()
+        control.plan_new_scan()
         control.plans.choose_preset("preview")
         control.point_at((60, 40))
         with self._job("scan"):

@@ -103,7 +103,7 @@ def forecast(stage: Stage) -> None:
     stage.open()
     scan = planned_scan(stage)
     stage.shoot("not-yet")
-    control = scan.page.forecast._commands
+    control = scan.page.forecast._controller
     assert isinstance(control, ForecastController)
     # Every sixth plan shows what all of them would.
     control._candidates = lambda rig: islice(usual_candidates(rig), 0, None, 6)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice
+from dsl_app.scan.command_line import fresh_target
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import Phase
-from dsl_app.scan.words import fresh_target
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_core.errors import Cancelled, DslError
@@ -138,14 +138,14 @@ class DemoController:
         if scans.state.phase.value.is_busy:
             self._notifier.tell("info", "A scan is running already.")
             return
-        scans.leave_session()
+        scans.plan_new_scan()
         scans.plans.choose_preset(LIVE_PRESET)
         scans.plans.set_target(fresh_target(self._folder, self._clock()))
         scans.state.then_reconstruct.set(True)
         scans.start()
         if scans.state.phase.value is Phase.PLANNING:
             # It was refused: what a person starts instead goes where their scans go.
-            scans.leave_session()
+            scans.plan_new_scan()
 
 
 def take_demo(session: Path, progress: Progress) -> None:

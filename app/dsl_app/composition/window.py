@@ -219,6 +219,7 @@ class Composition(QObject):
         return page
 
     def _scan_page(self, window: MainWindow) -> PageWidget:
+        from dsl_app.scan.command_line import fresh_target
         from dsl_app.scan.controller import ScanController
         from dsl_app.scan.effects.controller import EffectsController
         from dsl_app.scan.effects.state import EffectsState
@@ -227,7 +228,6 @@ class Composition(QObject):
         from dsl_app.scan.forecast.state import ForecastState
         from dsl_app.scan.page import ScanPage
         from dsl_app.scan.state import Phase, ScanState
-        from dsl_app.scan.words import fresh_target
         from dsl_core.model.plan import CapturePlan
 
         parts = window.parts
@@ -262,7 +262,7 @@ class Composition(QObject):
             effects,
             window.open_path,
         )
-        page.again_wanted.connect(lambda: window.do("reconstruct_again"))
+        page.reconstruct_requested.connect(lambda: window.do("reconstruct_again"))
         page.apply_theme(window.theme)
         return page
 

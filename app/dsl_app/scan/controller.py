@@ -1,4 +1,4 @@
-"""What the Scan page decides: start, pause, resume, cancel, reconstruct. No Qt."""
+"""Start, pause, resume and cancel a scan, and reconstruct it. No Qt."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.connection.state import Link
-from dsl_app.scan.job import Order, ScanJob
+from dsl_app.scan.command_line import fresh_target, rig_words, scan_command
+from dsl_app.scan.job import ScanJob, ScanRequest
 from dsl_app.scan.plan import ScanPlanController
-from dsl_app.scan.rescue import Rescuer
-from dsl_app.scan.state import Interrupted, Phase, Rescue, ScanState
-from dsl_app.scan.words import fresh_target, rig_words, scan_command
+from dsl_app.scan.reconnect import Reconnector
+from dsl_app.scan.state import InterruptedScan, Phase, Reconnection, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
@@ -26,13 +26,13 @@ from dsl_core.io.scan.origin import rig_notes
 from dsl_core.progress import Progress
 
 _PHASES = {State.RUNNING: Phase.RUNNING, State.PAUSED: Phase.PAUSED, State.CANCELLING: Phase.STOPPING}
-_BUSY = "A scan is running. Wait for its end, or cancel it first; frames taken so far are kept."
+_BUSY = "A scan is running. Wait until it ends, or cancel it; frames captured so far are kept."
 
 
 class ScanController:
-    """Plans and runs one scan at a time; `take_news` brings what happened in the job to the state.
+    """Plans and runs one scan at a time; `take_news` copies what happened in the job to the state.
 
-    ``hidden`` is a folder of the program itself, such as the demo's: no scan goes there unless it is told to.
+    ``hidden`` is a folder of the program itself, such as the demo's: scans are saved there only on request.
     """
 
     def __init__(
@@ -48,20 +48,20 @@ class ScanController:
     ) -> None:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
         self._clock, self._hidden = clock, hidden
-        #: Where the scans of a person go.
+        #: Where the person saves scans.
         self._folder = state.target.value.parent
         self._stop_following = state.target.changed.connect(self._keep_folder)
         self.plans = ScanPlanController(
             state, rig.state, runner, notifier, undo, library or CalibrationLibrary()
         )
-        self._rescuer = Rescuer(state, rig, notifier, self.start)
+        self._reconnector = Reconnector(state, rig, notifier, self.start)
         self._scan: ScanJob | None = None
         self._job: Job[Status] | None = None
 
     # Run -------------------------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Start the planned scan, or go on with the interrupted one."""
+        """Start the planned scan, or resume the interrupted one."""
         state, devices = self.state, self._rig.state.devices.value
         if state.phase.value.is_busy:
             self._notifier.tell("info", _BUSY)
@@ -73,9 +73,9 @@ class ScanController:
             return
         self._run(devices, state.interrupted.value)
 
-    def _run(self, devices: DeviceRig, session: Interrupted | None) -> None:
+    def _run(self, devices: DeviceRig, session: InterruptedScan | None) -> None:
         state, choice = self.state, self._rig.state.choice.value
-        order = Order(
+        request = ScanRequest(
             devices,
             state.plan.value,
             state.target.value if session is None else session.folder,
@@ -85,13 +85,13 @@ class ScanController:
             is_resumed=session is not None,
             check_drift=state.check_drift.value,
         )
-        self._scan = scan = ScanJob(order)
-        self._rescuer.forget()
+        self._scan = scan = ScanJob(request)
+        self._reconnector.forget()
         for text in (state.trouble, state.note):
             text.set("")
         state.phase.set(Phase.STARTING)
         self._job = Job(
-            f"Scan {order.folder.stem}",
+            f"Scan {request.folder.stem}",
             scan.work,
             self._finished,
             self._failed,
@@ -103,30 +103,30 @@ class ScanController:
             self._ended(Phase.PLANNING)
 
     def resume(self) -> None:
-        """Go on with the interrupted scan; a rig that was lost is connected before."""
-        if self.state.rescue.value is Rescue.NONE or self._rig.state.link.value is Link.OPEN:
+        """Resume the interrupted scan; a lost rig is reconnected first."""
+        if self.state.reconnection.value is Reconnection.NONE or self._rig.state.link.value is Link.OPEN:
             self.start()
         else:
-            self._rescuer.try_now()
+            self._reconnector.try_now()
 
     def stop_reconnecting(self) -> None:
-        """Leave a rig that was lost to the person at the window."""
-        self._rescuer.stop()
+        """Stop reconnecting a lost rig automatically."""
+        self._reconnector.stop()
 
     def pause(self) -> None:
         """Wait before the next frame."""
         if self._is_under_way() and self._scan is not None:
             self._scan.pause()
 
-    def go_on(self) -> None:
-        """Go on after `pause`."""
+    def unpause(self) -> None:
+        """Continue after `pause`."""
         if self._is_under_way() and self._scan is not None:
-            self._scan.go_on()
+            self._scan.unpause()
 
     def cancel(self) -> None:
-        """End before the next frame, or no longer wait for a lost rig; what is stored stays stored."""
-        if self.state.rescue.value.is_trying:
-            self._rescuer.stop()
+        """Stop before the next frame, or stop waiting for a lost rig; saved frames are kept."""
+        if self.state.reconnection.value.is_trying:
+            self._reconnector.stop()
         elif self._is_under_way() and self._job is not None:
             self.state.phase.set(Phase.STOPPING)
             self._job.cancel()
@@ -135,12 +135,12 @@ class ScanController:
         """Whether a scan can be paused or stopped; says so where there is none."""
         is_busy = self.state.phase.value.is_busy
         if not is_busy:
-            self._notifier.tell("info", "No scan is under way.")
+            self._notifier.tell("info", "No scan is running.")
         return is_busy
 
     def take_news(self) -> None:
-        """Hand what the job told since last time to who follows; called by the window's clock."""
-        self._rescuer.take_news()
+        """Copy what the job reported since the last call to the state; called by a timer."""
+        self._reconnector.take_news()
         scan = self._scan
         if scan is None:
             return
@@ -179,29 +179,29 @@ class ScanController:
         self.state.interrupted.set(None)
         self.state.finished.set(folder)
         self.state.check_drift.set(True)
-        self.state.note.set(f"All {status.total} frames are stored in {folder}.")
-        self._aim_anew()
+        self.state.note.set(f"All {status.total} frames are saved in {folder}.")
+        self._choose_target()
         self.plans.refresh()
         if self.state.then_reconstruct.value:
             self.reconstruct(folder)
 
     def _failed(self, error: Exception) -> None:
         folder = self._end(Phase.LOST)
-        self._offer_again(folder)
+        self._offer_to_resume(folder)
         session = self.state.interrupted.value
-        safe = f" {session.done} of {session.total} frames are safe in {folder}." if session else ""
+        safe = f" {session.done} of {session.total} frames are saved in {folder}." if session else ""
         story = f"The scan stopped: {sentence_of(error)}{safe}"
         self.state.trouble.set(story)
         self._notifier.tell("error", f"The scan {folder.name} was interrupted. The Scan page says why.")
         if isinstance(error, DeviceError) and not isinstance(error, DriftError):
             self._rig.lose(sentence_of(error))
-            self._rescuer.begin(story)
+            self._reconnector.begin(story)
 
     def _cancelled(self) -> None:
-        self._offer_again(self._end(Phase.STOPPED))
+        self._offer_to_resume(self._end(Phase.STOPPED))
 
-    def _offer_again(self, folder: Path) -> None:
-        """Offer to go on, as far as the session can be read."""
+    def _offer_to_resume(self, folder: Path) -> None:
+        """Offer to resume, if the scan can be read."""
         try:
             self._remember(folder)
         except DslError as error:
@@ -211,7 +211,7 @@ class ScanController:
     def _end(self, phase: Phase) -> Path:
         assert self._scan is not None
         self.take_news()
-        folder = self._scan.order.folder
+        folder = self._scan.request.folder
         self._ended(phase)
         return folder
 
@@ -223,12 +223,12 @@ class ScanController:
         if target.parent != self._hidden:
             self._folder = target.parent
 
-    def _aim_anew(self) -> None:
-        """Store the next scan beside those that a person took."""
+    def _choose_target(self) -> None:
+        """Name the next scan, in the folder where the person saves scans."""
         self.state.target.set(fresh_target(self._folder, self._clock()))
 
     def reconstruct(self, session: Path) -> None:
-        """Make the result of a complete scan, save it beside the scan and tell of it."""
+        """Reconstruct a complete scan, save the result next to it and report it."""
         target, before = session.with_suffix(".zarr"), self.state.note.value
         waiting = f"{before} Reconstructing…".strip()
 
@@ -240,14 +240,14 @@ class ScanController:
             return target
 
         def done(path: Path) -> None:
-            self.state.note.set(f"The result lies in {path}.")
+            self.state.note.set(f"The result is saved in {path}.")
             self.state.result.emit(path)
 
         def ended(how: str) -> None:
-            # Another scan may have something of its own to say meanwhile.
+            # Another scan may have set a note of its own meanwhile.
             if self.state.note.value == waiting:
-                again = f"Open {session.name} on the Results page to reconstruct it."
-                self.state.note.set(f"{before} The reconstruction {how}. {again}".strip())
+                retry = f"Open {session.name} on the Results page to reconstruct it."
+                self.state.note.set(f"{before} The reconstruction {how}. {retry}".strip())
 
         def failed(error: Exception) -> None:
             ended("failed")
@@ -261,10 +261,10 @@ class ScanController:
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", sentence_of(error))
 
-    # Sessions --------------------------------------------------------------------------------------
+    # Scans on disk --------------------------------------------------------------------------------------
 
     def open(self, path: Path) -> bool:
-        """Plan what a file says, or offer to go on with an interrupted scan; False for anything else."""
+        """Open a plan, or offer to resume an interrupted scan; False for anything else."""
         from dsl_core.io.file_names import MANIFEST_NAME
 
         if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
@@ -281,13 +281,13 @@ class ScanController:
             self._notifier.tell("error", str(error))
             return True
         if is_taken:
-            # What was said of another scan does not count for this one.
-            self._rescuer.forget()
+            # Messages about another scan do not apply to this one.
+            self._reconnector.forget()
             self.state.trouble.set("")
         return is_taken
 
     def _remember(self, folder: Path) -> bool:
-        """Offer to go on with a session that lacks frames; False when there is nothing to go on with."""
+        """Offer to resume a scan that lacks frames; False when there is nothing to resume."""
         from dsl_core.io.file_names import MANIFEST_NAME
         from dsl_core.io.scan.session import SessionReader
 
@@ -300,26 +300,26 @@ class ScanController:
         self.plans.take_plan(reader.plan)
         self.state.target.set(folder)
         self.state.interrupted.set(
-            Interrupted(folder, total - missing, total, rig_words(reader.manifest.notes))
+            InterruptedScan(folder, total - missing, total, rig_words(reader.manifest.notes))
         )
         self.plans.refresh()
         return True
 
-    def leave_session(self) -> None:
+    def plan_new_scan(self) -> None:
         """Plan a new scan; the interrupted one stays on disk."""
         if self.state.phase.value.is_busy:
             return
-        self._rescuer.forget()
+        self._reconnector.forget()
         self.state.interrupted.set(None)
         self.state.check_drift.set(True)
         self.state.phase.set(Phase.PLANNING)
         self.state.trouble.set("")
         self.state.note.set("")
-        self._aim_anew()
+        self._choose_target()
         self.plans.take_rig()
 
     def command_line(self) -> str:
-        """The command that takes this scan, or goes on with it."""
+        """The command that captures or resumes this scan."""
         state = self.state
         if state.interrupted.value is not None:
             skip = "" if state.check_drift.value else " --no-drift-check"
@@ -335,7 +335,7 @@ class ScanController:
         )
 
     def close(self) -> None:
-        """Follow the rig no more."""
+        """Disconnect from the rig's state."""
         self._stop_following()
-        self._rescuer.close()
+        self._reconnector.close()
         self.plans.close()

@@ -1,4 +1,4 @@
-"""A scan at work in a job's thread, and what the window may ask of it meanwhile."""
+"""A scan running in a job's thread, and what the window may ask of it meanwhile."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PICTURE_CELLS = 800
 
 
 @dataclass(frozen=True)
-class Order:
+class ScanRequest:
     """What to scan: with which devices, plan and calibration, and into which folder."""
 
     devices: DeviceRig
@@ -36,14 +36,14 @@ class Order:
 
 
 class ScanJob:
-    """Runs an order once; `work` belongs to the job's thread, everything else to the window's."""
+    """Runs a request once; `work` belongs to the job's thread, everything else to the window's."""
 
-    def __init__(self, order: Order) -> None:
-        self.order = order
+    def __init__(self, request: ScanRequest) -> None:
+        self.request = request
         self.token = CancelToken()
         self._lock = threading.Lock()
         self._runner: Runner | None = None
-        #: Of its own, as the runner tells news, for which the other is taken, under a lock too.
+        #: A lock of its own: the runner reports its status under a lock, and that takes the other one.
         self._pausing = threading.Lock()
         self._is_paused = False
         self._graphs: IntensityGraphs | None = None
@@ -53,25 +53,25 @@ class ScanJob:
     # In the job's thread ---------------------------------------------------------------------------
 
     def work(self, progress: Progress) -> Status:
-        """Take every missing frame; raises what the engine raises."""
+        """Capture every missing frame; raises what the engine raises."""
         from dsl_core import pipeline
         from dsl_core.workflows import scans
 
-        order = self.order
-        if order.is_resumed:
-            progress.report("compare with before", 0, 0)
-            devices, plan = scans.prepare_resume(order.devices, order.folder, order.check_drift)
+        request = self.request
+        if request.is_resumed:
+            progress.report("check for movement", 0, 0)
+            devices, plan = scans.prepare_resume(request.devices, request.folder, request.check_drift)
             notes = {}
         else:
             devices, overridden = self._calibrated()
-            plan, notes = order.plan, order.notes | overridden
+            plan, notes = request.plan, request.notes | overridden
         graphs = IntensityGraphs(plan, devices.camera.info.bayer)
-        if order.is_resumed:
+        if request.is_resumed:
             self._read_before(graphs, progress)
         self._graphs = graphs
         info = devices.camera.info
         with pipeline.open_scan(
-            devices, plan, order.folder, progress, notes, self.token,
+            devices, plan, request.folder, progress, notes, self.token,
             lambda shot, frame: self._watch(shot, frame, info),
         ) as runner:  # fmt: skip
             runner.listen(self._listen)
@@ -85,21 +85,21 @@ class ScanJob:
         """The devices with the calibration ordered, and what was overridden, as notes of the scan."""
         from dsl_core.devices.conditions import with_calibration
 
-        order = self.order
-        if order.calibration is None:
-            return replace(order.devices, calibration=None), {}
-        devices, overridden = with_calibration(order.devices, order.calibration, order.override)
+        request = self.request
+        if request.calibration is None:
+            return replace(request.devices, calibration=None), {}
+        devices, overridden = with_calibration(request.devices, request.calibration, request.override)
         return devices, {"calibration_overridden": "; ".join(overridden)} if overridden else {}
 
     def _read_before(self, graphs: IntensityGraphs, progress: Progress) -> None:
-        """Take the frames of earlier runs into the graphs."""
+        """Add the frames of earlier runs to the graphs."""
         from dsl_core.io.scan.session import SessionReader
 
-        reader = SessionReader(self.order.folder)
+        reader = SessionReader(self.request.folder)
         sound = reader.sound()
         there = [s for s in reader.plan.shots() if s.role == "spectral" and s.index in sound]
         for done, shot in enumerate(there):
-            progress.report("read what is there", done, len(there))
+            progress.report("read saved frames", done, len(there))
             graphs.add(shot, reader.read(shot))
 
     def _watch(self, shot: Shot, frame: Frame, camera: CameraInfo) -> None:
@@ -119,22 +119,22 @@ class ScanJob:
     # In the window's thread ------------------------------------------------------------------------
 
     def take_news(self) -> tuple[Status | None, LivePicture | None]:
-        """The latest status and picture since last time."""
+        """The latest status and picture since the last call."""
         with self._lock:
             news = self._status, self._picture
             self._status = self._picture = None
         return news
 
     def graph(self, pixel: tuple[int, int]) -> IntensityGraph | None:
-        """The intensity graph of a pixel as far as it is there."""
+        """The intensity graph of a pixel, as far as captured."""
         return None if self._graphs is None else self._graphs.graph(pixel)
 
     def pause(self) -> None:
-        """Wait before the next frame; one that is still being prepared waits before its first."""
+        """Wait before the next frame; a scan still in preparation waits before its first."""
         self._pause(True)
 
-    def go_on(self) -> None:
-        """Go on after `pause`."""
+    def unpause(self) -> None:
+        """Continue after `pause`."""
         self._pause(False)
 
     def _pause(self, on: bool) -> None:

@@ -1,4 +1,4 @@
-"""The Scan page: the plan at the left, what it costs and sees in the middle, the run at the right."""
+"""The Scan page: plan on the left, forecast and frames in the middle, run on the right."""
 
 from __future__ import annotations
 
@@ -17,14 +17,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.scan.commands import ScanCommands
-from dsl_app.scan.effects.panel import EffectsCommands, EffectsPanel
+from dsl_app.scan.controller import ScanController
+from dsl_app.scan.controls import banner_controls
+from dsl_app.scan.effects.controller import EffectsController
+from dsl_app.scan.effects.panel import EffectsPanel
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.panel import ForecastPanel
 from dsl_app.scan.plan_editor import PlanEditor
 from dsl_app.scan.run import CalibrationBox, RunBox, TargetBox
-from dsl_app.scan.state import Phase, Rescue, ScanState
+from dsl_app.scan.state import Phase, Reconnection, ScanState
 from dsl_app.scan.view import ScanView
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
@@ -33,36 +35,34 @@ from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.page import PageWidget
 
-#: How often news of the scan is fetched, ms: ten pictures a second look alive.
+#: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
 LEFT_PX, RIGHT_PX = 276, 292
-RESUME = "Go on at the next missing frame, after a look at whether anything moved"
-RECONNECT = "Open the rig again, and go on at the next missing frame after a look at whether anything moved"
 PLANS = "Plans and pattern sets (*.json)"
 
 
 class ScanPage(PageWidget):
-    """Follows a `ScanState` and asks a controller; ``open_result`` shows a finished scan elsewhere.
+    """Shows a `ScanState` and calls its controller; ``open_result`` shows a finished scan elsewhere.
 
-    ``again_wanted`` tells that the finished scan is to be reconstructed in another way.
+    ``reconstruct_requested`` asks to reconstruct the finished scan with other parameters.
     """
 
-    again_wanted = Signal()
+    reconstruct_requested = Signal()
 
     def __init__(
         self,
         state: ScanState,
-        commands: ScanCommands,
+        controller: ScanController,
         forecast: ForecastPanel,
         rendered: EffectsState,
-        effects: EffectsCommands,
+        effects: EffectsController,
         open_result: Callable[[Path], object],
     ) -> None:
         super().__init__()
-        self._state, self._commands, self._open_result = state, commands, open_result
+        self._state, self._controller, self._open_result = state, controller, open_result
         self.banner = Banner("Resume")
-        self.stop = self.banner.add_button("Stop trying")
-        self.stop.setToolTip("Connect the rig no more by itself; everything stored stays")
+        self.stop = self.banner.add_button("Stop reconnecting")
+        self.stop.setToolTip("Stop reconnecting the rig automatically; saved frames are kept")
         self.plan = PlanEditor()
         self.plan.setObjectName("scan-plan")
         for box in (self.plan.preset, self.plan.code, self.plan.patterns):
@@ -70,20 +70,20 @@ class ScanPage(PageWidget):
         set_help(self.plan, "scanning#the-plan")
         self.forecast = forecast
         set_help(self.forecast, "accuracy-against-time")
-        # Tabs behind the first are made when somebody looks.
-        self.view = Deferred(lambda: ScanView(state, commands))
+        # The other tabs are built when first shown.
+        self.view = Deferred(lambda: ScanView(state, controller))
         self.effects = Deferred(lambda: EffectsPanel(rendered, effects))
         set_help(self.effects, "effects-of-the-twin")
         self._rendered, self._effects = rendered, effects
-        self.calibration = CalibrationBox(state, commands)
+        self.calibration = CalibrationBox(state, controller)
         set_help(self.calibration, "calibrating#using-a-calibration")
-        self.target, self.run = TargetBox(state, commands), RunBox(state, commands)
+        self.target, self.run = TargetBox(state, controller), RunBox(state, controller)
         self.run.setObjectName("scan-run")
         set_help(self.target, "scanning#before-it-starts")
         set_help(self.run, "scanning#while-it-runs")
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(commands.take_news)
+        self._timer.timeout.connect(controller.take_news)
         self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
@@ -97,11 +97,11 @@ class ScanPage(PageWidget):
         self.middle = QTabWidget()
         self.middle.setDocumentMode(True)
         self.middle.tabBar().setDrawBase(False)
-        self.middle.tabBar().setAccessibleName("What is shown of the scan")
+        self.middle.tabBar().setAccessibleName("Views of the scan")
         for tab, title, tip in (
-            (self.forecast, "&Accuracy against time", "What plans are expected to reach, and what they take"),
-            (self.view, "&Frames", "What the scan sees while it runs"),
-            (self.effects, "&Effects", "What the simulated rig renders of all that light does"),
+            (self.forecast, "&Accuracy against time", "Expected accuracy and capture time of each plan"),
+            (self.view, "&Frames", "Frames while the scan runs"),
+            (self.effects, "&Effects", "Effects of light that the simulated rig renders"),
         ):
             self.middle.setTabToolTip(self.middle.addTab(tab, title), tip)
         row = QHBoxLayout()
@@ -113,14 +113,14 @@ class ScanPage(PageWidget):
         column.addLayout(row, 1)
 
     def _connect(self) -> None:
-        state, commands = self._state, self._commands
-        self.banner.action.clicked.connect(commands.resume)
-        self.stop.clicked.connect(commands.stop_reconnecting)
-        self.run.again.clicked.connect(self.again_wanted)
-        self.plan.preset_chosen.connect(commands.plans.choose_preset)
+        state, controller = self._state, self._controller
+        self.banner.action.clicked.connect(controller.resume)
+        self.stop.clicked.connect(controller.stop_reconnecting)
+        self.run.again.clicked.connect(self.reconstruct_requested)
+        self.plan.preset_chosen.connect(controller.plans.choose_preset)
         self.plan.plan_changed.connect(self._change_plan)
-        self.plan.open_wanted.connect(self._open_plan)
-        self.plan.save_wanted.connect(self._save_plan)
+        self.plan.open_requested.connect(self._open_plan)
+        self.plan.save_requested.connect(self._save_plan)
         self._stops = [
             *self.calibration.stops,
             *self.target.stops,
@@ -130,27 +130,27 @@ class ScanPage(PageWidget):
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.phase.follow(self._show_phase),
             state.trouble.follow(self.banner.say),
-            state.rescue.follow(self._show_rescue),
+            state.reconnection.follow(self._show_reconnection),
             state.result.connect(self._show_result),
             self._rendered.offered.follow(self._offer_effects),
         ]
 
     def _change_plan(self, plan: object) -> None:
-        self._commands.plans.change_plan(plan)  # type: ignore[arg-type]
-        # What was refused or rounded is shown as it is.
+        self._controller.plans.change_plan(plan)  # type: ignore[arg-type]
+        # Show what was refused or rounded.
         self._show_plan()
 
     def _open_plan(self) -> None:
         folder = str(self._state.target.value.parent)
         name, _ = QFileDialog.getOpenFileName(self, "Open a plan or a pattern set", folder, PLANS)
         if name:
-            self._commands.plans.open_plan(Path(name))
+            self._controller.plans.open_plan(Path(name))
 
     def _save_plan(self) -> None:
         proposed = str(self._state.target.value.parent / "plan.json")
         name, _ = QFileDialog.getSaveFileName(self, "Save the plan", proposed, PLANS)
         if name:
-            self._commands.plans.save_plan(Path(name))
+            self._controller.plans.save_plan(Path(name))
 
     def _show_plan(self) -> None:
         state = self._state
@@ -166,58 +166,59 @@ class ScanPage(PageWidget):
             self.middle.setCurrentWidget(self.view)
         self._keep_time()
 
-    def _show_rescue(self, rescue: Rescue) -> None:
-        self.banner.action.setText("Reconnect and resume" if rescue.is_away else "Resume")
-        self.banner.action.setToolTip(RECONNECT if rescue.is_away else RESUME)
-        self.banner.action.setEnabled(rescue is not Rescue.RESUMING)
-        self.stop.setVisible(rescue.is_trying)
+    def _show_reconnection(self, reconnection: Reconnection) -> None:
+        shown = banner_controls(reconnection)
+        self.banner.action.setText(shown.action)
+        self.banner.action.setToolTip(shown.tip)
+        self.banner.action.setEnabled(shown.is_enabled)
+        self.stop.setVisible(shown.can_stop)
         self._keep_time()
 
     def _keep_time(self) -> None:
-        """Fetch news while there may be some."""
-        if self._state.phase.value.is_busy or self._state.rescue.value.is_trying:
+        """Fetch the state of the scan while it may change."""
+        if self._state.phase.value.is_busy or self._state.reconnection.value.is_trying:
             self._timer.start()
         else:
             self._timer.stop()
 
     def _offer_effects(self, on: bool) -> None:
-        """Only a simulated rig can leave out what light does."""
+        """Show the Effects tab for simulated rigs only."""
         self.middle.setTabVisible(self.middle.indexOf(self.effects), on)
 
     def _show_result(self, path: Path) -> None:
-        # Who works elsewhere meanwhile is not torn away.
+        # Do not interrupt somebody who works on another page.
         if self.isVisible():
             self._open_result(path)
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Disks and libraries change while nobody looks."""
+        """Refresh what may have changed on disk."""
         super().showEvent(event)
         if not self._state.phase.value.is_busy:
-            self._commands.plans.refresh()
-            self._commands.plans.load_library()
+            self._controller.plans.refresh()
+            self._controller.plans.load_library()
 
     def subject(self) -> Path | None:
-        """The scan that was finished last."""
+        """The scan finished last."""
         return self._state.finished.value
 
     def open_path(self, path: Path) -> bool:
-        """Take an interrupted scan, a plan or a pattern set."""
-        return self._commands.open(path)
+        """Open an interrupted scan, a plan or a pattern set."""
+        return self._controller.open(path)
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
         """What the buttons do, for menus and keys."""
         return {
-            "scan_start": self._commands.resume,
+            "scan_start": self._controller.resume,
             "scan_pause": self.run.toggle_pause,
-            "scan_stop": self._commands.cancel,
+            "scan_stop": self._controller.cancel,
         }
 
     def command_line(self) -> str:
-        """The command that takes this scan."""
-        return self._commands.command_line()
+        """The command that captures this scan."""
+        return self._controller.command_line()
 
     def figure(self) -> Figure | None:
-        """What accuracy costs in time, once that is predicted."""
+        """The curve of accuracy against time, once predicted."""
         curve = self.forecast.curve.made
         if curve is None or not curve.front():
             return None
@@ -229,7 +230,7 @@ class ScanPage(PageWidget):
             part.apply_theme(theme)
 
     def release(self) -> None:
-        """Follow nothing more; the runner ends the scan, whose frames are safe."""
+        """Disconnect from all state; the job runner stops the scan, whose frames are saved."""
         self._timer.stop()
         for stop in self._stops:
             stop()
@@ -238,7 +239,7 @@ class ScanPage(PageWidget):
             if part is not None:
                 part.release()
         self._effects.close()
-        self._commands.close()
+        self._controller.close()
 
 
 def _side(width_px: int, *boxes: QWidget) -> QScrollArea:

@@ -1,36 +1,52 @@
-"""What is scanned before it is: presets, plan, target, calibration, and what they take. No Qt."""
+"""The next scan: its plan, target and calibration, what it costs and what prevents it. No Qt."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from dsl_app.connection.state import RigState
-from dsl_app.scan.facts import find_facts
-from dsl_app.scan.plan_files import read_plan
-from dsl_app.scan.state import OWN_CALIBRATION, CalibrationChoice, Interrupted, Phase, ScanState, same_plan
+from dsl_app.scan.state import (
+    OWN_CALIBRATION,
+    CalibrationChoice,
+    Facts,
+    InterruptedScan,
+    Phase,
+    ScanState,
+    same_plan,
+)
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import DslError
+from dsl_core.devices.conditions import check_conditions
+from dsl_core.errors import DslError, PlanError
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.plan_file import save_plan
+from dsl_core.io.scan.estimate import estimate
 from dsl_core.io.scan.session import SUFFIX
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.presets import PRESETS, on_cycles
 from dsl_core.model.rig import Rig
+from dsl_core.patterns.multiplexed import profile_count
 from dsl_core.progress import Progress
 
 KEEPS_ITS_PLAN = (
-    "The scan at hand keeps its plan. It can be changed, undone and redone once that scan is complete, or"
-    " left by 'Plan a new scan'."
+    "The current scan keeps its plan. Complete it, or click 'Plan a new scan', to change, undo or redo the"
+    " plan."
+)
+
+NO_CALIBRATION = (
+    "No calibration is in use. The scan can be captured, but not reconstructed without one. Calibrate the rig,"
+    " or choose a calibration from the library."
 )
 
 
 class ScanPlanController:
-    """Keeps plan, target and calibration of the next scan, and says what they take."""
+    """Keeps plan, target and calibration of the next scan, and works out what they cost."""
 
     def __init__(
         self,
@@ -44,9 +60,9 @@ class ScanPlanController:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
         self._undo, self._library = undo, library
         self._chosen: Rig | None = None
-        #: Counts choices of a calibration: of several that are read at once the last one counts.
+        #: Counts choices of a calibration: when several are being read, the last one wins.
         self._turn = 0
-        #: What was chosen while a scan ran, which keeps its own.
+        #: What was chosen during a scan, which keeps its own calibration.
         self._next: CalibrationChoice | None = None
         self._stops = [
             rig.devices.follow(lambda _: self.take_rig()),
@@ -56,12 +72,12 @@ class ScanPlanController:
     # Plan ------------------------------------------------------------------------------------------
 
     def choose_preset(self, key: str) -> None:
-        """Take the plan of a preset."""
+        """Use the plan of a preset."""
         plan = next(preset.plan for preset in PRESETS if preset.key == key)
         self.change_plan(on_cycles(plan, self.state.period_ms.value))
 
     def change_plan(self, plan: CapturePlan) -> None:
-        """Take a plan of any kind, with the sizes of the rig; can be undone."""
+        """Use a plan, adapted to the sizes of the rig; can be undone."""
         old, new, period_ms = self.state.plan.value, self._fitted(plan), self.state.period_ms.value
         if new != old and not self._is_locked():
             self._undo.push(
@@ -74,28 +90,30 @@ class ScanPlanController:
             )
 
     def _set_plan(self, plan: CapturePlan, period_ms: float) -> None:
-        """Take a plan that was made for an LED cycle; another rig may be connected since."""
+        """Use a plan made for an LED cycle; another rig may have been connected since."""
         now_ms = self.state.period_ms.value
         fitted = self._fitted(plan)
         self.take_plan(fitted if period_ms == now_ms else on_cycles(fitted, now_ms))
         self.refresh()
 
     def take_plan(self, plan: CapturePlan) -> None:
-        """Let this be the plan at hand as it is; a file of another one holds it no more."""
+        """Make this the current plan; a file that held another plan is forgotten."""
         if not same_plan(plan, self.state.plan.value):
             self.state.plan_file.set(None)
         self.state.plan.set(plan)
 
     def open_plan(self, path: Path) -> None:
-        """Plan what a file says, a plan or a pattern set; undo brings back what was planned."""
+        """Open a plan or a pattern set from a file; undo restores the previous plan."""
         if self._is_locked():
-            self._notifier.tell("info", f"The scan at hand keeps its plan. Open {path.name} when it is over.")
+            self._notifier.tell(
+                "info", f"The current scan keeps its plan. Open {path.name} when it is finished."
+            )
             return
         now = self.state.plan.value
 
         def done(plan: CapturePlan) -> None:
             self.change_plan(plan)
-            # A file is as good as the plan where it is one, and nothing had to be fitted to the rig.
+            # The file stands for the plan only if it is one and nothing had to be adapted to the rig.
             is_same = kind_of(path) is Kind.PLAN and self.state.plan.value == plan
             self.state.plan_file.set(path if is_same else None)
 
@@ -105,14 +123,14 @@ class ScanPlanController:
         self._runner.submit(Job(f"Open {path.name}", work, done, self._tell, is_minor=True))
 
     def save_plan(self, path: Path) -> None:
-        """Write the plan into a file; who chose its name was asked about one that exists."""
+        """Save the plan to a file; the file dialog has asked before replacing one."""
         target = path if path.suffix else path.with_suffix(".json")
         plan = self.state.plan.value
 
         def done(written: Path) -> None:
             if self.state.plan.value == plan:
                 self.state.plan_file.set(written)
-            self._notifier.tell("info", f"The plan lies in {written}.")
+            self._notifier.tell("info", f"The plan is saved in {written}.")
 
         def work(progress: Progress) -> Path:
             return save_plan(plan, target, overwrite=True)
@@ -120,11 +138,11 @@ class ScanPlanController:
         self._runner.submit(Job(f"Save {target.name}", work, done, self._tell, is_minor=True))
 
     def _is_locked(self) -> bool:
-        """A plan that was begun stays as it is."""
+        """Whether a scan has begun, whose plan must not change."""
         return self.state.phase.value.is_busy or self.state.interrupted.value is not None
 
     def set_target(self, target: Path) -> None:
-        """Store the scan there."""
+        """Save the scan there."""
         if not self._is_locked():
             self.state.target.set(
                 target if target.suffix == SUFFIX else target.with_name(target.name + SUFFIX)
@@ -132,7 +150,7 @@ class ScanPlanController:
             self.refresh()
 
     def refresh(self) -> None:
-        """Say anew what the plan takes and what keeps it from starting."""
+        """Work out again what the plan costs and what prevents it from starting."""
         state = self.state
         session = state.interrupted.value
         facts = find_facts(
@@ -152,7 +170,7 @@ class ScanPlanController:
         return self._rig.devices.value
 
     def take_rig(self) -> None:
-        """Fit plan and calibration to the rig at hand."""
+        """Adapt plan and calibration to the connected rig."""
         state, devices = self.state, self._devices
         if devices is not None:
             info = devices.projector.info
@@ -172,13 +190,13 @@ class ScanPlanController:
 
     @property
     def calibration(self) -> Rig | None:
-        """The calibration to scan with; None while there is none."""
+        """The calibration to scan with, or None."""
         if self.state.calibration.value.key:
             return self._chosen
         return None if self._devices is None else self._devices.calibration
 
     def load_library(self) -> None:
-        """List what the library has."""
+        """List the calibrations of the library."""
 
         def work(progress: Progress) -> tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]:
             found: list[CalibrationChoice] = []
@@ -193,7 +211,7 @@ class ScanPlanController:
 
         def done(read: tuple[tuple[CalibrationChoice, ...], tuple[str, ...]]) -> None:
             chosen = self.state.calibration.value
-            # An older version in use is no name of the library, but stays in the list.
+            # An older version in use is not a name in the library, but stays in the list.
             older = (chosen,) if "@" in chosen.key else ()
             self.state.calibrations.set((self.state.calibrations.value[0], *read[0], *older))
             for trouble in read[1]:
@@ -202,7 +220,7 @@ class ScanPlanController:
         self._runner.submit(Job("Read the calibrations", work, done, self._tell, is_minor=True))
 
     def choose_calibration(self, choice: CalibrationChoice) -> None:
-        """Scan with another calibration; a scan under way keeps its own."""
+        """Scan with another calibration; a running scan keeps its own."""
         if self.state.phase.value.is_busy:
             self._choose_later(choice)
             return
@@ -236,7 +254,7 @@ class ScanPlanController:
         self._next = choice
         if is_news:
             self._notifier.tell(
-                "info", f"The scan under way keeps its calibration. Scans after it use {choice.name}."
+                "info", f"The running scan keeps its calibration. Later scans use {choice.name}."
             )
 
     def _phase_changed(self, phase: Phase) -> None:
@@ -253,12 +271,85 @@ class ScanPlanController:
         self._notifier.tell("error", sentence_of(error))
 
     def close(self) -> None:
-        """Follow the rig no more."""
+        """Disconnect from the rig's state."""
         for stop in self._stops:
             stop()
 
 
-def connect_first(session: Interrupted) -> str:
-    """Which rig an interrupted session waits for."""
-    which = f" It was taken with {session.rig}." if session.rig else ""
+def connect_first(session: InterruptedScan) -> str:
+    """Which rig an interrupted scan needs."""
+    which = f" It was captured with {session.rig}." if session.rig else ""
     return f"Connect the rig of this scan on the Rig page.{which}"
+
+
+def read_plan(path: Path, now: CapturePlan) -> CapturePlan:
+    """The plan in a file; a pattern set takes the settings of the current plan.
+
+    Raises `PlanError` or `StoreError` that says what is wrong with the file.
+    """
+    from dsl_core.io.plan_file import load_plan
+
+    if kind_of(path) is not Kind.PATTERNS:
+        return load_plan(path)
+    from dsl_core.planning.design import columns_of
+    from dsl_core.planning.designed import load_design
+
+    made = load_design(path)
+    width_px = now.projector_size_px[0]
+    if made.width_px != width_px:
+        raise PlanError(
+            f"The patterns of {path.name} are {made.width_px} columns wide, but the projector has {width_px}."
+            " Design patterns for this rig with 'dsl-scan design'."
+        )
+    return now.model_copy(
+        update={
+            "name": made.name,
+            "code": GrayCode(rows=False),
+            "spectral": columns_of(made.array),
+            "code_settings": tuple(range(len(now.settings))),
+        }
+    )
+
+
+def find_facts(
+    devices: DeviceRig | None, plan: CapturePlan, target: Path, calibration: Rig | None, override: bool
+) -> Facts:
+    """Frames, seconds and bytes of a plan, with a sentence for each obstacle."""
+    latency_ms = 0.0 if devices is None else devices.projector.info.latency_ms
+    needs = estimate(plan, target, latency_ms)
+    differ = devices is not None and calibration is not None and bool(check_conditions(calibration, devices))
+    obstacles = [*_obstacles(devices, plan, calibration, override), *_place(target)]
+    if needs.free_bytes < needs.needed_bytes:
+        obstacles.append("There is not enough disk space. Free some space, or choose another drive.")
+    remarks = (NO_CALIBRATION,) if devices is not None and calibration is None else ()
+    return Facts(
+        needs.frames, needs.seconds, needs.needed_bytes, needs.free_bytes, tuple(obstacles), remarks, differ
+    )
+
+
+def _obstacles(
+    devices: DeviceRig | None, plan: CapturePlan, calibration: Rig | None, override: bool
+) -> Iterator[str]:
+    from dsl_core.capture.preflight import find_obstacles
+
+    if devices is None:
+        yield NO_RIG
+        return
+    try:
+        profile_count(plan.spectral, plan.projector_size_px[0])
+    except PlanError as error:
+        yield str(error)
+    if calibration is not None and override:
+        calibration = calibration.model_copy(update={"conditions": None})
+    for clause in find_obstacles(replace(devices, calibration=calibration), plan):
+        yield f"{clause[0].upper()}{clause[1:]}."
+
+
+def _place(target: Path) -> Iterator[str]:
+    try:
+        if (target / MANIFEST_NAME).exists():
+            yield f"{target.name} already contains a scan. Choose another name, or open it to resume it."
+        elif target.exists():
+            yield f"{target} exists and is not a scan. Choose another name."
+    except OSError as error:
+        yield f"{target} cannot be accessed ({error.strerror}). Choose another folder."

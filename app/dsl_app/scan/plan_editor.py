@@ -1,60 +1,64 @@
-"""The plan of a scan: a preset, or code, patterns and settings of one's own."""
+"""The editor of a plan: a preset, or a custom combination of code, patterns and settings."""
 
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QGroupBox, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QHBoxLayout, QPushButton, QWidget
 
-from dsl_app.scan.setting_rows import SettingRows
 from dsl_app.scan.state import preset_of
-from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines
-from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of
+from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
+from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of, whole_cycles
 
-OWN = "Own plan"
-OWN_PURPOSE = "Not one of the presets; the table beside says what to expect of it."
+OWN = "Custom plan"
+OWN_PURPOSE = "Not a preset; the table shows what to expect of it."
 LINES, COMB, COLOURS, FILE = "lines", "comb", "colours", "file"
 WIDEST_PX = 4096
+MOST_SETTINGS = 4
+LONGEST_MS = 30_000.0
+_EXPOSURE_TIP = "Exposures are whole LED cycles, so that each contains all colours of the projector."
 
 
 class PlanEditor(QGroupBox):
-    """Shows a plan; ``preset_chosen`` and ``plan_changed`` tell what a person wants instead.
+    """Shows a plan; ``preset_chosen`` and ``plan_changed`` report what the person chose instead.
 
-    ``open_wanted`` and ``save_wanted`` ask for files.
+    ``open_requested`` and ``save_requested`` ask for files.
     """
 
     preset_chosen = Signal(str)
     plan_changed = Signal(object)
-    open_wanted = Signal()
-    save_wanted = Signal()
+    open_requested = Signal()
+    save_requested = Signal()
 
     def __init__(self) -> None:
         super().__init__("Plan")
         self._plan = CapturePlan()
-        self.preset = ChoiceBox("Preset", "Plans by name, from a quick look to what was published")
+        self.preset = ChoiceBox("Preset", "Named plans, from a quick preview to the published one")
         for each in PRESETS:
             self.preset.addItem(each.title, each.key)
         self.preset.addItem(OWN, "")
         self._purpose = label("", "muted")
         self._purpose.setWordWrap(True)
-        self.code = ChoiceBox("Binary code", "Finds the projector column, and row, that lights each pixel")
+        self.code = ChoiceBox("Binary code", "Finds the projector column and row that light each pixel")
         for choice in CODE_CHOICES:
             self.code.addItem(choice.title, choice.name)
         self.code.addItem("None", "")
-        self.patterns = ChoiceBox("Patterns", "One line a frame, or several at once")
+        self.patterns = ChoiceBox("Patterns", "One line per frame, or several at once")
         self.patterns.addItem("Single lines", LINES)
         self.patterns.addItem("Comb of lines", COMB)
-        self.patterns.addItem("Combs, one a colour", COLOURS)
+        self.patterns.addItem("Combs, one per colour", COLOURS)
         set_help(self.patterns, "designed-patterns")
-        self.line_width = WholeBox("Line width", 1, WIDEST_PX, 5, "px", "Columns that a line lights")
-        self.step = WholeBox("Step", 1, WIDEST_PX, 2, "px", "How far lines move from frame to frame")
-        self.period = WholeBox("Period", 2, WIDEST_PX, 106, "px", "Distance of the lines of a comb")
+        self.line_width = WholeBox("Line width", 1, WIDEST_PX, 5, "px", "Projector columns per line")
+        self.step = WholeBox("Step", 1, WIDEST_PX, 2, "px", "Shift of the lines from frame to frame")
+        self.period = WholeBox("Period", 2, WIDEST_PX, 106, "px", "Distance between the lines of a comb")
         self.settings = SettingRows()
         self.open = QPushButton("&Open plan…")
-        self.open.setToolTip("Plan what a file says: of 'Save plan', or of dsl-scan plan, tradeoff or design")
+        self.open.setToolTip(
+            "Open a plan or pattern set: one saved here, or made by dsl-scan plan, tradeoff or design"
+        )
         self.save = QPushButton("Sa&ve plan…")
-        self.save.setToolTip("Write this plan into a file, for this page or 'dsl-scan scan --plan'")
+        self.save.setToolTip("Save this plan to a file, for this page or for 'dsl-scan scan --plan'")
         self._lay_out()
         self._connect()
 
@@ -83,8 +87,8 @@ class PlanEditor(QGroupBox):
 
     def _connect(self) -> None:
         self.preset.activated.connect(self._choose)
-        self.open.clicked.connect(self.open_wanted)
-        self.save.clicked.connect(self.save_wanted)
+        self.open.clicked.connect(self.open_requested)
+        self.save.clicked.connect(self.save_requested)
         for box in (self.code, self.patterns):
             box.activated.connect(lambda _: self._edited())
         for number in (self.line_width, self.step, self.period):
@@ -100,7 +104,7 @@ class PlanEditor(QGroupBox):
             self.preset_chosen.emit(key)
 
     def set_plan(self, plan: CapturePlan, period_ms: float) -> None:
-        """Show a plan on a projector of this frame period."""
+        """Show a plan on a projector with this frame period."""
         self._plan = plan
         preset = preset_of(plan, period_ms)
         self.preset.setCurrentIndex(self.preset.findData("" if preset is None else preset.key))
@@ -116,7 +120,7 @@ class PlanEditor(QGroupBox):
         self.settings.set_settings(plan.settings, period_ms)
 
     def _offer_file(self, on: bool) -> None:
-        """Name patterns that are no lines; there is no way to them but a file or the curve."""
+        """List designed patterns only while they are in use: they come from a file or the curve."""
         index = self.patterns.findData(FILE)
         if on and index < 0:
             self.patterns.addItem("Designed", FILE)
@@ -143,7 +147,7 @@ class PlanEditor(QGroupBox):
         width, step = self.line_width.value(), self.step.value()
         kind, spectral = self.patterns.currentData(), self._plan.spectral
         if kind in (COMB, COLOURS):
-            # Whole steps a period, and room for a gap: only such combs can be reconstructed.
+            # Whole steps per period, and room for a gap: only such combs can be reconstructed.
             period = max(round(self.period.value() / step), 2 + width // step) * step
             third = round(period / 3)
             shifts = (0, third, 2 * third) if kind == COLOURS else (0, 0, 0)
@@ -153,11 +157,94 @@ class PlanEditor(QGroupBox):
         self._tell(code=code_of(self.code.currentData()) or NoCode(), spectral=spectral)
 
     def _tell(self, **changes: object) -> None:
-        self.plan_changed.emit(self._plan.model_copy(update={**changes, "name": "own plan"}))
+        self.plan_changed.emit(self._plan.model_copy(update={**changes, "name": "custom plan"}))
 
 
 def _purpose_of(plan: CapturePlan) -> str:
-    """What is to be said of a plan that is no preset."""
+    """What describes a plan that is not a preset."""
     if isinstance(plan.spectral, Columns):
         return f"{plan.spectral_count} designed patterns. {OWN_PURPOSE}"
     return OWN_PURPOSE
+
+
+class SettingRows(QWidget):
+    """Rows of exposure and drive level; emits ``changed`` with a tuple of `Setting` when edited."""
+
+    changed = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._period_ms = 1.0
+        self._settings: tuple[Setting, ...] = ()
+        self._rows: list[tuple[NumberBox, NumberBox]] = []
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 0, 0, 0)
+        self._grid.setVerticalSpacing(4)
+        self._grid.setColumnStretch(0, 1)
+
+    def set_settings(self, settings: tuple[Setting, ...], period_ms: float) -> None:
+        """Show settings for a projector with this frame period."""
+        same = len(settings) == len(self._settings) and self._rows
+        self._settings, self._period_ms = settings, period_ms
+        if not same:
+            self._build()
+        for i, setting in enumerate(settings):
+            exposure, level = self._rows[i]
+            exposure.setSingleStep(period_ms)
+            cycles = whole_cycles(setting.exposure_ms, period_ms)
+            exposure.setToolTip(f"{cycles} LED cycles of {period_ms:.2f} ms. {_EXPOSURE_TIP}")
+            for box, value in ((exposure, setting.exposure_ms), (level, setting.level)):
+                box.blockSignals(True)
+                box.setValue(value)
+                box.blockSignals(False)
+
+    def _build(self) -> None:
+        while (item := self._grid.takeAt(0)) is not None:
+            widget = item.widget()
+            if widget is not None:
+                widget.hide()
+                widget.deleteLater()
+        self._rows = []
+        self._grid.addWidget(label("Exposure", "muted"), 0, 0)
+        self._grid.addWidget(label("Level", "muted"), 0, 1)
+        for i in range(len(self._settings)):
+            self._add_row(i)
+        add = QPushButton("Add setting")
+        add.setToolTip(
+            "Capture every pattern at another exposure and level too, for brighter or darker parts"
+        )
+        add.setEnabled(len(self._settings) < MOST_SETTINGS)
+        add.clicked.connect(self._add)
+        self._grid.addWidget(add, len(self._settings) + 1, 0, 1, 3)
+
+    def _add_row(self, i: int) -> None:
+        exposure = NumberBox(f"Exposure of setting {i + 1}", 0.1, LONGEST_MS, 1, "ms", 1, _EXPOSURE_TIP)
+        level = NumberBox(
+            f"Level of setting {i + 1}", 0.01, 1, 1, decimals=2, tip="Drive level of lit columns, 0 to 1"
+        )
+        level.setSingleStep(0.05)
+        remove = QPushButton("×")
+        remove.setFixedWidth(28)
+        remove.setAccessibleName(f"Remove setting {i + 1}")
+        remove.setToolTip("Remove this setting from the plan")
+        remove.setEnabled(len(self._settings) > 1)
+        remove.clicked.connect(lambda: self._remove(i))
+        exposure.valueChanged.connect(lambda _: self._edited(i))
+        level.valueChanged.connect(lambda _: self._edited(i))
+        for column, widget in enumerate((exposure, level, remove)):
+            self._grid.addWidget(widget, i + 1, column)
+        self._rows.append((exposure, level))
+
+    def _edited(self, i: int) -> None:
+        exposure, level = self._rows[i]
+        cycles = whole_cycles(exposure.value(), self._period_ms)
+        made = Setting(exposure_ms=cycles * self._period_ms, level=round(level.value(), 2))
+        self.changed.emit((*self._settings[:i], made, *self._settings[i + 1 :]))
+
+    def _add(self) -> None:
+        last = self._settings[-1]
+        longer = Setting(exposure_ms=2 * last.exposure_ms, level=last.level)
+        self.changed.emit((*self._settings, longer))
+
+    def _remove(self, i: int) -> None:
+        self.changed.emit((*self._settings[:i], *self._settings[i + 1 :]))

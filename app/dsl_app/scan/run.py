@@ -1,4 +1,4 @@
-"""The right side of the Scan page: calibration, target, what it takes, start, and how far it is."""
+"""The right side of the Scan page: calibration, target, cost, start and progress."""
 
 from __future__ import annotations
 
@@ -16,33 +16,31 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
 )
 
-from dsl_app.scan.commands import ScanCommands
-from dsl_app.scan.forecast.words import minutes, volume
+from dsl_app.scan.controller import ScanController
+from dsl_app.scan.controls import progress_text, run_controls
+from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
-from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widgets.forms import ChoiceBox, label, set_role
 from dsl_core.capture.status import Status
 from dsl_core.model.plan import Columns
-
-_PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 
 
 class CalibrationBox(QGroupBox):
     """The calibration that the scan uses."""
 
-    def __init__(self, state: ScanState, commands: ScanCommands) -> None:
+    def __init__(self, state: ScanState, controller: ScanController) -> None:
         super().__init__("Calibration")
-        self._state, self._commands = state, commands
-        self.choice = ChoiceBox("Calibration in use", "The rig's own, or one of the library")
-        self.override = QCheckBox("Use it although settings differ")
-        self.override.setToolTip("Scan with this calibration in spite of the differences named below")
+        self._state, self._controller = state, controller
+        self.choice = ChoiceBox("Calibration in use", "The rig's own calibration, or one from the library")
+        self.override = QCheckBox("Use despite different settings")
+        self.override.setToolTip("Scan with this calibration despite the differences listed below")
         self._remark = label("", "warn")
         self._remark.setWordWrap(True)
         column = QVBoxLayout(self)
         for widget in (self.choice, self.override, self._remark):
             column.addWidget(widget)
         self.choice.activated.connect(self._choose)
-        self.override.toggled.connect(commands.plans.set_override)
+        self.override.toggled.connect(controller.plans.set_override)
         self.stops = [
             state.calibrations.follow(self._list),
             state.calibration.follow(self._mark),
@@ -60,7 +58,7 @@ class CalibrationBox(QGroupBox):
         self.choice.setCurrentIndex(max(self.choice.findData(chosen.key), 0))
 
     def _choose(self, index: int) -> None:
-        self._commands.plans.choose_calibration(self._state.calibrations.value[index])
+        self._controller.plans.choose_calibration(self._state.calibrations.value[index])
 
     def _show_facts(self, facts: Facts | None) -> None:
         self.override.setVisible(facts is not None and (facts.settings_differ or self.override.isChecked()))
@@ -70,16 +68,16 @@ class CalibrationBox(QGroupBox):
 
 
 class TargetBox(QGroupBox):
-    """Where the scan is stored and what it takes."""
+    """Where the scan is saved and what it costs."""
 
-    def __init__(self, state: ScanState, commands: ScanCommands) -> None:
-        super().__init__("Store in")
-        self._state, self._commands = state, commands
+    def __init__(self, state: ScanState, controller: ScanController) -> None:
+        super().__init__("Save in")
+        self._state, self._controller = state, controller
         self.name = QLineEdit()
         self.name.setAccessibleName("Name of the scan")
-        self.name.setToolTip("Name of the folder that the scan makes, NAME.dsl")
+        self.name.setToolTip("Name of the scan's folder, NAME.dsl")
         self.folder = QPushButton("Folder…")
-        self.folder.setToolTip("Choose the folder in which the scan is stored")
+        self.folder.setToolTip("Choose the folder in which scans are saved")
         self._where = label("", "muted")
         self._where.setWordWrap(True)
         self._frames, self._time, self._disk = label("–"), label("–"), label("–")
@@ -101,13 +99,13 @@ class TargetBox(QGroupBox):
         text = self.name.text().strip()
         target = self._state.target.value
         if text and text != target.stem:
-            self._commands.plans.set_target(target.parent / text.replace("/", "-"))
+            self._controller.plans.set_target(target.parent / text.replace("/", "-"))
 
     def _browse(self) -> None:
         target = self._state.target.value
-        name = QFileDialog.getExistingDirectory(self, "Store scans in", str(target.parent))
+        name = QFileDialog.getExistingDirectory(self, "Save scans in", str(target.parent))
         if name:
-            self._commands.plans.set_target(Path(name) / target.name)
+            self._controller.plans.set_target(Path(name) / target.name)
 
     def _show_target(self, target: Path) -> None:
         self.name.setText(target.stem)
@@ -127,39 +125,39 @@ class TargetBox(QGroupBox):
 
 
 class RunBox(QGroupBox):
-    """Start, pause, cancel, and how far the scan is."""
+    """Start, pause, cancel, and progress."""
 
-    def __init__(self, state: ScanState, commands: ScanCommands) -> None:
+    def __init__(self, state: ScanState, controller: ScanController) -> None:
         super().__init__("Scan")
-        self._state, self._commands = state, commands
+        self._state, self._controller = state, controller
         self.start = QPushButton("&Start scan")
         self.start.setProperty("role", "primary")
-        self.start.setToolTip("Take every frame of the plan; each is safe on disk before the next is taken")
+        self.start.setToolTip("Capture all frames of the plan; each is saved before the next is captured")
         self.pause = QPushButton("&Pause")
-        self.pause.setToolTip("Wait before the next frame; nothing is lost")
+        self.pause.setToolTip("Pause before the next frame; nothing is lost")
         self.cancel = QPushButton("&Cancel")
-        self.cancel.setToolTip("End after the frame at hand; what is stored can be resumed")
+        self.cancel.setToolTip("Stop after the current frame; the scan can be resumed later")
         self.renew = QPushButton("Plan a &new scan")
-        self.renew.setToolTip("Leave the interrupted scan as it is on disk")
+        self.renew.setToolTip("Keep the interrupted scan on disk and plan another")
         self.again = QPushButton("Reconstruct a&gain…")
-        self.again.setToolTip("Make a result of the finished scan with other parameters, without scanning")
-        self.drift = QCheckBox("Compare old frames first")
+        self.again.setToolTip("Reconstruct the finished scan with other parameters, without scanning again")
+        self.drift = QCheckBox("Check for movement first")
         self.drift.setToolTip(
-            "Take two old frames again before going on. Without it the scan goes on although scene or light"
-            " changed; half of it then shows something else"
+            "Capture two old frames again and compare before resuming. Without this check, a scan whose scene or"
+            " light has changed is resumed and its frames do not fit together"
         )
         self.then = QCheckBox("Reconstruct at the end")
-        self.then.setToolTip("Make and open the result as soon as all frames are stored")
+        self.then.setToolTip("Reconstruct and open the result as soon as all frames are saved")
         self._phase, self._what, self._time = label(""), label("", "muted"), label("", "muted")
         self._bar = QProgressBar()
         self._bar.setAccessibleName("Progress of the scan")
         self._text = label("", "muted")
         self._text.setWordWrap(True)
         self._lay_out()
-        self.start.clicked.connect(commands.start)
+        self.start.clicked.connect(controller.start)
         self.pause.clicked.connect(self.toggle_pause)
-        self.cancel.clicked.connect(commands.cancel)
-        self.renew.clicked.connect(commands.leave_session)
+        self.cancel.clicked.connect(controller.cancel)
+        self.renew.clicked.connect(controller.plan_new_scan)
         self.then.toggled.connect(state.then_reconstruct.set)
         self.drift.toggled.connect(state.check_drift.set)
         self.stops = [
@@ -188,43 +186,40 @@ class RunBox(QGroupBox):
             column.addWidget(widget)
 
     def toggle_pause(self) -> None:
-        """Pause, or go on."""
+        """Pause, or continue."""
         if self._state.phase.value is Phase.PAUSED:
-            self._commands.go_on()
+            self._controller.unpause()
         else:
-            self._commands.pause()
+            self._controller.pause()
 
     def _show(self) -> None:
-        phase, session, facts = (
-            self._state.phase.value, self._state.interrupted.value, self._state.facts.value,
-        )  # fmt: skip
-        self.start.setText("&Start scan" if session is None else "&Resume scan")
-        obstacles = () if facts is None or phase.is_busy else facts.obstacles
-        self.start.setEnabled(not phase.is_busy and not obstacles)
-        self.pause.setText("&Go on" if phase is Phase.PAUSED else "&Pause")
-        self.pause.setEnabled(phase in (Phase.RUNNING, Phase.PAUSED))
-        self.cancel.setEnabled(phase.is_busy and phase is not Phase.STOPPING)
+        state = self._state
+        shown = run_controls(
+            state.phase.value,
+            state.interrupted.value,
+            state.facts.value,
+            state.note.value,
+            state.finished.value is not None,
+        )
+        self.start.setText(shown.start)
+        self.start.setEnabled(shown.can_start)
+        self.pause.setText(shown.pause)
+        self.pause.setEnabled(shown.can_pause)
+        self.cancel.setEnabled(shown.can_cancel)
         for widget in (self.renew, self.drift):
-            widget.setVisible(session is not None and not phase.is_busy)
-        self.again.setVisible(self._state.finished.value is not None and not phase.is_busy)
-        ready = phase is not Phase.PLANNING or not obstacles
-        self._phase.setText(f"● {phase.value}" if ready else "● not ready")
-        set_role(self._phase, _PHASE_ROLES.get(phase, "muted"))
-        lines = list(obstacles)
-        if session is not None and not phase.is_busy:
-            lines.insert(0, f"{session.folder.name} holds {session.done} of {session.total} frames.")
-        if self._state.note.value:
-            lines.append(self._state.note.value)
-        self._text.setText("\n".join(lines))
-        self._text.setVisible(bool(lines))
-        set_role(self._text, "warn" if obstacles else "muted")
+            widget.setVisible(shown.is_resumable)
+        self.again.setVisible(shown.can_reconstruct_again)
+        self._phase.setText(shown.phase)
+        set_role(self._phase, shown.phase_role)
+        self._text.setText(shown.remarks)
+        self._text.setVisible(bool(shown.remarks))
+        set_role(self._text, shown.remarks_role)
 
     def _show_status(self, status: Status) -> None:
         self._bar.setRange(0, max(status.total, 1))
         self._bar.setValue(status.done)
         self._bar.setVisible(status.total > 0)
-        for widget in (self._what, self._time):
-            widget.setVisible(status.total > 0)
-        self._what.setText(f"{status.done} of {status.total} frames stored")
-        spent, left = describe_seconds(status.elapsed_s), describe_seconds(status.remaining_s)
-        self._time.setText(f"took {spent}" if status.state.is_final else f"{spent} so far, {left} left")
+        told = progress_text(status)
+        for line, text in ((self._what, told.frames), (self._time, told.time)):
+            line.setText(text)
+            line.setVisible(bool(text))

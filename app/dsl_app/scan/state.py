@@ -1,4 +1,4 @@
-"""The scan as the window knows it: its plan, what it will take, how far it is, what it sees."""
+"""The state of the Scan page: plan, cost, progress and the latest frame."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from dsl_core.model.presets import PRESETS, Preset, on_cycles
 
 
 class Phase(Enum):
-    """Where the page stands; the words are shown."""
+    """Phases of a scan; the values are shown."""
 
     PLANNING = "ready"
     STARTING = "starting"
@@ -36,24 +36,24 @@ class Phase(Enum):
         return self in (Phase.STARTING, Phase.RUNNING, Phase.PAUSED, Phase.STOPPING)
 
 
-class Rescue(Enum):
-    """What becomes of a rig that was lost during a scan; the scan waits for a person unless `RESUMING`."""
+class Reconnection(Enum):
+    """Reconnection of a rig that was lost during a scan; the scan resumes by itself only when `RESUMING`."""
 
-    NONE = "nothing was lost"
-    TRYING = "connecting again"
-    RESUMING = "connecting again to go on with the scan"
-    GIVEN_UP = "not there"
-    BACK = "connected again"
+    NONE = "not lost"
+    TRYING = "reconnecting"
+    RESUMING = "reconnecting to resume the scan"
+    GIVEN_UP = "not connected"
+    BACK = "reconnected"
 
     @property
     def is_trying(self) -> bool:
-        """Whether the rig is being connected again."""
-        return self in (Rescue.TRYING, Rescue.RESUMING)
+        """Whether the rig is being reconnected."""
+        return self in (Reconnection.TRYING, Reconnection.RESUMING)
 
     @property
     def is_away(self) -> bool:
-        """Whether the rig must be connected before the scan goes on."""
-        return self.is_trying or self is Rescue.GIVEN_UP
+        """Whether the rig must be connected before the scan resumes."""
+        return self.is_trying or self is Reconnection.GIVEN_UP
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ OWN_CALIBRATION = CalibrationChoice("", "none")
 
 
 @dataclass(frozen=True)
-class Interrupted:
-    """A session that lacks frames; ``rig`` is the command line's words for the rig it was taken with."""
+class InterruptedScan:
+    """A scan that lacks frames; ``rig`` is the command-line form of the rig it was captured with."""
 
     folder: Path
     done: int
@@ -86,7 +86,7 @@ class Interrupted:
 
 @dataclass(frozen=True)
 class Facts:
-    """What the plan takes, ``obstacles`` that keep it from starting, and ``remarks`` that do not."""
+    """The cost of a plan, ``obstacles`` that prevent it from starting, and ``remarks`` that do not."""
 
     frames: int
     seconds: float
@@ -99,7 +99,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class LivePicture:
-    """The last frame as people look at it: RGB, one pixel for ``cell_px`` of the camera."""
+    """The last frame as RGB, one pixel for ``cell_px`` camera pixels."""
 
     shot: Shot
     picture: NDArray[np.uint8]
@@ -109,10 +109,9 @@ class LivePicture:
 class ScanState:
     """Values that the scan's controller sets and the page follows.
 
-    ``trouble`` is a sentence on what interrupted the scan (empty: nothing), ``note`` one on what became of
-    it. ``rescue`` is what becomes of the rig where a lost device was it. ``plan_file`` holds the plan at
-    hand, where it was saved or opened and is still the same.
-    ``check_drift`` compares two old frames before an interrupted scan goes on. ``period_ms`` is the LED cycle
+    ``trouble`` says what interrupted the scan (empty: nothing), ``note`` how the last one ended.
+    ``plan_file`` is the file that holds exactly the current plan, if there is one. ``check_drift`` compares
+    two old frames before an interrupted scan resumes. ``period_ms`` is the LED cycle
     of the rig's projector. ``finished`` is the scan that was completed last, ``result`` fires with each new
     result.
     """
@@ -126,7 +125,7 @@ class ScanState:
         self.override = Value(False)
         self.check_drift = Value(True)
         self.then_reconstruct = Value(True)
-        self.interrupted: Value[Interrupted | None] = Value(None)
+        self.interrupted: Value[InterruptedScan | None] = Value(None)
         self.finished: Value[Path | None] = Value(None)
         self.facts: Value[Facts | None] = Value(None)
         self.period_ms = Value(1000.0 / 60.0)
@@ -134,7 +133,7 @@ class ScanState:
         self.phase = Value(Phase.PLANNING)
         self.status = Value(Status(State.IDLE))
         self.trouble = Value("")
-        self.rescue = Value(Rescue.NONE)
+        self.reconnection = Value(Reconnection.NONE)
         self.note = Value("")
         self.picture: Value[LivePicture | None] = Value(None)
         self.cursor: Value[tuple[int, int] | None] = Value(None)
@@ -143,12 +142,12 @@ class ScanState:
 
     @property
     def preset(self) -> Preset | None:
-        """The preset whose patterns and settings the plan has; None for a plan of one's own."""
+        """The preset that the plan equals; None for a custom plan."""
         return preset_of(self.plan.value, self.period_ms.value)
 
 
 def preset_of(plan: CapturePlan, period_ms: float) -> Preset | None:
-    """The preset that a plan is, on a projector of this frame period."""
+    """The preset that a plan equals, on a projector with this frame period."""
     for preset in PRESETS:
         wanted = on_cycles(preset.plan, period_ms)
         same_patterns = (plan.code, plan.spectral) == (wanted.code, wanted.spectral)
@@ -158,7 +157,7 @@ def preset_of(plan: CapturePlan, period_ms: float) -> Preset | None:
 
 
 def same_settings(first: Sequence[Setting], second: Sequence[Setting]) -> bool:
-    """Whether settings are the same but for the rounding of whole cycles."""
+    """Whether settings are equal up to the rounding to whole cycles."""
     return len(first) == len(second) and all(
         a.level == b.level and math.isclose(a.exposure_ms, b.exposure_ms, rel_tol=1e-9)
         for a, b in zip(first, second, strict=True)
@@ -166,6 +165,6 @@ def same_settings(first: Sequence[Setting], second: Sequence[Setting]) -> bool:
 
 
 def same_plan(first: CapturePlan, second: CapturePlan) -> bool:
-    """Whether plans are the same but for the rounding of whole cycles."""
+    """Whether plans are equal up to the rounding to whole cycles."""
     alike = first.model_copy(update={"settings": second.settings}) == second
     return alike and same_settings(first.settings, second.settings)

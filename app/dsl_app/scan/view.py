@@ -1,4 +1,4 @@
-"""What the scan sees: its last frame, and the intensity graph of a pixel as it builds up."""
+"""The last frame of a scan, and the intensity graph of a pixel as it builds up."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 
-from dsl_app.scan.commands import ScanCommands
+from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import LivePicture, ScanState
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
@@ -22,8 +22,8 @@ from dsl_core.model.plan import CapturePlan, Shot
 
 #: Red, green and blue of the camera: they are data and the same in every theme.
 CHANNEL_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
-HINT = "No frame yet. Start a scan and move over its picture to follow the intensity of a pixel."
-#: Columns of the published projector: an axis before there is anything to draw.
+HINT = "No frame yet. Start a scan, then point at the picture to plot the intensity of a pixel."
+#: Columns of the published projector: the range of the empty axis.
 PUBLISHED_COLUMNS = 640
 _ROLES = {"code": "code", "spectral": "pattern", "white": "white", "black": "black"}
 
@@ -39,7 +39,9 @@ class FramePicture(QWidget):
         self._cursor: tuple[int, int] | None = None
         self.view = pg.GraphicsLayoutWidget()
         self.view.setAccessibleName("Last frame of the scan")
-        self.view.setToolTip("The last frame. Move over it, or use the arrow keys, to follow a pixel.")
+        self.view.setToolTip(
+            "The last frame. Point at a pixel, or use the arrow keys, to plot its intensity."
+        )
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
         self.box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)
@@ -110,7 +112,7 @@ class FramePicture(QWidget):
 class ScanView(QSplitter):
     """The last frame above the graph of a pixel; follows a `ScanState`."""
 
-    def __init__(self, state: ScanState, commands: ScanCommands) -> None:
+    def __init__(self, state: ScanState, controller: ScanController) -> None:
         super().__init__(Qt.Orientation.Vertical)
         self.picture, self.graph = FramePicture(), GraphPlot()
         set_help(self.picture, "scanning#while-it-runs")
@@ -120,7 +122,7 @@ class ScanView(QSplitter):
             widget.setMinimumHeight(120)
             self.addWidget(widget)
             self.setStretchFactor(self.count() - 1, stretch)
-        self.picture.pointed.connect(commands.point_at)
+        self.picture.pointed.connect(controller.point_at)
         self._stops = [
             state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
             state.cursor.follow(self.picture.show_cursor),
@@ -133,7 +135,7 @@ class ScanView(QSplitter):
         self.graph.apply_theme(theme)
 
     def release(self) -> None:
-        """Follow nothing more."""
+        """Disconnect from all state."""
         for stop in self._stops:
             stop()
 
@@ -145,8 +147,8 @@ class GraphPlot(QWidget):
         super().__init__()
         self.plot = calm_plot(
             "Intensity graph",
-            "Raw counts of the pixel while the lines move over the projector: the zero order is the high"
-            " peak, first orders lie to its sides.",
+            "Raw counts of the pixel while the lines move across the projector: the high peak is the zero order,"
+            " the first orders are on either side.",
             "Raw counts (DN)", "First column of the line (px)",
         )  # fmt: skip
         self._title = label("Intensity graph", "heading")
@@ -160,7 +162,7 @@ class GraphPlot(QWidget):
         column.addWidget(self.plot, 1)
 
     def show_graph(self, graph: IntensityGraph | None) -> None:
-        """Draw a graph, as far as it is there."""
+        """Draw a graph, as far as captured."""
         if graph is None:
             self._title.setText("Intensity graph")
             for curve in self._curves:
@@ -175,7 +177,7 @@ class GraphPlot(QWidget):
             for channel in range(3):
                 curve = self._curves[3 * i + channel]
                 curve.setVisible(i in begun)
-                # The setting that grows now is solid.
+                # The setting being captured is drawn solid.
                 old = bool(begun) and i != begun[-1]
                 style = Qt.PenStyle.DotLine if old else Qt.PenStyle.SolidLine
                 curve.setPen(pg.mkPen(CHANNEL_COLOURS[channel], width=1, style=style))
@@ -196,13 +198,13 @@ class GraphPlot(QWidget):
 
 
 def covered_px(shown: LivePicture) -> tuple[int, int]:
-    """Width and height of what a picture shows, in pixels of the camera."""
+    """Width and height of the area shown, camera pixels."""
     height, width = shown.picture.shape[:2]
     return width * shown.cell_px, height * shown.cell_px
 
 
 def words_of(shot: Shot, plan: CapturePlan) -> str:
-    """What a shot shows and how it is exposed, as people say it."""
+    """Pattern and exposure of a shot, in words."""
     counts = {"code": plan.code_count, "spectral": plan.spectral_count}
     which = f" {shot.pattern + 1} of {counts[shot.role]}" if shot.role in counts else ""
     setting = f"setting {shot.setting + 1} of {len(plan.settings)}"

@@ -101,7 +101,7 @@ def test_after_a_live_demo_that_was_interrupted_too(
     session = bench.scans.state.interrupted.value
     assert session is not None
     assert session.folder.parent == tmp_path / "demo"
-    bench.scans.scans.leave_session()
+    bench.scans.scans.plan_new_scan()
     assert bench.scans.state.target.value == tmp_path / "scan-20260301-1020.dsl"
 
 

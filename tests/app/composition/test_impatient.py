@@ -73,7 +73,7 @@ class Bench:
         page = self.window.open_page("scan")
         assert isinstance(page, ScanPage)
         self.wait(lambda: not self.window.parts.runner.active)
-        page._commands.plans.change_plan(PRESETS[0].plan)
+        page._controller.plans.change_plan(PRESETS[0].plan)
         page._state.then_reconstruct.set(False)
         return page
 
@@ -164,7 +164,7 @@ def test_closing_during_a_scan_asks_and_the_frames_stay(
     bench.wait(lambda: state.status.value.done >= 3)
     assert not bench.window.close()
     assert state.phase.value.is_busy
-    page._commands.pause()
+    page._controller.pause()
     bench.wait(lambda: state.phase.value is Phase.PAUSED)
     assert bench.window.close()
     assert "can be resumed" in asked[1]

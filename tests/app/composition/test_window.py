@@ -17,7 +17,7 @@ from shiboken6 import isValid
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
-from tests.app.support.scan_bench import foreseen
+from tests.app.support.scan_bench import made_up_prediction
 
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 
@@ -70,7 +70,7 @@ def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
 
     def predict(rig: Rig, plan: CapturePlan, view: object, latency_ms: float) -> prediction.Prediction:
         time.sleep(0.05)
-        return foreseen(rig, plan, latency_ms)
+        return made_up_prediction(rig, plan, latency_ms)
 
     monkeypatch.setattr(prediction, "predict", predict)
     composition = Composition(Wish(TWIN, predicts=True))

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from dsl_app.connection.state import RigChoice
 from dsl_app.scan.forecast.controller import NO_CALIBRATION, ForecastController
-from dsl_app.scan.forecast.job import ForecastJob, Rigging
-from dsl_app.scan.forecast.state import ForecastState, Foreseen, identity, plan_title
+from dsl_app.scan.forecast.job import ForecastBasis, ForecastJob
+from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity, plan_title
 from dsl_app.scan.forecast.store import ForecastStore
 from dsl_app.scan.state import Phase
 from dsl_app.shared.jobs.base import Job
@@ -22,7 +22,7 @@ from tests.app.support.scan_bench import (
     COMB,
     TWIN,
     ScanBench,
-    foreseen,
+    made_up_prediction,
     make_bench,
     make_forecast,
     planned_bench,
@@ -48,16 +48,18 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         seen.append(plan.name)
         if isinstance(plan.spectral, NoSpectral):
             raise PlanError(f"The plan {plan.name!r} has no spectral patterns.")
-        return foreseen(rig, plan, latency_ms)
+        return made_up_prediction(rig, plan, latency_ms)
 
     monkeypatch.setattr(prediction, "predict", predict)
     return seen
 
 
 def test_the_planner_is_asked(bench: ScanBench, tmp_path: Path) -> None:
-    work = ForecastJob(Rigging(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False)
+    work = ForecastJob(
+        ForecastBasis(bench.calibration, 50.0, 1000 / 60), tmp_path, lambda rig: (), lambda: False
+    )
     found = work._of(COMB, ForecastStore(tmp_path, bench.calibration, 50.0), "")
-    assert isinstance(found, Foreseen)
+    assert isinstance(found, ForecastPoint)
     assert found.expected.spectral_frames == 32
     assert 0 < found.expected.rmse < found.expected.pixel_rmse < 1
 

@@ -131,10 +131,10 @@ def test_a_scan_that_is_opened_brings_another_plan_than_the_file(
     with monkeypatch.context() as losing:
         losing.setattr(SimCamera, "snap", lost)
         bench.scans.start()
-    bench.scans.leave_session()
+    bench.scans.plan_new_scan()
     saved_comb(bench, tmp_path)
     assert bench.scans.open(tmp_path / "first.dsl")
-    bench.scans.leave_session()
+    bench.scans.plan_new_scan()
     assert bench.state.preset is PRESETS[0]
     assert "--plan" not in bench.scans.command_line()
 

@@ -10,8 +10,8 @@ import pytest
 from dsl_app.connection.state import Link
 from dsl_app.scan.job import ScanJob
 from dsl_app.scan.plan import connect_first
-from dsl_app.scan.rescue import ATTEMPTS, RETRY_S
-from dsl_app.scan.state import CalibrationChoice, Phase, Rescue
+from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
+from dsl_app.scan.state import CalibrationChoice, Phase, Reconnection
 
 from dsl_core.capture.status import State, Status
 from dsl_core.cli.options import PlanChoice
@@ -209,7 +209,7 @@ def test_a_scene_that_moved_meanwhile_is_refused(
     assert phase(bench) is Phase.LOST
     assert "changed since the scan stopped" in bench.state.trouble.value
     # Its devices answer, and connecting them again would move nothing back.
-    assert (bench.rig.state.link.value, bench.state.rescue.value) == (Link.OPEN, Rescue.NONE)
+    assert (bench.rig.state.link.value, bench.state.reconnection.value) == (Link.OPEN, Reconnection.NONE)
     assert len(bench.notifier.told) == told + 1
     assert "--no-drift-check" not in bench.scans.command_line()
     # Who knows better goes on all the same.
@@ -254,7 +254,7 @@ def test_leaving_a_session_plans_a_new_one(
     with monkeypatch.context() as lost:
         fail_from(lost, 10)
         bench.scans.start()
-    bench.scans.leave_session()
+    bench.scans.plan_new_scan()
     assert bench.state.interrupted.value is None
     assert phase(bench) is Phase.PLANNING
     assert bench.state.target.value != tmp_path / "first.dsl"
@@ -398,7 +398,7 @@ def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
         bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "The disk is full" in bench.state.trouble.value
-    assert (bench.rig.state.link.value, bench.state.rescue.value) == (Link.OPEN, Rescue.NONE)
+    assert (bench.rig.state.link.value, bench.state.reconnection.value) == (Link.OPEN, Reconnection.NONE)
     assert f"20 of {FRAMES} frames are safe" in bench.state.trouble.value
     bench.scans.start()
     assert SessionReader(tmp_path / "first.dsl").missing() == []
@@ -414,8 +414,8 @@ class Outage:
     links: list[Link] = field(default_factory=list)
 
     @property
-    def rescue(self) -> Rescue:
-        return self.bench.state.rescue.value
+    def reconnection(self) -> Reconnection:
+        return self.bench.state.reconnection.value
 
     @property
     def link(self) -> Link:
@@ -440,7 +440,7 @@ def outage(bench: ScanBench, monkeypatch: pytest.MonkeyPatch) -> Outage:
         return snap(self, timeout_ms)
 
     monkeypatch.setattr(SimCamera, "snap", failing)
-    monkeypatch.setattr(bench.scans._rescuer, "_clock", lambda: made.now_s)
+    monkeypatch.setattr(bench.scans._reconnector, "_clock", lambda: made.now_s)
     bench.rig.state.link.changed.connect(made.links.append)
     bench.scans.start()
     return made
@@ -450,7 +450,7 @@ def test_a_lost_rig_is_connected_again_a_few_times_and_no_more(outage: Outage) -
     bench = outage.bench
     devices = bench.rig.state.devices
     assert outage.links == [Link.LOST, Link.OPENING, Link.LOST]
-    assert (outage.rescue, devices.value) == (Rescue.TRYING, None)
+    assert (outage.reconnection, devices.value) == (Reconnection.TRYING, None)
     assert "Check its cable" in bench.rig.state.trouble.value
     assert outage.told.endswith(f"Connecting the rig again, attempt 1 of {ATTEMPTS}.")
     outage.wait(RETRY_S / 2)
@@ -458,21 +458,21 @@ def test_a_lost_rig_is_connected_again_a_few_times_and_no_more(outage: Outage) -
     for attempt in range(2, ATTEMPTS + 1):
         outage.wait(RETRY_S)
         assert (outage.link, f"attempt {attempt} of" in outage.told) == (Link.LOST, attempt < ATTEMPTS)
-    assert outage.rescue is Rescue.GIVEN_UP
+    assert outage.reconnection is Reconnection.GIVEN_UP
     assert outage.told.endswith("could not be connected again: The camera sent no frame. Check its cable.")
     assert [level for level, _ in bench.notifier.told] == ["error", "error"]
     outage.is_gone = False
     outage.wait(10 * RETRY_S)
-    assert outage.rescue is Rescue.GIVEN_UP
+    assert outage.reconnection is Reconnection.GIVEN_UP
     bench.scans.resume()
-    assert (phase(bench), outage.rescue, outage.link) == (Phase.DONE, Rescue.NONE, Link.OPEN)
+    assert (phase(bench), outage.reconnection, outage.link) == (Phase.DONE, Reconnection.NONE, Link.OPEN)
 
 
 def test_a_rig_that_comes_back_goes_on_only_when_asked(outage: Outage) -> None:
     bench = outage.bench
     outage.is_gone = False
     outage.wait(RETRY_S)
-    assert (phase(bench), outage.rescue, outage.link) == (Phase.LOST, Rescue.BACK, Link.OPEN)
+    assert (phase(bench), outage.reconnection, outage.link) == (Phase.LOST, Reconnection.BACK, Link.OPEN)
     assert f"2 of {FRAMES} frames are safe" in outage.told
     assert outage.told.endswith("The rig is connected again.")
     bench.scans.resume()
@@ -482,7 +482,7 @@ def test_a_rig_that_comes_back_goes_on_only_when_asked(outage: Outage) -> None:
 def test_who_wishes_so_finds_the_scan_gone_on(outage: Outage) -> None:
     bench = outage.bench
     bench.scans.resume()
-    assert outage.rescue is Rescue.RESUMING
+    assert outage.reconnection is Reconnection.RESUMING
     assert "attempt 2 of" in outage.told
     assert outage.told.endswith("The scan goes on by itself when it answers.")
     outage.is_gone = False
@@ -495,7 +495,7 @@ def test_no_attempt_follows_a_stop(outage: Outage) -> None:
     outage.bench.scans.stop_reconnecting()
     outage.is_gone = False
     outage.wait(RETRY_S)
-    assert (outage.rescue, outage.link) == (Rescue.GIVEN_UP, Link.LOST)
+    assert (outage.reconnection, outage.link) == (Reconnection.GIVEN_UP, Link.LOST)
     assert outage.told.endswith("The rig is no longer being connected.")
 
 
@@ -504,20 +504,20 @@ def test_a_rig_that_a_person_connects_is_back_too(outage: Outage) -> None:
     outage.is_gone = False
     outage.bench.rig.connect(TWIN)
     # It may be another rig than the one that was wished for.
-    assert (phase(outage.bench), outage.rescue) == (Phase.LOST, Rescue.BACK)
+    assert (phase(outage.bench), outage.reconnection) == (Phase.LOST, Reconnection.BACK)
 
 
 def test_a_rig_is_not_connected_again_for_a_scan_that_was_left(outage: Outage) -> None:
-    outage.bench.scans.leave_session()
+    outage.bench.scans.plan_new_scan()
     outage.is_gone = False
     outage.wait(RETRY_S)
-    assert (outage.rescue, outage.link, outage.told) == (Rescue.NONE, Link.LOST, "")
+    assert (outage.reconnection, outage.link, outage.told) == (Reconnection.NONE, Link.LOST, "")
 
 
 def test_who_stops_a_lost_scan_does_not_find_it_gone_on(outage: Outage) -> None:
     bench = outage.bench
     bench.scans.resume()
-    assert outage.rescue is Rescue.RESUMING
+    assert outage.reconnection is Reconnection.RESUMING
     bench.scans.cancel()
     outage.is_gone = False
     outage.wait(10 * RETRY_S)
@@ -533,7 +533,7 @@ def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
 
     def prepare(job: ScanJob) -> tuple[DeviceRig, dict[str, str]]:
         job.pause()
-        threading.Timer(0.3, job.go_on).start()
+        threading.Timer(0.3, job.unpause).start()
         return calibrated(job)
 
     def hear(job: ScanJob, status: Status) -> None:
@@ -552,8 +552,8 @@ def test_another_scan_that_is_opened_does_not_go_on_by_itself(outage: Outage, tm
     shutil.copytree(tmp_path / "first.dsl", tmp_path / "other.dsl")
     bench.scans.resume()
     assert not bench.scans.open(tmp_path)
-    assert outage.rescue is Rescue.RESUMING
+    assert outage.reconnection is Reconnection.RESUMING
     assert bench.scans.open(tmp_path / "other.dsl")
     outage.is_gone = False
     outage.wait(RETRY_S)
-    assert (phase(bench), outage.rescue, outage.told) == (Phase.LOST, Rescue.NONE, "")
+    assert (phase(bench), outage.reconnection, outage.told) == (Phase.LOST, Reconnection.NONE, "")

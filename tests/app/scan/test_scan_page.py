@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.connection.state import Link
-from dsl_app.scan import rescue
+from dsl_app.scan import reconnect
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.forecast.controller import ForecastController
@@ -30,7 +30,15 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.support.scan_bench import FRAMES, SHORT, TWIN, ScanBench, foreseen, make_bench, make_forecast
+from tests.app.support.scan_bench import (
+    FRAMES,
+    SHORT,
+    TWIN,
+    ScanBench,
+    made_up_prediction,
+    make_bench,
+    make_forecast,
+)
 
 Bench = tuple[ScanPage, ScanBench, list[Path]]
 
@@ -130,8 +138,8 @@ def test_a_lost_camera_is_said_over_the_page(
     qtbot: QtBot, ready: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page, bench, _ = ready
-    monkeypatch.setattr(rescue, "RETRY_S", 0.0)
-    monkeypatch.setattr(rescue, "ATTEMPTS", 1000)
+    monkeypatch.setattr(reconnect, "RETRY_S", 0.0)
+    monkeypatch.setattr(reconnect, "ATTEMPTS", 1000)
 
     def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
         raise DeviceError("The camera sent no frame. Check its cable.")
@@ -236,7 +244,7 @@ def predicted(monkeypatch: pytest.MonkeyPatch) -> None:
     from dsl_core.planning import prediction
 
     monkeypatch.setattr(
-        prediction, "predict", lambda rig, plan, view, latency_ms: foreseen(rig, plan, latency_ms)
+        prediction, "predict", lambda rig, plan, view, latency_ms: made_up_prediction(rig, plan, latency_ms)
     )
 
 
@@ -247,7 +255,7 @@ def figures(page: ScanPage, column: int) -> dict[str, str]:
 
 
 def begin(qtbot: QtBot, page: ScanPage) -> ForecastState:
-    control = page.forecast._commands
+    control = page.forecast._controller
     assert isinstance(control, ForecastController)
     control.begin()
     qtbot.waitUntil(lambda: control.state.progress.value == (0, 0), timeout=60_000)

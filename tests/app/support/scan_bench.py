@@ -99,7 +99,7 @@ def make_forecast(
     )
 
 
-def foreseen(rig: Rig, plan: CapturePlan, latency_ms: float) -> Prediction:
+def made_up_prediction(rig: Rig, plan: CapturePlan, latency_ms: float) -> Prediction:
     """A prediction that takes no time: errors fall with time and grow with noise."""
     from dsl_core.planning.prediction import Prediction
 

@@ -1,4 +1,4 @@
-"""Which effects the simulated rig renders: looked at for the scene at hand, then put in force. No Qt."""
+"""The effects that the simulated rig renders: previewed for the current scene, then applied. No Qt."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice
-from dsl_app.scan.effects.state import EffectRow, EffectsState, EffectsView, Wanted
+from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
 from dsl_app.scan.state import ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
@@ -24,7 +24,7 @@ EFFECTS, TOLERANCE = "effects", "tolerance"
 
 
 class EffectsController:
-    """Weighs the effects of the scene at hand; `apply` connects the twin anew with a choice."""
+    """Weighs the effects of the current scene; `apply` reconnects the twin with a choice."""
 
     def __init__(
         self,
@@ -35,7 +35,7 @@ class EffectsController:
         notifier: Notifier,
     ) -> None:
         self.state, self._scan, self._rig, self._runner, self._notifier = state, scan, rig, runner, notifier
-        self._asked = (Wanted.USUAL.value, ONE_DN)
+        self._asked = (EffectChoice.USUAL.value, ONE_DN)
         self._turn = 0
         self._stops = [rig.state.devices.follow(self._take_rig), rig.state.link.follow(self._take_link)]
 
@@ -44,20 +44,20 @@ class EffectsController:
         state = self.state
         state.view.set(None)
         if devices is None and self._rig.state.link.value is Link.OPENING:
-            return  # what comes may be simulated again
+            return  # the next rig may be simulated, too
         world = _world_of(devices)
         state.offered.set(world is not None)
-        state.in_use.set(options.get(EFFECTS, Wanted.USUAL.value))
+        state.in_use.set(options.get(EFFECTS, EffectChoice.USUAL.value))
         state.tolerance.set(ONE_DN if world is None else world.tolerance)
         self._asked = (state.in_use.value, state.tolerance.value)
 
     def _take_link(self, link: Link) -> None:
-        # A rig that was asked for may not have come.
+        # Connecting the requested rig may have failed.
         if link is Link.CLOSED and self._rig.state.devices.value is None:
             self.state.offered.set(False)
 
     def look(self, choice: str, tolerance: Tolerance) -> None:
-        """Show what a choice renders, and what the rest would change and cost."""
+        """Show what a choice renders, and what the other effects would change and cost."""
         self._asked = choice, tolerance
         world, plan = _world_of(self._rig.state.devices.value), self._scan.plan.value
         if world is None:
@@ -70,7 +70,7 @@ class EffectsController:
             return view_of(world, choice, tolerance, plan)
 
         def done(view: EffectsView) -> None:
-            # Whoever clicks quickly wants the last choice.
+            # After several quick clicks the last choice wins.
             if turn == self._turn:
                 self.state.busy.set(False)
                 self.state.view.set(view)
@@ -84,25 +84,25 @@ class EffectsController:
         self._runner.submit(Job("Weigh the effects", work, done, failed, ended, is_minor=True))
 
     def look_again(self) -> None:
-        """Show the choice looked at last, for the plan at hand."""
+        """Show the last choice again, for the current plan."""
         self.look(*self._asked)
 
     def apply(self, choice: str, tolerance: Tolerance) -> None:
-        """Let the twin render a choice from now on."""
+        """Let the twin render a choice."""
         if self._scan.phase.value.is_busy:
-            self._notifier.tell("info", "A scan is running. Wait for its end, then change the effects.")
+            self._notifier.tell("info", "A scan is running. Wait until it ends, then change the effects.")
             return
         now = self._rig.state.choice.value
         options = {key: value for key, value in now.options if key not in (EFFECTS, TOLERANCE)}
-        if choice != Wanted.USUAL.value:
+        if choice != EffectChoice.USUAL.value:
             options[EFFECTS] = choice
-        if choice == Wanted.AUTO.value and tolerance != ONE_DN:
+        if choice == EffectChoice.AUTO.value and tolerance != ONE_DN:
             # Options of a rig are separated by spaces.
             options[TOLERANCE] = str(tolerance).replace(" ", "")
         self._rig.connect(RigChoice(now.name, tuple(options.items())))
 
     def close(self) -> None:
-        """Follow the rig no more."""
+        """Disconnect from the rig's state."""
         for stop in self._stops:
             stop()
 
@@ -117,7 +117,7 @@ def _world_of(devices: DeviceRig | None) -> World | None:
 
 
 def view_of(world: World, choice: str, tolerance: Tolerance, plan: CapturePlan) -> EffectsView:
-    """What a world would render by a choice; the world itself stays as it is."""
+    """What a world would render with a choice; the world itself is not changed."""
     from dsl_core.simulation.effects.catalogue import Choice
 
     other = replace(world, effects=Choice.of(choice), tolerance=tolerance, settings=plan.settings, _path=None)

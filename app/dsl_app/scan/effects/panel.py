@@ -1,9 +1,8 @@
-"""The effects of light that the simulated rig renders: what each changes, costs, and why it is on or off."""
+"""The Effects tab: what each effect of light changes and costs, and why it is on or off."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
@@ -15,46 +14,31 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.scan.effects.state import EffectRow, EffectsState, EffectsView, Wanted
+from dsl_app.scan.effects.controller import EffectsController
+from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
-_COLUMNS = ("Effect", "At most", "In σ", "A frame", "Why")
+_COLUMNS = ("Effect", "At most", "In σ", "Per frame", "Why")
 _CHOICES = (
-    (Wanted.USUAL, "As usual", "what the plain renderer has"),
-    (Wanted.AUTO, "What the scene calls for", "the rest changes no pixel by the tolerance"),
-    (Wanted.ALL, "Everything", "the expensive ones too"),
-    (Wanted.NONE, "Nothing", "only what cannot be left out"),
-    (Wanted.CHOSEN, "Chosen below", "those that are ticked"),
+    (EffectChoice.USUAL, "Default", "the effects of the plain renderer"),
+    (EffectChoice.AUTO, "What the scene calls for", "the others change no pixel by more than the tolerance"),
+    (EffectChoice.ALL, "All", "including the expensive ones"),
+    (EffectChoice.NONE, "None", "only those that cannot be left out"),
+    (EffectChoice.CHOSEN, "Custom", "the effects ticked below"),
 )
 #: Signs and names of the units of a tolerance.
 _UNITS = (("DN", "DN"), ("σ", "sigma"))
 
 
-class EffectsCommands(Protocol):
-    """What the panel asks of its controller."""
-
-    def look(self, choice: str, tolerance: Tolerance) -> None:
-        """Show what a choice renders."""
-
-    def look_again(self) -> None:
-        """Show the choice looked at last."""
-
-    def apply(self, choice: str, tolerance: Tolerance) -> None:
-        """Put a choice in force."""
-
-    def close(self) -> None:
-        """Follow nothing more."""
-
-
 class EffectsPanel(QWidget):
-    """Follows an `EffectsState` and asks a controller."""
+    """Shows an `EffectsState` and calls its controller."""
 
-    def __init__(self, state: EffectsState, commands: EffectsCommands) -> None:
+    def __init__(self, state: EffectsState, controller: EffectsController) -> None:
         super().__init__()
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._controller, self._theme = state, controller, DARK
         self.choice = ChoiceBox("Effects", "Which effects of light the simulated rig renders")
         for wanted, title, what in _CHOICES:
             self.choice.addItem(title, wanted.value)
@@ -65,16 +49,14 @@ class EffectsPanel(QWidget):
             1000,
             ONE_DN.value,
             decimals=3,
-            tip="What is left out changes no pixel of any picture by more",
+            tip="Effects left out change no pixel of any picture by more than this",
         )
         self.unit = ChoiceBox("Unit of the tolerance", "Counts, or standard deviations of a dark pixel")
         for sign, name in _UNITS:
             self.unit.addItem(sign, name)
         self._within = label("within", "muted")
         self.apply = QPushButton("Apply")
-        self.apply.setToolTip(
-            "Connect the simulated rig anew with these effects; its scans say which they were"
-        )
+        self.apply.setToolTip("Reconnect the simulated rig with these effects; its scans record them")
         self.table = _table()
         self._summary, self._saved = label(""), label("", "muted")
         for text in (self._summary, self._saved):
@@ -101,7 +83,7 @@ class EffectsPanel(QWidget):
         self.tolerance.valueChanged.connect(lambda _: self._look())
         self.unit.currentIndexChanged.connect(lambda _: self._look())
         self.table.itemChanged.connect(self._ticked)
-        self.apply.clicked.connect(lambda: self._commands.apply(self._wanted(), self._chosen_tolerance()))
+        self.apply.clicked.connect(lambda: self._controller.apply(self._wanted(), self._chosen_tolerance()))
         self.stops: list[Callable[[], None]] = [
             state.in_use.follow(lambda _: self._show_in_use()),
             state.tolerance.follow(lambda _: self._show_in_use()),
@@ -110,16 +92,16 @@ class EffectsPanel(QWidget):
         ]
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Weigh the effects when somebody looks."""
+        """Weigh the effects when the tab is shown."""
         super().showEvent(event)
-        self._commands.look_again()
+        self._controller.look_again()
 
     # Ask -------------------------------------------------------------------------------------------
 
     def _wanted(self) -> str:
-        """The choice as the command line has it."""
+        """The choice in command-line form."""
         kind = str(self.choice.currentData())
-        if kind != Wanted.CHOSEN.value:
+        if kind != EffectChoice.CHOSEN.value:
             return kind
         names = (row.name for row, item in self._items() if item.checkState() is Qt.CheckState.Checked)
         return ",".join(names)
@@ -135,13 +117,13 @@ class EffectsPanel(QWidget):
 
     def _look(self) -> None:
         if self.isVisible():
-            self._commands.look(self._wanted(), self._chosen_tolerance())
+            self._controller.look(self._wanted(), self._chosen_tolerance())
         self._show_state()
 
     def _ticked(self, item: QTableWidgetItem) -> None:
-        """Take effects by name as soon as one is ticked."""
+        """Switch to a custom choice as soon as an effect is ticked."""
         if item.column() == 0:
-            index = self.choice.findData(Wanted.CHOSEN.value)
+            index = self.choice.findData(EffectChoice.CHOSEN.value)
             if self.choice.currentIndex() == index:
                 self._look()
             else:
@@ -150,9 +132,9 @@ class EffectsPanel(QWidget):
     # Show ------------------------------------------------------------------------------------------
 
     def _show_in_use(self) -> None:
-        """Bring the controls to what the rig renders now."""
-        named = [wanted.value for wanted in Wanted]
-        kind = self._state.in_use.value if self._state.in_use.value in named else Wanted.CHOSEN.value
+        """Show what the rig renders now."""
+        named = [wanted.value for wanted in EffectChoice]
+        kind = self._state.in_use.value if self._state.in_use.value in named else EffectChoice.CHOSEN.value
         tolerance = self._state.tolerance.value
         for box in (self.choice, self.tolerance, self.unit):
             box.blockSignals(True)
@@ -162,7 +144,7 @@ class EffectsPanel(QWidget):
         for box in (self.choice, self.tolerance, self.unit):
             box.blockSignals(False)
         if self.isVisible():
-            self._commands.look_again()
+            self._controller.look_again()
         self._show_state()
 
     def _show(self, view: EffectsView | None) -> None:
@@ -189,7 +171,7 @@ class EffectsPanel(QWidget):
 
     def _show_state(self) -> None:
         state, view = self._state, self._state.view.value
-        is_auto = self.choice.currentData() == Wanted.AUTO.value
+        is_auto = self.choice.currentData() == EffectChoice.AUTO.value
         for widget in (self._within, self.tolerance, self.unit):
             widget.setVisible(is_auto)
         self.apply.setEnabled(
@@ -201,18 +183,17 @@ class EffectsPanel(QWidget):
             )
         )
         if view is None:
-            self._summary.setText("Weighing …" if state.busy.value else "")
+            self._summary.setText("Weighing…" if state.busy.value else "")
             self._saved.setText("")
             return
         self._summary.setText(
-            f"{len(view.on)} of {len(view.rows)} effects are rendered. What is off changes no pixel of any"
-            f" picture by more than {view.left_out}."
+            f"{len(view.on)} of {len(view.rows)} effects are rendered. The others change no pixel of any picture"
+            f" by more than {view.left_out}."
         )
         saved_s = view.frames * (view.all_s - view.frame_s)
         self._saved.setText(
-            f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with"
-            f" everything: {100 * view.saved_share:.0f} %, or {saved_s:.0f} s of {view.frames} frames, are"
-            " saved."
+            f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with all effects."
+            f" This saves {100 * view.saved_share:.0f} %, or {saved_s:.0f} s over {view.frames} frames."
         )
 
     def apply_theme(self, theme: Theme) -> None:
@@ -221,7 +202,7 @@ class EffectsPanel(QWidget):
         self._show(self._state.view.value)
 
     def release(self) -> None:
-        """Follow nothing more."""
+        """Disconnect from all state."""
         for stop in self.stops:
             stop()
 

@@ -1,4 +1,4 @@
-"""Which effects of light a simulated rig renders, as the window knows it."""
+"""The state of the Effects tab."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dsl_app.shared.evented import Value
 from dsl_core.simulation.effects.tolerance import ONE_DN
 
 
-class Wanted(Enum):
+class EffectChoice(Enum):
     """How effects are chosen; the values are those of the command line, ``CHOSEN`` stands for names."""
 
     USUAL = "usual"
@@ -35,10 +35,10 @@ class EffectRow:
 
 @dataclass(frozen=True)
 class EffectsView:
-    """A decision on every effect of the scene at hand.
+    """A decision on every effect of the current scene.
 
-    ``left_out`` is the most that what is off changes, in words; ``frame_s`` and ``all_s`` are computing of a
-    frame, of which the scan takes ``frames``.
+    ``left_out`` bounds the change by all effects that are off, in words; ``frame_s`` and ``all_s`` are the
+    computing times of a frame with this choice and with all effects; the scan has ``frames``.
     """
 
     rows: tuple[EffectRow, ...]
@@ -49,12 +49,12 @@ class EffectsView:
 
     @property
     def saved_share(self) -> float:
-        """Share of the computing that is saved against rendering everything."""
+        """Share of computing saved, compared with rendering everything."""
         return 1 - self.frame_s / self.all_s if self.all_s > 0 else 0.0
 
     @property
     def on(self) -> tuple[str, ...]:
-        """Names of what is rendered."""
+        """Names of the rendered effects."""
         return tuple(row.name for row in self.rows if row.on)
 
 
@@ -62,12 +62,12 @@ class EffectsState:
     """Values that the controller sets and the panel follows.
 
     ``offered``: whether the rig is simulated. ``in_use`` and ``tolerance`` are those of the rig, ``view`` is
-    what would be rendered by the choice looked at last.
+    what the last choice would render.
     """
 
     def __init__(self) -> None:
         self.offered = Value(False)
-        self.in_use = Value(Wanted.USUAL.value)
+        self.in_use = Value(EffectChoice.USUAL.value)
         self.tolerance = Value(ONE_DN)
         self.view: Value[EffectsView | None] = Value(None)
         self.busy = Value(False)

@@ -1,33 +1,39 @@
-"""What accuracy costs in time on the rig at hand: predicted, wished for, and measured after a scan. No Qt."""
+"""Accuracy against time on the current rig: predicted, requested, and measured after a scan. No Qt."""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dsl_app.connection.state import RigState
-from dsl_app.scan.forecast.job import ForecastJob, Rigging, usual_candidates
-from dsl_app.scan.forecast.measured import measure
-from dsl_app.scan.forecast.state import ForecastState, Foreseen, Measured, identity
+from dsl_app.scan.forecast.job import ForecastBasis, ForecastJob, usual_candidates
+from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, Measured, identity
 from dsl_app.scan.plan import KEEPS_ITS_PLAN, ScanPlanController
 from dsl_app.scan.state import Phase, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
-from dsl_core.errors import PlanError
+from dsl_core.errors import DslError, PlanError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
+if TYPE_CHECKING:
+    from dsl_core.evaluation.summary import Evaluation
+
 NO_CALIBRATION = (
-    "Without a calibration nothing can be predicted for this rig. Calibrate it, or choose a calibration of"
-    " the library at the right."
+    "Predictions for this rig need a calibration. Calibrate the rig, or choose a calibration from the"
+    " library on the right."
 )
 
 
 class ForecastController:
-    """Predicts presets, candidates and the plan at hand in one job that starts anew where it was stopped.
+    """Predicts presets, candidates and the current plan in one job that can be stopped and restarted.
 
-    ``folder`` keeps what was predicted. Where it is not ``automatic``, only `begin` starts it.
+    ``folder`` caches predictions. Unless ``automatic``, only `begin` starts the job.
     """
 
     def __init__(
@@ -45,12 +51,12 @@ class ForecastController:
         self.state, self._scan, self._rig, self._plans = state, scan, rig, plans
         self._runner, self._notifier, self._folder = runner, notifier, folder
         self._automatic, self._candidates = automatic, candidates
-        self._known: dict[int, Foreseen] = {}
+        self._known: dict[int, ForecastPoint] = {}
         self._refused: dict[int, str] = {}
         self._work: ForecastJob | None = None
         self._job: Job[None] | None = None
-        self._of: Rigging | None = None
-        #: Whether nothing is left to predict but plans of one's own, as all is done or a person said stop.
+        self._of: ForecastBasis | None = None
+        #: Whether only custom plans are left to predict: all others are done, or the person stopped the job.
         self._is_complete = False
         self._stops = [
             rig.devices.follow(lambda _: self._renew()),
@@ -62,20 +68,20 @@ class ForecastController:
 
     # Predict ---------------------------------------------------------------------------------------
 
-    def _rigging(self) -> Rigging | None:
+    def _rigging(self) -> ForecastBasis | None:
         known = self._plans.calibration
         if known is None:
             return None
         scan = self._scan
-        return Rigging(known, scan.latency_ms.value, scan.period_ms.value, self.state.look.value)
+        return ForecastBasis(known, scan.latency_ms.value, scan.period_ms.value, self.state.look.value)
 
     def look(self, result: Path | None) -> None:
-        """Predict for the scene that a result shows, or for a Color Checker."""
+        """Predict for the scene of a result, or for a Color Checker."""
         self.state.look.set(result)
         self._renew()
 
     def _renew(self) -> None:
-        """Forget what was predicted for another rig or calibration."""
+        """Discard predictions for another rig or calibration."""
         now, is_there = self._rigging(), self._rig.devices.value is not None
         self.state.trouble.set(NO_CALIBRATION if now is None and is_there else "")
         if now == self._of:
@@ -89,7 +95,7 @@ class ForecastController:
             self.begin()
 
     def begin(self) -> None:
-        """Predict what is not known yet, unless a scan uses the machine."""
+        """Predict what is not known yet, unless a scan is running."""
         if self._of is None or self._job is not None or self._scan.phase.value.is_busy:
             return
         plan = self._scan.plan.value
@@ -106,7 +112,7 @@ class ForecastController:
             lambda: self._ended(work, complete=False),
             is_minor=True,
         )
-        # How many there are is not known yet, but that something is under way is.
+        # The total is not known yet, but show that something is running.
         self.state.progress.set((0, 1))
         self._runner.submit(job)
 
@@ -121,27 +127,27 @@ class ForecastController:
 
     def _ended(self, work: ForecastJob, complete: bool) -> None:
         if work is not self._work:
-            return  # what it found was for another rig
+            return  # its predictions are for another rig
         self.take_news()
         self._is_complete = True
         self._stop()
         if complete and self._automatic:
-            # The plan may have changed when the job was about to end.
+            # The plan may have changed just before the job ended.
             self.begin()
 
     def _failed(self, work: ForecastJob, error: Exception) -> None:
         if work is self._work:
             self._stop()
             self._is_complete = True
-            self.state.trouble.set(f"Nothing can be predicted: {sentence_of(error)}")
+            self.state.trouble.set(f"Prediction failed: {sentence_of(error)}")
 
     def take_news(self) -> None:
-        """Show what was predicted since last time; called by the window's clock."""
+        """Show new predictions; called by a timer."""
         if self._work is None or self._job is None:
             return
         news = self._work.take_news()
         for each in news:
-            if isinstance(each, Foreseen):
+            if isinstance(each, ForecastPoint):
                 self._known[each.key] = each
             else:
                 self._refused[identity(each.plan)] = each.reason
@@ -167,20 +173,20 @@ class ForecastController:
 
     # Choose ----------------------------------------------------------------------------------------
 
-    def choose(self, wanted: Foreseen) -> None:
-        """Plan this."""
+    def choose(self, wanted: ForecastPoint) -> None:
+        """Use this plan."""
         self._plans.change_plan(wanted.plan)
 
     def answer(self, budget_s: float | None = None, error: float | None = None) -> None:
-        """Plan the most accurate within a time, or the quickest that reaches an error of single pixels."""
+        """Use the most accurate plan within a time, or the quickest one within an error of single pixels."""
         from dsl_core.planning.choice import Weighed, choose
 
         points = self.state.points.value
         if not points:
-            self.state.answer.set("Nothing is predicted yet. Wait a moment, then ask again.")
+            self.state.answer.set("No plan is predicted yet. Wait a moment, then try again.")
             return
         done, total = self.state.progress.value
-        so_far = f" Of {done} of {total} plans predicted so far." if done < total else ""
+        so_far = f" {done} of {total} plans predicted so far." if done < total else ""
         try:
             found = choose([Weighed(each.plan, each.expected) for each in points], budget_s, error)
         except PlanError as none:
@@ -194,7 +200,7 @@ class ForecastController:
         if identity(self._scan.plan.value) == best.key:
             self.state.answer.set(f"Chosen: {words}{so_far}")
         else:
-            self.state.answer.set(f"Best would be {words}{so_far} {KEEPS_ITS_PLAN}")
+            self.state.answer.set(f"The best plan would be {words}{so_far} {KEEPS_ITS_PLAN}")
 
     # After a scan ----------------------------------------------------------------------------------
 
@@ -208,13 +214,13 @@ class ForecastController:
 
     def _note_scan(self) -> None:
         status, plan = self._scan.status.value, self._scan.plan.value
-        seconds = None if self._waits_for_nothing else status.elapsed_s
+        seconds = None if self._is_faster_than_real else status.elapsed_s
         name = self._scan.target.value.stem
         self.state.measured.set(Measured(name, plan, status.total, seconds, plan.raw_bytes))
 
     @property
-    def _waits_for_nothing(self) -> bool:
-        """Whether a simulated rig takes exposures quicker than real ones could be."""
+    def _is_faster_than_real(self) -> bool:
+        """Whether the rig is simulated and captures faster than real time."""
         from dsl_core.simulation.sim_devices import SimCamera
 
         devices = self._rig.devices.value
@@ -222,7 +228,7 @@ class ForecastController:
         return is_simulated and dict(self._rig.choice.value.options).get("realtime") != "on"
 
     def _measure(self, result: Path) -> None:
-        """Compare a new result with its truth, if any is known; its scene may be planned for."""
+        """Compare a new result with the truth, if known; its scene can then be planned for."""
         self.state.last_look.set(result)
         scan = self.state.measured.value
         if scan is None or scan.name != result.stem:
@@ -233,12 +239,49 @@ class ForecastController:
             return measure(scan, result)
 
         def failed(error: Exception) -> None:
-            self._notifier.tell("warning", f"{result.name} could not be judged: {sentence_of(error)}")
+            self._notifier.tell(
+                "warning", f"{result.name} could not be compared with the truth: {sentence_of(error)}"
+            )
 
-        self._runner.submit(Job(f"Judge {result.stem}", work, self.state.measured.set, failed, is_minor=True))
+        self._runner.submit(
+            Job(f"Compare {result.stem} with the truth", work, self.state.measured.set, failed, is_minor=True)
+        )
 
     def close(self) -> None:
-        """Follow nothing more."""
+        """Disconnect from all state and stop the job."""
         for stop in self._stops:
             stop()
         self._stop()
+
+
+def measure(scan: Measured, result: Path) -> Measured:
+    """The scan with the duration of its reconstruction and, where the truth is known, its errors."""
+    from dsl_core.evaluation.summary import evaluate
+    from dsl_core.io.result.result_file import load_result
+    from dsl_core.workflows.scans import truth_of
+
+    found = load_result(result)
+    costs = json.loads(str(found.attrs.get("stage_costs", "[]")))
+    known = replace(scan, computing_s=sum(float(cost["seconds"]) for cost in costs) or None)
+    try:
+        truth = truth_of(found)
+    except DslError:  # a real rig, whose scene is unknown
+        return known
+    return _with_errors(known, evaluate(found, truth))
+
+
+def _with_errors(scan: Measured, found: Evaluation) -> Measured:
+    if found.depth is not None:
+        scan = replace(scan, depth_rmse_mm=found.depth.rmse_mm, coverage=found.depth.coverage)
+    if not found.patches:
+        return scan
+    squares = [patch.pixel_rmse**2 for patch in found.patches]
+    return replace(
+        scan,
+        rmse=found.mean("rmse"),
+        pixel_rmse=math.sqrt(sum(squares) / len(squares)),
+        angle_rad=found.mean("angle_rad"),
+        pixel_angle_rad=found.mean("pixel_angle_rad"),
+        delta_e=found.mean("delta_e"),
+        fwhm_nm=found.mean_fwhm_nm,
+    )

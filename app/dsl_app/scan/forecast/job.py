@@ -1,4 +1,4 @@
-"""Predicting plans in a job's thread, the one that is wanted first. No Qt."""
+"""Predicts plans in a job's thread, the requested one first. No Qt."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_app.scan.forecast.state import Foreseen, identity
+from dsl_app.scan.forecast.state import ForecastPoint, identity
 from dsl_app.scan.forecast.store import ForecastStore
 from dsl_core.errors import DslError
 from dsl_core.model.plan import CapturePlan
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from dsl_core.planning.prediction import Prediction
     from dsl_core.planning.views import View
 
-#: How often is looked whether other work is over, s.
+#: Interval at which to check whether other work has ended, s.
 LOOK_S = 0.1
 
 
 def usual_candidates(rig: Rig) -> Iterable[CapturePlan]:
-    """Every plan that the planner weighs."""
+    """All plans that the planner considers."""
     from dsl_core.planning.candidates import candidate_plans
 
     return candidate_plans(rig)
@@ -35,17 +35,17 @@ def usual_candidates(rig: Rig) -> Iterable[CapturePlan]:
 
 @dataclass(frozen=True)
 class Refused:
-    """A plan of which nothing can be predicted, and why."""
+    """A plan that cannot be predicted, and why."""
 
     plan: CapturePlan
     reason: str
 
 
 @dataclass(frozen=True)
-class Rigging:
-    """For what is predicted: a calibration, the projector's latency and frame period, and a scene.
+class ForecastBasis:
+    """What predictions are based on: a calibration, the projector's latency and frame period, and a scene.
 
-    ``look`` is a result that shows the scene; None for a Color Checker.
+    ``look`` is a result of the scene; None for a Color Checker.
     """
 
     rig: Rig
@@ -55,25 +55,25 @@ class Rigging:
 
     @property
     def scene(self) -> str:
-        """What tells scenes apart, results of the same name among them."""
+        """An identifier of the scene that also distinguishes results of the same name."""
         if self.look is None:
             return ""
         try:
             return f"{self.look} {self.look.stat().st_mtime_ns}"
-        except OSError:  # whoever reads it will say so
+        except OSError:  # reported when it is read
             return str(self.look)
 
 
 class ForecastJob:
-    """Predicts presets, then candidates; `work` belongs to the job's thread, all else to the window's.
+    """Predicts presets, then candidates; `work` belongs to the job's thread, everything else to the window's.
 
-    Without candidates only what is wanted is predicted. ``must_wait`` says whether other work should have the
-    machine for itself.
+    Without candidates only the requested plan is predicted. ``must_wait`` tells whether other work has
+    priority.
     """
 
     def __init__(
         self,
-        rigging: Rigging,
+        rigging: ForecastBasis,
         folder: Path,
         candidates: Callable[[Rig], Iterable[CapturePlan]] | None,
         must_wait: Callable[[], bool],
@@ -82,7 +82,7 @@ class ForecastJob:
         self._folder, self._candidates, self._must_wait = folder, candidates, must_wait
         self._lock = threading.Lock()
         self._wanted: CapturePlan | None = None
-        self._news: list[Foreseen | Refused] = []
+        self._news: list[ForecastPoint | Refused] = []
         self._view: View | None = None
 
     # In the window's thread ------------------------------------------------------------------------
@@ -92,8 +92,8 @@ class ForecastJob:
         with self._lock:
             self._wanted = plan
 
-    def take_news(self) -> list[Foreseen | Refused]:
-        """What was predicted since last time."""
+    def take_news(self) -> list[ForecastPoint | Refused]:
+        """Predictions since the last call."""
         with self._lock:
             news, self._news = self._news, []
         return news
@@ -101,8 +101,8 @@ class ForecastJob:
     # In the job's thread ---------------------------------------------------------------------------
 
     def work(self, progress: Progress) -> None:
-        """Predict all that is not remembered; raises `DslError` where nothing can be predicted at all."""
-        from dsl_core.planning import choice as _choice  # noqa: F401 - the window will want it at once
+        """Predict everything that is not cached; raises `DslError` if nothing can be predicted at all."""
+        from dsl_core.planning import choice as _choice  # noqa: F401 - the window needs it soon
 
         rig = self.rigging.rig
         store = ForecastStore(self._folder, rig, self.rigging.latency_ms, self.rigging.scene)
@@ -126,7 +126,7 @@ class ForecastJob:
         return [(each.key, on_cycles(each.plan, self.rigging.period_ms)) for each in PRESETS]
 
     def _next(self, todo: deque[CapturePlan]) -> tuple[CapturePlan, bool] | None:
-        """The plan whose turn it is, and whether somebody waits for it."""
+        """The next plan, and whether it was requested."""
         with self._lock:
             wanted, self._wanted = self._wanted, None
         if wanted is not None:
@@ -134,16 +134,16 @@ class ForecastJob:
         return (todo.popleft(), False) if todo else None
 
     def _wait(self, progress: Progress) -> None:
-        """Let work that a person asked for go first."""
+        """Let work that the person started go first."""
         while self._must_wait():
             progress.report("wait for other work", 0, 0)
             time.sleep(LOOK_S)
 
-    def _post(self, news: Foreseen | Refused) -> None:
+    def _post(self, news: ForecastPoint | Refused) -> None:
         with self._lock:
             self._news.append(news)
 
-    def _of(self, plan: CapturePlan, store: ForecastStore, preset: str) -> Foreseen | Refused:
+    def _of(self, plan: CapturePlan, store: ForecastStore, preset: str) -> ForecastPoint | Refused:
         rig = self.rigging.rig
         size = {
             "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
@@ -152,17 +152,17 @@ class ForecastJob:
         sized = plan.model_copy(update=size)
         known = store.find(sized)
         if known is not None:
-            return Foreseen(plan, known, preset)
+            return ForecastPoint(plan, known, preset)
         view = self._look()
         try:
             found = self._predict(sized, view)
         except DslError as error:
             return Refused(plan, str(error))
         store.keep(sized, found)
-        return Foreseen(plan, found, preset)
+        return ForecastPoint(plan, found, preset)
 
     def _look(self) -> View:
-        """Sample pixels of the scene; raises `DslError` where there are none."""
+        """Sample pixels of the scene; raises `DslError` if there are none."""
         from dsl_core.planning.views import plane_view, scene_view
 
         if self._view is not None:

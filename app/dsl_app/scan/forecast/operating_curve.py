@@ -1,4 +1,4 @@
-"""What accuracy costs in time: plans as points, the one at hand to be dragged along the best of them."""
+"""The curve of accuracy against time: plans as points, the current one draggable along the best."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from dsl_app.scan.forecast.state import Foreseen
+from dsl_app.scan.forecast.state import ForecastPoint
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks, time_ticks
 
-#: Presets that are always named; other points only while they are chosen or pointed at.
+#: Presets that are always labelled; other points only while chosen or pointed at.
 NAMED = ("preview", "balanced", "reference")
-#: Names closer than this, in decades of time, would overlap.
+#: Labels closer than this, in decades of time, would overlap.
 NEAR = 0.3
 #: Room around the points, in decades.
 ROOM = 0.09
@@ -46,15 +46,15 @@ FIGURES = (
 
 
 class OperatingCurve(QWidget):
-    """Emits ``chosen`` with the plan clicked, dropped on, or reached by arrow keys; ``pointed`` meanwhile."""
+    """Emits ``chosen`` for the plan clicked, dropped on or reached by arrow keys, ``pointed`` while moving."""
 
     chosen = Signal(object)
     pointed = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()
-        self._points: tuple[Foreseen, ...] = ()
-        self._current: Foreseen | None = None
+        self._points: tuple[ForecastPoint, ...] = ()
+        self._current: ForecastPoint | None = None
         self._theme = DARK
         self._labels: dict[int, Any] = {}
         self._is_fixed = False
@@ -63,9 +63,9 @@ class OperatingCurve(QWidget):
             self.figure.addItem(figure.title)
         self.plot = calm_plot(
             "Accuracy against time",
-            "Expected error over the time on the rig; below and left is better. Click a point, drag the"
-            " marker along the curve, or press the arrow keys. The star is the published plan.",
-            "RMSE", "Time on the rig",
+            "Expected error against capture time; lower left is better. Click a point, drag the marker along the"
+            " curve, or press the arrow keys. The star is the published plan.",
+            "RMSE", "Capture time",
         )  # fmt: skip
         self.plot.setMouseEnabled(False, False)
         self.plot.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -95,13 +95,13 @@ class OperatingCurve(QWidget):
 
     # Show ------------------------------------------------------------------------------------------
 
-    def show_points(self, points: Sequence[Foreseen], current: Foreseen | None) -> None:
-        """Show what is expected of plans, and which one is at hand."""
+    def show_points(self, points: Sequence[ForecastPoint], current: ForecastPoint | None) -> None:
+        """Show predictions and which plan is current."""
         self._points, self._current = tuple(points), current
         self._draw()
 
     def fix(self, fixed: bool) -> None:
-        """Let nothing be chosen while a scan is under way."""
+        """Disable choices while a scan is running."""
         self._is_fixed = fixed
         self.marker.movable = not fixed
 
@@ -109,16 +109,16 @@ class OperatingCurve(QWidget):
     def _figure(self) -> Figure:
         return FIGURES[self.figure.currentIndex()]
 
-    def spot(self, point: Foreseen) -> tuple[float, float] | None:
-        """Where a point lies on the axes, which count decades; None where it has no such figure."""
+    def spot(self, point: ForecastPoint) -> tuple[float, float] | None:
+        """The position of a point on the logarithmic axes; None if it lacks the figure."""
         value = getattr(point.expected, self._figure.field)
         return None if not value else (math.log10(point.expected.seconds), math.log10(value))
 
-    def _seen(self) -> list[tuple[Foreseen, tuple[float, float]]]:
+    def _seen(self) -> list[tuple[ForecastPoint, tuple[float, float]]]:
         return [(each, at) for each in self._points if (at := self.spot(each)) is not None]
 
-    def front(self) -> list[Foreseen]:
-        """The plans that no quicker one beats, from quick to slow."""
+    def front(self) -> list[ForecastPoint]:
+        """The plans that no quicker one beats, quickest first."""
         wanted = self._figure.wanted
         best, found = float("inf"), []
         for point, at in sorted(self._seen(), key=lambda each: each[1]):
@@ -154,7 +154,7 @@ class OperatingCurve(QWidget):
             self._place_marker(at)
 
     @staticmethod
-    def _spot_of(point: Foreseen, at: tuple[float, float], theme: Theme) -> dict[str, Any]:
+    def _spot_of(point: ForecastPoint, at: tuple[float, float], theme: Theme) -> dict[str, Any]:
         if point.is_published:
             return {
                 "pos": at,
@@ -175,7 +175,7 @@ class OperatingCurve(QWidget):
             }
         return {"pos": at, "data": point, "symbol": "o", "size": 6, "brush": theme.muted, "pen": theme.base}
 
-    def _named(self) -> list[Foreseen]:
+    def _named(self) -> list[ForecastPoint]:
         """Points with names; the one at hand pushes out those beside it."""
         at = None if self._current is None else self.spot(self._current)
         named = [] if at is None or self._current is None else [self._current]
@@ -198,7 +198,7 @@ class OperatingCurve(QWidget):
         item.getAxis("bottom").setTicks([time_ticks(10 ** (left - ROOM), 10 ** (right + ROOM))])
         item.getAxis("left").setTicks([ticks(10 ** (low - ROOM / 2), 10**top)])
 
-    def _name(self, point: Foreseen) -> None:
+    def _name(self, point: ForecastPoint) -> None:
         at = self.spot(point)
         if at is None or point.key in self._labels:
             return
@@ -220,8 +220,8 @@ class OperatingCurve(QWidget):
 
     # Choose ----------------------------------------------------------------------------------------
 
-    def _nearest(self) -> Foreseen | None:
-        """The point of the curve, or the preset, nearest to the marker on the screen."""
+    def _nearest(self) -> ForecastPoint | None:
+        """The preset or point of the curve nearest to the marker on the screen."""
         (width, height), at = self.plot.getViewBox().viewPixelSize(), self.marker.pos()
         worth = {point.key for point in self.front()}
         near = [each for each in self._seen() if each[0].preset or each[0].key in worth]
@@ -239,7 +239,7 @@ class OperatingCurve(QWidget):
         else:
             self._choose(nearest)
 
-    def _choose(self, point: Foreseen) -> None:
+    def _choose(self, point: ForecastPoint) -> None:
         if not self._is_fixed:
             self.chosen.emit(point)
 
@@ -250,7 +250,7 @@ class OperatingCurve(QWidget):
         self.pointed.emit(point)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Left and right lead to quicker and slower plans of the curve; the plot leaves them to it."""
+        """Left and right choose quicker and slower plans of the curve."""
         step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(Qt.Key(event.key()), 0)
         line = self.front()
         if not step or not line:

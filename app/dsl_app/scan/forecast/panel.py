@@ -1,10 +1,8 @@
-"""The operating point: what accuracy costs in time, what a plan is expected to reach, what a scan was."""
+"""Accuracy against time: the curve, a table of expected and measured figures, and the search for a plan."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Protocol
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
@@ -17,73 +15,59 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.scan.forecast.controller import ForecastController
+from dsl_app.scan.forecast.figures import FIGURES
 from dsl_app.scan.forecast.operating_curve import OperatingCurve
-from dsl_app.scan.forecast.state import ForecastState, Foreseen, identity
-from dsl_app.scan.forecast.words import FIGURES
+from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
-#: How often news of the predictions is fetched, ms.
+#: Interval at which new predictions are fetched, ms.
 FETCH_MS = 200
 BUDGET, ERROR = "budget", "error"
 #: Height of a row of the table.
 ROW_PX = 19
-NOTHING_YET = "Nothing is predicted yet. It takes a connected rig with a calibration, and no scan under way."
+NOTHING_YET = (
+    "Nothing is predicted yet. Predictions need a connected rig with a calibration, and no running scan."
+)
 _HEADS = ("Expected of", "This plan", "Published", "Last scan")
 CHART = "a Color Checker at 700 mm"
 
 
-class ForecastCommands(Protocol):
-    """What the panel asks of its controller."""
-
-    def take_news(self) -> None:
-        """Hand over what was predicted meanwhile."""
-
-    def choose(self, wanted: Foreseen) -> None:
-        """Plan this."""
-
-    def answer(self, budget_s: float | None = None, error: float | None = None) -> None:
-        """Plan what answers a wish."""
-
-    def look(self, result: Path | None) -> None:
-        """Predict for the scene of a result."""
-
-    def close(self) -> None:
-        """Follow nothing more."""
-
-
 class ForecastPanel(QWidget):
-    """Follows a `ForecastState` and asks a controller."""
+    """Shows a `ForecastState` and calls its controller."""
 
-    def __init__(self, state: ForecastState, commands: ForecastCommands) -> None:
+    def __init__(self, state: ForecastState, controller: ForecastController) -> None:
         super().__init__()
-        self._state, self._commands = state, commands
-        self._pointed: Foreseen | None = None
+        self._state, self._controller = state, controller
+        self._pointed: ForecastPoint | None = None
         self._is_fixed = False
         self.curve = Deferred(self._make_curve)
-        self.scene = ChoiceBox("Scene", "For what is predicted: a chart, or the scene of the last result")
+        self.scene = ChoiceBox("Scene", "The scene to predict for: a chart, or that of the last result")
         self.scene.addItems(("for a chart", "for the last scan"))
         self.scene.setEnabled(False)
         self.scene.be_narrow(100)
         self.table = _table()
-        self.wish = ChoiceBox("Wish", "What is given: the time at hand, or the error that is good enough")
+        self.wish = ChoiceBox("Limit", "The limit to plan for: capture time, or error")
         self.wish.addItem("Time at most", BUDGET)
         self.wish.addItem("Error at most", ERROR)
-        self.budget = NumberBox("Most time", 1, 36000, 60, "s", 0, "Time for the capture")
+        self.budget = NumberBox("Maximum time", 1, 36000, 60, "s", 0, "Time for the capture")
         self.error = NumberBox(
-            "Largest error", 0.001, 1, 0.02, "", 4, "Reflectance error (RMSE) of a single pixel"
+            "Maximum error", 0.001, 1, 0.02, "", 4, "Reflectance error (RMSE) of a single pixel"
         )
         self.ask = QPushButton("Find plan")
-        self.ask.setToolTip("Choose the most accurate plan in that time, or the quickest that is good enough")
+        self.ask.setToolTip(
+            "Choose the most accurate plan within that time, or the quickest within that error"
+        )
         self._answer = label("")
         self._note = label("", "muted")
         for text in (self._answer, self._note):
             text.setWordWrap(True)
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(commands.take_news)
+        self._timer.timeout.connect(controller.take_news)
         self._lay_out()
         self._connect()
 
@@ -128,12 +112,12 @@ class ForecastPanel(QWidget):
 
     def _ask(self) -> None:
         if self.wish.currentData() == BUDGET:
-            self._commands.answer(budget_s=self.budget.value())
+            self._controller.answer(budget_s=self.budget.value())
         else:
-            self._commands.answer(error=self.error.value())
+            self._controller.answer(error=self.error.value())
 
     def _look(self, index: int) -> None:
-        self._commands.look(self._state.last_look.value if index else None)
+        self._controller.look(self._state.last_look.value if index else None)
 
     def _show_scene(self) -> None:
         look, latest = self._state.look.value, self._state.last_look.value
@@ -149,7 +133,7 @@ class ForecastPanel(QWidget):
         made = OperatingCurve()
         made.figure.be_narrow(100)
         made.head.addWidget(self.scene)
-        made.chosen.connect(self._commands.choose)
+        made.chosen.connect(self._controller.choose)
         made.pointed.connect(self._point)
         made.fix(self._is_fixed)
         self._draw(made)
@@ -158,7 +142,7 @@ class ForecastPanel(QWidget):
     def _draw(self, curve: OperatingCurve) -> None:
         curve.show_points(self._state.points.value, self._state.current.value)
 
-    def _point(self, point: Foreseen | None) -> None:
+    def _point(self, point: ForecastPoint | None) -> None:
         self._pointed = point
         self._show_figures()
 
@@ -174,7 +158,7 @@ class ForecastPanel(QWidget):
         scan, published = state.measured.value, state.published
         title = _HEADS[1] if self._pointed is None else "Pointed at"
         self.table.setHorizontalHeaderLabels((_HEADS[0], title, *_HEADS[2:]))
-        self._tell_scan(shown)
+        self._label_columns(shown)
         expected = None if shown is None else shown.expected
         best = None if published is None else published.expected
         for row, figure in enumerate(FIGURES):
@@ -185,16 +169,16 @@ class ForecastPanel(QWidget):
                 assert item is not None
                 item.setText(text)
 
-    def _tell_scan(self, shown: Foreseen | None) -> None:
-        """Say of which plan and scan the columns are."""
+    def _label_columns(self, shown: ForecastPoint | None) -> None:
+        """Name the plan and the scan of each column."""
         scan = self._state.measured.value
         same = scan is not None and shown is not None and identity(scan.plan) == shown.key
         told = {
             1: "Predicted" if shown is None else f"Predicted for {shown.title}",
             2: "Predicted for the published plan, on this rig",
-            3: "No scan was taken yet"
+            3: "No scan yet"
             if scan is None
-            else f"What {scan.name} really was" + ("" if same else ", which had another plan"),
+            else f"Measured on {scan.name}" + ("" if same else ", which had another plan"),
         }
         for column, text in told.items():
             heading = self.table.horizontalHeaderItem(column)
@@ -216,19 +200,19 @@ class ForecastPanel(QWidget):
             text = "Predicting …" if total else NOTHING_YET
         else:
             scene = CHART if state.look.value is None else f"the scene of {state.look.value.stem}"
-            origin = f"Expected from the calibration, for {scene}: F1 says how."
+            origin = f"Expected from the calibration, for {scene} (press F1 to read how)."
             text = f"{done} of {total} plans predicted. {origin}" if total > 1 else origin
         self._note.setText(text)
-        self._allow_to_ask()
+        self._enable_search()
 
     def fix(self, fixed: bool) -> None:
-        """Let nothing be chosen while a scan is under way."""
+        """Disable choices while a scan is running."""
         self._is_fixed = fixed
         if self.curve.made is not None:
             self.curve.made.fix(fixed)
-        self._allow_to_ask()
+        self._enable_search()
 
-    def _allow_to_ask(self) -> None:
+    def _enable_search(self) -> None:
         for box in (self.wish, self.budget, self.error):
             box.setEnabled(not self._is_fixed)
         self.ask.setEnabled(not self._is_fixed and bool(self._state.points.value))
@@ -238,17 +222,17 @@ class ForecastPanel(QWidget):
         self.curve.apply_theme(theme)
 
     def release(self) -> None:
-        """Follow nothing more."""
+        """Disconnect from all state."""
         self._timer.stop()
         for stop in self.stops:
             stop()
-        self._commands.close()
+        self._controller.close()
 
 
 def _table() -> ReadTable:
     table = ReadTable(
         "Expected figures",
-        "What is expected of the plan and of the published one, and what the last scan really was",
+        "Expected figures of this plan and of the published one, and measured ones of the last scan",
         _HEADS,
         rows=len(FIGURES),
     )

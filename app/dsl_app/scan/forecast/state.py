@@ -1,4 +1,4 @@
-"""What accuracy is expected to cost in time on the rig at hand, and what the last scan really was."""
+"""Predicted accuracy against time on the current rig, and what the last scan measured."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _TITLES = {preset.key: preset.title for preset in PRESETS}
 
 
 @dataclass(frozen=True)
-class Foreseen:
+class ForecastPoint:
     """A plan and what is expected of it; ``preset`` is its key, empty for any other plan."""
 
     plan: CapturePlan
@@ -36,7 +36,7 @@ class Foreseen:
 
     @property
     def title(self) -> str:
-        """Its name for people."""
+        """Its displayed name."""
         return _TITLES.get(self.preset) or plan_title(self.plan)
 
     @property
@@ -47,7 +47,7 @@ class Foreseen:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a scan really was; errors are None where no truth is known, times where nobody waited.
+    """Measured figures of a scan; errors are None without a known truth, times on a rig that does not wait.
 
     ``rmse``, ``angle_rad`` and ``delta_e`` are means over patches, ``pixel_*`` those of single pixels.
     """
@@ -71,15 +71,15 @@ class Measured:
 class ForecastState:
     """Values that the forecast's controller sets and its panel follows.
 
-    ``points`` are the plans predicted so far, ``current`` is the plan at hand (None while not known, the
-    reason being ``trouble`` or, for this plan alone, ``refusal``). ``progress`` is how many plans are done of
-    how many (0 of 0: nothing is computed). ``answer`` says what became of a wish for time or accuracy.
-    ``look`` is the result whose scene is planned for (None: a Color Checker), ``last_look`` the latest one.
+    ``points`` are the plans predicted so far, ``current`` is the current plan (None while unknown; ``trouble``
+    or, for this plan alone, ``refusal`` says why). ``progress`` counts plans done and in total (0 of 0: nothing
+    is computed). ``answer`` is the answer to a budget of time or error. ``look`` is the result whose scene
+    is planned for (None: a Color Checker), ``last_look`` the latest one.
     """
 
     def __init__(self) -> None:
-        self.points: Value[tuple[Foreseen, ...]] = Value(())
-        self.current: Value[Foreseen | None] = Value(None)
+        self.points: Value[tuple[ForecastPoint, ...]] = Value(())
+        self.current: Value[ForecastPoint | None] = Value(None)
         self.trouble = Value("")
         self.refusal = Value("")
         self.progress = Value((0, 0))
@@ -89,15 +89,15 @@ class ForecastState:
         self.measured: Value[Measured | None] = Value(None)
 
     @property
-    def published(self) -> Foreseen | None:
+    def published(self) -> ForecastPoint | None:
         """The published operating point on this rig."""
         return next((each for each in self.points.value if each.is_published), None)
 
 
 def identity(plan: CapturePlan) -> int:
-    """What makes two plans the same but for name, image sizes and the rounding of whole cycles.
+    """Equal for plans that differ only in name, image sizes and the rounding to whole cycles.
 
-    A number, as patterns of one's own are too long to be compared while a marker is dragged.
+    A number, because custom patterns are too long to compare while a marker is dragged.
     """
     settings = tuple((round(setting.exposure_ms, 6), setting.level) for setting in plan.settings)
     return hash((plan.code, plan.spectral, settings, plan.code_settings))

@@ -1,4 +1,4 @@
-"""Predictions that were made once, kept in a file for each rig. No Qt."""
+"""A cache of predictions, in one file per rig. No Qt."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     from dsl_core.planning.prediction import Prediction
 
 _log = logging.getLogger(__name__)
-#: Files of rigs that were used longest ago are removed beyond this number.
+#: Beyond this number, the files of the least recently used rigs are deleted.
 MOST_RIGS = 20
 
 
 class ForecastStore:
-    """What is expected of plans on one rig with one latency; a file that cannot be read starts anew.
+    """Predictions of plans for one rig, latency and scene; an unreadable file is replaced.
 
-    ``scene`` tells scenes apart that were looked at.
+    ``scene`` identifies the scene.
     """
 
     def __init__(self, folder: Path, rig: Rig, latency_ms: float, scene: str = "") -> None:
@@ -38,10 +38,12 @@ class ForecastStore:
         except FileNotFoundError:
             pass
         except (OSError, ValueError, TypeError, AttributeError) as error:
-            _log.warning("The predictions %s cannot be read (%s); they are made anew.", self._path, error)
+            _log.warning(
+                "The predictions %s cannot be read (%s); they are computed again.", self._path, error
+            )
 
     def find(self, plan: CapturePlan) -> Prediction | None:
-        """What was predicted of a plan, if anything."""
+        """The prediction of a plan, or None."""
         from pydantic import ValidationError
 
         from dsl_core.planning.prediction import Prediction
@@ -57,7 +59,7 @@ class ForecastStore:
         self._is_changed = True
 
     def save(self) -> None:
-        """Write what is new; a full disk costs only the time to predict again."""
+        """Write new predictions; failing only costs the time to predict again."""
         if not self._is_changed:
             return
         try:
@@ -72,7 +74,7 @@ class ForecastStore:
 
 
 def _stamp(rig: Rig, latency_ms: float, scene: str) -> str:
-    """Names everything that predictions depend on, the program that makes them among it."""
+    """A name for everything that predictions depend on, including the program."""
     known = rig.model_dump_json(exclude={"name", "provenance", "calibrations"})
     return _digest(f"{_method()} {latency_ms!r} {scene!r} {known}")
 
@@ -86,7 +88,7 @@ def _digest(text: str) -> str:
 
 
 def _method() -> str:
-    """The version of the program, and where its sources can be read, those that predict."""
+    """A hash of the program's version and, where readable, the sources that predict."""
     import dsl_core.planning
 
     hashed = hashlib.sha256(__version__.encode())

@@ -1,4 +1,4 @@
-"""Names and words of scans: the command line that does the same, the next name, the rig of a session."""
+"""The command line that does the same as the page, and the names of new scans. No Qt."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def plan_words(plan: CapturePlan) -> list[str]:
             words.append(f"--lines {width}x{step}")
         case LineComb(width_px=width, step_px=step, period_px=period):
             words.append(f"--comb {width}x{step}x{period}")
-    # Enough digits that an exposure stays a whole number of LED cycles.
+    # Enough digits to keep an exposure a whole number of LED cycles.
     words += [f"--setting {setting.exposure_ms:.12g}@{setting.level:g}" for setting in plan.settings]
     return words
 
 
 def needs_file(plan: CapturePlan) -> bool:
-    """Whether the options of the command line cannot say a plan."""
+    """Whether a plan cannot be expressed by options of the command line."""
     is_line_set = isinstance(plan.spectral, ScanLines) and not plan.spectral.sparse
     is_comb = isinstance(plan.spectral, LineComb) and not any(plan.spectral.shifts_px)
     return not (is_line_set or is_comb) or plan.code_settings != tuple(range(len(plan.settings)))
@@ -38,10 +38,13 @@ def needs_file(plan: CapturePlan) -> bool:
 def scan_command(
     target: Path, rig: str, plan: CapturePlan, calibration: str, override: bool, file: Path | None = None
 ) -> str:
-    """The command that takes this scan; ``rig`` as `RigChoice.command` says it, ``file`` holds the plan."""
+    """The command that captures this scan; ``rig`` as in `RigChoice.command`, ``file`` holds the plan."""
     words, first = ["dsl-scan scan", shlex.quote(str(target)), rig], ""
     if file is None and needs_file(plan):
-        file, first = Path("plan.json"), "# First save the plan as plan.json, by 'Save plan' on this page.\n"
+        file, first = (
+            Path("plan.json"),
+            "# First save the plan as plan.json with 'Save plan…' on this page.\n",
+        )
     words += plan_words(plan) if file is None else [f"--plan {shlex.quote(str(file))}"]
     if calibration:
         words.append(f"--calibration {shlex.quote(calibration)}")
@@ -51,13 +54,13 @@ def scan_command(
 
 
 def rig_words(notes: Mapping[str, object]) -> str:
-    """The rig a session was taken with, as the command line says it; empty when it does not say."""
+    """The rig of a scan in command-line form; empty when the scan does not name it."""
     origin = rig_of_notes(notes)
     return "" if origin is None else RigChoice(origin[0], tuple(sorted(origin[1].items()))).command
 
 
 def fresh_target(folder: Path, now: datetime) -> Path:
-    """A session folder named by the minute that does not exist yet."""
+    """A scan folder that does not exist yet, named by date and minute."""
     stem = f"scan-{now:%Y%m%d-%H%M}"
     target, count = folder / f"{stem}{SUFFIX}", 1
     while target.exists():

@@ -1,4 +1,4 @@
-"""The figures of a forecast: their names, how they read, and where they stand in predictions and results."""
+"""The figures of a forecast: names, formats, and their fields in predictions and measurements."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NOTHING = "–"
 
 @dataclass(frozen=True)
 class ForecastFigure:
-    """A figure: its field in `Prediction`, how it reads, and its field in `Measured` if that is another."""
+    """A figure: its field in `Prediction`, its format, and its field in `Measured` if different."""
 
     field: str
     title: str
@@ -25,11 +25,11 @@ class ForecastFigure:
     measured: str = ""
 
     def expected(self, prediction: Prediction | None) -> str:
-        """The predicted value as it reads."""
+        """The predicted value as text."""
         return _words(self, None if prediction is None else getattr(prediction, self.field))
 
     def found(self, scan: Measured | None) -> str:
-        """The measured value as it reads."""
+        """The measured value as text."""
         return _words(self, None if scan is None else getattr(scan, self.measured or self.field))
 
 
@@ -38,7 +38,7 @@ def _words(figure: ForecastFigure, value: float | None) -> str:
 
 
 def minutes(seconds: float) -> str:
-    """A time as it reads.
+    """A duration as text.
 
     >>> minutes(45.0), minutes(204.0)
     ('45 s', '3.4 min')
@@ -47,7 +47,7 @@ def minutes(seconds: float) -> str:
 
 
 def volume(count: float) -> str:
-    """Bytes as they read.
+    """A number of bytes as text.
 
     >>> volume(46_096_080)
     '46 MB'
@@ -68,25 +68,25 @@ FIGURES: tuple[ForecastFigure, ...] = (
     ),
     ForecastFigure("delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means", "{:.2f}".format),
     ForecastFigure(
-        "fwhm_nm", "Width of 10 nm", "How wide a filter of 10 nm looks (FWHM)", "{:.1f} nm".format
+        "fwhm_nm", "Width of 10 nm", "Measured width (FWHM) of a 10 nm filter", "{:.1f} nm".format
     ),
     ForecastFigure(
-        "depth_std_mm", "Depth, pixel", "Error of depth of single pixels, without that of the calibration",
+        "depth_std_mm", "Depth, pixel", "Depth error of single pixels, without that of the calibration",
         "{:.2f} mm".format, "depth_rmse_mm",
     ),
     ForecastFigure(
         "coverage", "Coverage",
-        "Expected: share of the picture that gets a depth. Measured: share of what is lit",
+        "Expected: share of the picture with a depth. Measured: share of the lit part",
         lambda value: f"{100 * value:.0f} %",
     ),
-    ForecastFigure("frames", "Frames", "All exposures, code and black among them", "{:.0f}".format),
+    ForecastFigure("frames", "Frames", "All exposures, including code and black", "{:.0f}".format),
     ForecastFigure(
         "seconds", "Capture",
-        "Exposures and the projector's latency. A simulated rig does not wait, so that its time is not shown",
+        "Exposures and the projector's latency. Not measured on a simulated rig, which does not wait",
         minutes,
     ),
     ForecastFigure(
-        "computing_s", "Computing", "Reconstruction; expected on a machine like the one that was measured",
+        "computing_s", "Computing", "Reconstruction time; expected on a machine like the one measured",
         minutes,
     ),
     ForecastFigure("raw_bytes", "Raw data", "Frames before compression", volume),
