@@ -43,7 +43,7 @@ def scan_command(
     if file is None and needs_file(plan):
         file, first = (
             Path("plan.json"),
-            "# First save the plan as plan.json with 'Save plan…' on this page.\n",
+            "# First save the plan as plan.json ('Save plan…').\n",
         )
     words += plan_words(plan) if file is None else [f"--plan {shlex.quote(str(file))}"]
     if calibration:

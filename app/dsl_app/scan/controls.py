@@ -11,8 +11,6 @@ from dsl_core.capture.status import Status
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 RESUME = "Resume at the first missing frame, after checking whether anything has moved"
 RECONNECT = "Reconnect the rig, check whether anything has moved, and resume at the first missing frame"
-    "Reconnect the rig, then resume at the first missing frame after checking whether anything has moved"
-)
 
 
 @dataclass(frozen=True)

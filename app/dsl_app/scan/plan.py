@@ -40,8 +40,8 @@ KEEPS_ITS_PLAN = (
 )
 
 NO_CALIBRATION = (
-    "No calibration is in use. The scan can be captured, but not reconstructed without one. Calibrate the rig,"
-    " or choose a calibration from the library."
+    "No calibration is in use. The scan can be captured, but not reconstructed without one. Calibrate the"
+    " rig, or choose a calibration from the library."
 )
 
 
@@ -105,9 +105,7 @@ class ScanPlanController:
     def open_plan(self, path: Path) -> None:
         """Open a plan or a pattern set from a file; undo restores the previous plan."""
         if self._is_locked():
-            self._notifier.tell(
-                "info", f"The current scan keeps its plan. Open {path.name} when it is finished."
-            )
+            self._notifier.tell("info", f"The current scan keeps its plan. Open {path.name} after it.")
             return
         now = self.state.plan.value
 

@@ -54,9 +54,7 @@ class PlanEditor(QGroupBox):
         self.period = WholeBox("Period", 2, WIDEST_PX, 106, "px", "Distance between the lines of a comb")
         self.settings = SettingRows()
         self.open = QPushButton("&Open plan…")
-        self.open.setToolTip(
-            "Open a plan or pattern set: one saved here, or made by dsl-scan plan, tradeoff or design"
-        )
+        self.open.setToolTip("Open a plan or pattern set, saved here or by dsl-scan plan, tradeoff or design")
         self.save = QPushButton("Sa&ve plan…")
         self.save.setToolTip("Save this plan to a file, for this page or for 'dsl-scan scan --plan'")
         self._lay_out()
@@ -210,9 +208,7 @@ class SettingRows(QWidget):
         for i in range(len(self._settings)):
             self._add_row(i)
         add = QPushButton("Add setting")
-        add.setToolTip(
-            "Capture every pattern at another exposure and level too, for brighter or darker parts"
-        )
+        add.setToolTip("Capture all patterns at another exposure and level too, for brighter or darker parts")
         add.setEnabled(len(self._settings) < MOST_SETTINGS)
         add.clicked.connect(self._add)
         self._grid.addWidget(add, len(self._settings) + 1, 0, 1, 3)

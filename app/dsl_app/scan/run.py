@@ -143,8 +143,8 @@ class RunBox(QGroupBox):
         self.again.setToolTip("Reconstruct the finished scan with other parameters, without scanning again")
         self.drift = QCheckBox("Check for movement first")
         self.drift.setToolTip(
-            "Capture two old frames again and compare before resuming. Without this check, a scan whose scene or"
-            " light has changed is resumed and its frames do not fit together"
+            "Capture two old frames again and compare before resuming. Without this check, a scan whose scene"
+            " or light has changed is resumed and its frames do not fit together"
         )
         self.then = QCheckBox("Reconstruct at the end")
         self.then.setToolTip("Reconstruct and open the result as soon as all frames are saved")

@@ -39,9 +39,7 @@ class FramePicture(QWidget):
         self._cursor: tuple[int, int] | None = None
         self.view = pg.GraphicsLayoutWidget()
         self.view.setAccessibleName("Last frame of the scan")
-        self.view.setToolTip(
-            "The last frame. Point at a pixel, or use the arrow keys, to plot its intensity."
-        )
+        self.view.setToolTip("The last frame. Point at a pixel, or use arrow keys, to plot its intensity.")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
         self.box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)
@@ -147,8 +145,8 @@ class GraphPlot(QWidget):
         super().__init__()
         self.plot = calm_plot(
             "Intensity graph",
-            "Raw counts of the pixel while the lines move across the projector: the high peak is the zero order,"
-            " the first orders are on either side.",
+            "Raw counts of the pixel while the lines move across the projector: the high peak is the zero"
+            " order, the first orders are on either side.",
             "Raw counts (DN)", "First column of the line (px)",
         )  # fmt: skip
         self._title = label("Intensity graph", "heading")

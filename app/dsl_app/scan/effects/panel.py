@@ -187,13 +187,13 @@ class EffectsPanel(QWidget):
             self._saved.setText("")
             return
         self._summary.setText(
-            f"{len(view.on)} of {len(view.rows)} effects are rendered. The others change no pixel of any picture"
-            f" by more than {view.left_out}."
+            f"{len(view.on)} of {len(view.rows)} effects are rendered. The others change no pixel of any"
+            f" picture by more than {view.left_out}."
         )
         saved_s = view.frames * (view.all_s - view.frame_s)
         self._saved.setText(
-            f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with all effects."
-            f" This saves {100 * view.saved_share:.0f} %, or {saved_s:.0f} s over {view.frames} frames."
+            f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with all"
+            f" effects. This saves {100 * view.saved_share:.0f} %, or {saved_s:.0f} s over {view.frames} frames."
         )
 
     def apply_theme(self, theme: Theme) -> None:

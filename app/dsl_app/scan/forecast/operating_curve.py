@@ -46,7 +46,7 @@ FIGURES = (
 
 
 class OperatingCurve(QWidget):
-    """Emits ``chosen`` for the plan clicked, dropped on or reached by arrow keys, ``pointed`` while moving."""
+    """Emits ``chosen`` for the plan clicked, dropped on or reached by keys, ``pointed`` while moving."""
 
     chosen = Signal(object)
     pointed = Signal(object)
@@ -63,8 +63,8 @@ class OperatingCurve(QWidget):
             self.figure.addItem(figure.title)
         self.plot = calm_plot(
             "Accuracy against time",
-            "Expected error against capture time; lower left is better. Click a point, drag the marker along the"
-            " curve, or press the arrow keys. The star is the published plan.",
+            "Expected error against capture time; lower left is better. Click a point, drag the marker"
+            " along the curve, or press the arrow keys. The star is the published plan.",
             "RMSE", "Capture time",
         )  # fmt: skip
         self.plot.setMouseEnabled(False, False)
@@ -176,7 +176,7 @@ class OperatingCurve(QWidget):
         return {"pos": at, "data": point, "symbol": "o", "size": 6, "brush": theme.muted, "pen": theme.base}
 
     def _named(self) -> list[ForecastPoint]:
-        """Points with names; the one at hand pushes out those beside it."""
+        """Labelled points; the current one hides labels that would overlap its own."""
         at = None if self._current is None else self.spot(self._current)
         named = [] if at is None or self._current is None else [self._current]
         for point, place in self._seen():
@@ -190,7 +190,7 @@ class OperatingCurve(QWidget):
         if wanted:
             low, high = min(low, math.log10(wanted)), max(high, math.log10(wanted))
         left, right = min(x for x, _ in places), max(x for x, _ in places)
-        # Names stand above their points.
+        # Labels are above their points.
         top = high + max(0.2 * (high - low), ROOM)
         self.plot.setXRange(left - ROOM, right + ROOM, padding=0)
         self.plot.setYRange(low - ROOM / 2, top, padding=0)
@@ -204,7 +204,7 @@ class OperatingCurve(QWidget):
             return
         is_current = self._current is not None and point.key == self._current.key
         (left, right), _ = self.plot.getViewBox().viewRange()
-        # A name near an edge must not leave the plot.
+        # A label near an edge must not leave the plot.
         share = (at[0] - left) / (right - left)
         text = pg.TextItem(
             point.title, color=self._theme.text if is_current else self._theme.muted, anchor=(share, 1.25)

@@ -58,9 +58,7 @@ class ForecastPanel(QWidget):
             "Maximum error", 0.001, 1, 0.02, "", 4, "Reflectance error (RMSE) of a single pixel"
         )
         self.ask = QPushButton("Find plan")
-        self.ask.setToolTip(
-            "Choose the most accurate plan within that time, or the quickest within that error"
-        )
+        self.ask.setToolTip("Find the most accurate plan within that time, or the quickest within that error")
         self._answer = label("")
         self._note = label("", "muted")
         for text in (self._answer, self._note):

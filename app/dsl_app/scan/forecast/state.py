@@ -71,10 +71,10 @@ class Measured:
 class ForecastState:
     """Values that the forecast's controller sets and its panel follows.
 
-    ``points`` are the plans predicted so far, ``current`` is the current plan (None while unknown; ``trouble``
-    or, for this plan alone, ``refusal`` says why). ``progress`` counts plans done and in total (0 of 0: nothing
-    is computed). ``answer`` is the answer to a budget of time or error. ``look`` is the result whose scene
-    is planned for (None: a Color Checker), ``last_look`` the latest one.
+    ``points`` are the plans predicted so far, ``current`` is the current plan (None while unknown;
+    ``trouble`` or, for this plan alone, ``refusal`` says why). ``progress`` counts plans done and in total
+    (0 of 0: nothing is computed). ``answer`` answers a budget of time or error. ``look`` is the result whose
+    scene is planned for (None: a Color Checker), ``last_look`` the latest one.
     """
 
     def __init__(self) -> None:

@@ -38,9 +38,7 @@ class ForecastStore:
         except FileNotFoundError:
             pass
         except (OSError, ValueError, TypeError, AttributeError) as error:
-            _log.warning(
-                "The predictions %s cannot be read (%s); they are computed again.", self._path, error
-            )
+            _log.warning("The predictions %s cannot be read (%s) and are computed again.", self._path, error)
 
     def find(self, plan: CapturePlan) -> Prediction | None:
         """The prediction of a plan, or None."""
