@@ -111,7 +111,7 @@ def test_a_live_demo_that_cannot_start_leaves_the_folder(
     usage = namedtuple("usage", "total used free")
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))
     bench.demo.scan_live()
-    assert "too little room" in bench.scans.notifier.told[-1][1]
+    assert "not enough disk space" in bench.scans.notifier.told[-1][1]
     assert bench.scans.state.target.value.parent == tmp_path
 
 

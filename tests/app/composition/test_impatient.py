@@ -181,9 +181,9 @@ def test_a_projector_that_is_pulled_out_interrupts_and_its_scan_goes_on(bench: B
     rig.devices.set(with_faults(whole, FaultPlan(projector_gone_at=8)))
     QTest.mouseClick(page.run.start, _LEFT)
     bench.wait(lambda: state.phase.value is Phase.LOST)
-    assert "frames are safe" in page.banner.text
+    assert "frames are saved" in page.banner.text
     bench.wait(lambda: rig.link.value is Link.OPEN)
-    assert page.banner.text.endswith("The rig is connected again.")
+    assert page.banner.text.endswith("The rig is reconnected.")
     QTest.mouseClick(page.banner.action, _LEFT)
     bench.wait(lambda: state.phase.value is Phase.DONE)
     assert not page.banner.isVisible()

@@ -193,7 +193,8 @@ class EffectsPanel(QWidget):
         saved_s = view.frames * (view.all_s - view.frame_s)
         self._saved.setText(
             f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with all"
-            f" effects. This saves {100 * view.saved_share:.0f} %, or {saved_s:.0f} s over {view.frames} frames."
+            f" effects. This saves {100 * view.saved_share:.0f} %, or {saved_s:.0f} s for"
+            f" all {view.frames} frames."
         )
 
     def apply_theme(self, theme: Theme) -> None:

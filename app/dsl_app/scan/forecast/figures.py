@@ -23,6 +23,10 @@ class ForecastFigure:
     tip: str
     read: Callable[[float], str]
     measured: str = ""
+    #: Axis title of the curve of this figure; empty for figures without a curve.
+    axis: str = ""
+    #: The value that is best; 0 for errors.
+    target: float = 0.0
 
     def expected(self, prediction: Prediction | None) -> str:
         """The predicted value as text."""
@@ -57,37 +61,66 @@ def volume(count: float) -> str:
 
 FIGURES: tuple[ForecastFigure, ...] = (
     ForecastFigure(
-        "rmse", "Reflectance, patch", "RMSE over the bands of the mean spectrum of a patch", "{:.4f}".format
+        "rmse",
+        "Reflectance, patch",
+        "RMSE over the bands of the mean spectrum of a patch",
+        "{:.4f}".format,
+        axis="RMSE",
     ),
     ForecastFigure(
-        "pixel_rmse", "Reflectance, pixel", "RMSE over the bands of single pixels", "{:.4f}".format
+        "pixel_rmse",
+        "Reflectance, pixel",
+        "RMSE over the bands of single pixels",
+        "{:.4f}".format,
+        axis="RMSE",
     ),
     ForecastFigure(
-        "pixel_angle_rad", "Angle, pixel", "Angle between measured and true spectrum of single pixels",
+        "pixel_angle_rad",
+        "Angle, pixel",
+        "Angle between measured and true spectrum of single pixels",
         "{:.3f} rad".format,
-    ),
-    ForecastFigure("delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means", "{:.2f}".format),
-    ForecastFigure(
-        "fwhm_nm", "Width of 10 nm", "Measured width (FWHM) of a 10 nm filter", "{:.1f} nm".format
+        axis="angle (rad)",
     ),
     ForecastFigure(
-        "depth_std_mm", "Depth, pixel", "Depth error of single pixels, without that of the calibration",
-        "{:.2f} mm".format, "depth_rmse_mm",
+        "delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means", "{:.2f}".format, axis="ΔE₀₀"
     ),
     ForecastFigure(
-        "coverage", "Coverage",
+        "fwhm_nm",
+        "Width of 10 nm",
+        "Measured width (FWHM) of a 10 nm filter",
+        "{:.1f} nm".format,
+        axis="FWHM (nm)",
+        target=10.0,
+    ),
+    ForecastFigure(
+        "depth_std_mm",
+        "Depth, pixel",
+        "Depth error of single pixels, without that of the calibration",
+        "{:.2f} mm".format,
+        "depth_rmse_mm",
+        axis="error (mm)",
+    ),
+    ForecastFigure(
+        "coverage",
+        "Coverage",
         "Expected: share of the picture with a depth. Measured: share of the lit part",
         lambda value: f"{100 * value:.0f} %",
     ),
     ForecastFigure("frames", "Frames", "All exposures, including code and black", "{:.0f}".format),
     ForecastFigure(
-        "seconds", "Capture",
+        "seconds",
+        "Capture",
         "Exposures and the projector's latency. Not measured on a simulated rig, which does not wait",
         minutes,
     ),
     ForecastFigure(
-        "computing_s", "Computing", "Reconstruction time; expected on a machine like the one measured",
+        "computing_s",
+        "Computing",
+        "Reconstruction time; expected on a machine like the one measured",
         minutes,
     ),
     ForecastFigure("raw_bytes", "Raw data", "Frames before compression", volume),
-)  # fmt: skip
+)
+
+#: Figures that the curve can show; that of single pixels is shown first.
+CURVES = tuple(sorted((f for f in FIGURES if f.axis), key=lambda figure: figure.field != "pixel_rmse"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import pyqtgraph as pg
@@ -12,6 +11,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
+from dsl_app.scan.forecast.figures import CURVES, ForecastFigure
 from dsl_app.scan.forecast.state import ForecastPoint
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox
@@ -23,26 +23,6 @@ NAMED = ("preview", "balanced", "reference")
 NEAR = 0.3
 #: Room around the points, in decades.
 ROOM = 0.09
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure of `Prediction`: how it is called, and the value that it should have."""
-
-    field: str
-    title: str
-    axis: str
-    wanted: float = 0.0
-
-
-FIGURES = (
-    Figure("pixel_rmse", "Reflectance of single pixels", "RMSE"),
-    Figure("rmse", "Reflectance of patches", "RMSE"),
-    Figure("pixel_angle_rad", "Spectral angle of single pixels", "angle (rad)"),
-    Figure("delta_e", "Colour of patches", "ΔE₀₀"),
-    Figure("fwhm_nm", "Width of 10 nm filters", "FWHM (nm)", 10.0),
-    Figure("depth_std_mm", "Depth of single pixels", "error (mm)"),
-)
 
 
 class OperatingCurve(QWidget):
@@ -59,7 +39,7 @@ class OperatingCurve(QWidget):
         self._labels: dict[int, Any] = {}
         self._is_fixed = False
         self.figure = ChoiceBox("Figure of accuracy", "The figure that the curve shows")
-        for figure in FIGURES:
+        for figure in CURVES:
             self.figure.addItem(figure.title)
         self.plot = calm_plot(
             "Accuracy against time",
@@ -106,8 +86,8 @@ class OperatingCurve(QWidget):
         self.marker.movable = not fixed
 
     @property
-    def _figure(self) -> Figure:
-        return FIGURES[self.figure.currentIndex()]
+    def _figure(self) -> ForecastFigure:
+        return CURVES[self.figure.currentIndex()]
 
     def spot(self, point: ForecastPoint) -> tuple[float, float] | None:
         """The position of a point on the logarithmic axes; None if it lacks the figure."""
@@ -119,7 +99,7 @@ class OperatingCurve(QWidget):
 
     def front(self) -> list[ForecastPoint]:
         """The plans that no quicker one beats, quickest first."""
-        wanted = self._figure.wanted
+        wanted = self._figure.target
         best, found = float("inf"), []
         for point, at in sorted(self._seen(), key=lambda each: each[1]):
             off = abs(10 ** at[1] - wanted)
@@ -134,7 +114,7 @@ class OperatingCurve(QWidget):
             self.plot.removeItem(text)
         self._labels = {}
         self.plot.setLabel("left", figure.axis)
-        self._wanted.setVisible(figure.wanted > 0 and bool(seen))
+        self._wanted.setVisible(figure.target > 0 and bool(seen))
         self.marker.setVisible(False)
         line = [at for point in self.front() if (at := self.spot(point)) is not None]
         self._front.setData([x for x, _ in line], [y for _, y in line])
@@ -143,8 +123,8 @@ class OperatingCurve(QWidget):
             for side in ("bottom", "left"):
                 self.plot.getPlotItem().getAxis(side).setTicks([[]])
             return
-        if figure.wanted:
-            self._wanted.setPos(math.log10(figure.wanted))
+        if figure.target:
+            self._wanted.setPos(math.log10(figure.target))
         self._set_ranges([at for _, at in seen])
         for point in self._named():
             self._name(point)
@@ -185,7 +165,7 @@ class OperatingCurve(QWidget):
         return named
 
     def _set_ranges(self, places: list[tuple[float, float]]) -> None:
-        wanted = self._figure.wanted
+        wanted = self._figure.target
         low, high = min(y for _, y in places), max(y for _, y in places)
         if wanted:
             low, high = min(low, math.log10(wanted)), max(high, math.log10(wanted))

@@ -111,7 +111,7 @@ def test_wishes_choose_a_plan_or_say_what_could_be_had(
 ) -> None:
     control = forecast(bench, tmp_path, automatic=False)
     control.answer(budget_s=60)
-    assert "Nothing is predicted yet" in control.state.answer.value
+    assert "No plan is predicted yet" in control.state.answer.value
     control.begin()
     control.answer(budget_s=20)
     assert bench.state.preset is PRESETS[0]
@@ -133,7 +133,7 @@ def test_a_wish_during_a_scan_does_not_claim_a_choice(
     control.answer(error=min(each.expected.pixel_rmse for each in control.state.points.value))
     assert bench.state.preset is PRESETS[0]
     assert "Chosen" not in control.state.answer.value
-    assert control.state.answer.value.startswith("Best would be ")
+    assert control.state.answer.value.startswith("The best plan would be ")
     assert "keeps its plan" in control.state.answer.value
 
 

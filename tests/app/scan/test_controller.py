@@ -158,7 +158,7 @@ def test_a_reconstruction_that_does_not_end_well_is_not_announced_for_ever(
     bench.state.then_reconstruct.set(True)
     bench.scans.start()
     note = bench.state.note.value
-    assert note.startswith(f"All {FRAMES} frames are stored in ")
+    assert note.startswith(f"All {FRAMES} frames are saved in ")
     assert "Reconstructing…" not in note
     assert f"The reconstruction {how}. Open first.dsl on the Results page" in note
 
@@ -174,7 +174,7 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     assert session is not None
     assert (session.done, session.total) == (30, FRAMES)
     assert "Check its cable" in bench.state.trouble.value
-    assert f"30 of {FRAMES} frames are safe" in bench.state.trouble.value
+    assert f"30 of {FRAMES} frames are saved" in bench.state.trouble.value
     assert bench.scans.command_line() == f"dsl-scan resume {tmp_path / 'first.dsl'}"
     bench.scans.start()
     assert phase(bench) is Phase.DONE
@@ -266,7 +266,7 @@ def test_a_full_disk_is_said_before_the_start(bench: ScanBench, monkeypatch: pyt
     monkeypatch.setattr(shutil, "disk_usage", lambda path: usage(10, 9, 1))
     bench.scans.start()
     assert phase(bench) is Phase.PLANNING
-    assert "too little room" in bench.notifier.told[-1][1]
+    assert "not enough disk space" in bench.notifier.told[-1][1]
 
 
 def test_a_place_that_is_taken_is_refused(bench: ScanBench, tmp_path: Path) -> None:
@@ -274,7 +274,7 @@ def test_a_place_that_is_taken_is_refused(bench: ScanBench, tmp_path: Path) -> N
     bench.scans.plans.set_target(tmp_path / "taken")
     facts = bench.state.facts.value
     assert facts is not None
-    assert "exists and is no scan" in facts.obstacles[0]
+    assert "exists and is not a scan" in facts.obstacles[0]
 
 
 def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp_path: Path) -> None:
@@ -316,7 +316,7 @@ def test_a_calibration_chosen_during_a_scan_is_for_the_next(
         meanwhile.setattr(SimCamera, "snap", choosing)
         bench.scans.start()
     assert [text for _, text in bench.notifier.told] == [
-        "The scan under way keeps its calibration. Scans after it use bench."
+        "The running scan keeps its calibration. Later scans use bench."
     ]
     taken = SessionReader(tmp_path / "first.dsl").calibration
     assert taken is not None
@@ -399,7 +399,7 @@ def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
     assert phase(bench) is Phase.LOST
     assert "The disk is full" in bench.state.trouble.value
     assert (bench.rig.state.link.value, bench.state.reconnection.value) == (Link.OPEN, Reconnection.NONE)
-    assert f"20 of {FRAMES} frames are safe" in bench.state.trouble.value
+    assert f"20 of {FRAMES} frames are saved" in bench.state.trouble.value
     bench.scans.start()
     assert SessionReader(tmp_path / "first.dsl").missing() == []
 
@@ -452,14 +452,14 @@ def test_a_lost_rig_is_connected_again_a_few_times_and_no_more(outage: Outage) -
     assert outage.links == [Link.LOST, Link.OPENING, Link.LOST]
     assert (outage.reconnection, devices.value) == (Reconnection.TRYING, None)
     assert "Check its cable" in bench.rig.state.trouble.value
-    assert outage.told.endswith(f"Connecting the rig again, attempt 1 of {ATTEMPTS}.")
+    assert outage.told.endswith(f"Reconnecting the rig, attempt 1 of {ATTEMPTS}.")
     outage.wait(RETRY_S / 2)
     assert "attempt 1" in outage.told
     for attempt in range(2, ATTEMPTS + 1):
         outage.wait(RETRY_S)
         assert (outage.link, f"attempt {attempt} of" in outage.told) == (Link.LOST, attempt < ATTEMPTS)
     assert outage.reconnection is Reconnection.GIVEN_UP
-    assert outage.told.endswith("could not be connected again: The camera sent no frame. Check its cable.")
+    assert outage.told.endswith("could not be reconnected: The camera sent no frame. Check its cable.")
     assert [level for level, _ in bench.notifier.told] == ["error", "error"]
     outage.is_gone = False
     outage.wait(10 * RETRY_S)
@@ -473,8 +473,8 @@ def test_a_rig_that_comes_back_goes_on_only_when_asked(outage: Outage) -> None:
     outage.is_gone = False
     outage.wait(RETRY_S)
     assert (phase(bench), outage.reconnection, outage.link) == (Phase.LOST, Reconnection.BACK, Link.OPEN)
-    assert f"2 of {FRAMES} frames are safe" in outage.told
-    assert outage.told.endswith("The rig is connected again.")
+    assert f"2 of {FRAMES} frames are saved" in outage.told
+    assert outage.told.endswith("The rig is reconnected.")
     bench.scans.resume()
     assert (phase(bench), outage.told) == (Phase.DONE, "")
 
@@ -484,11 +484,11 @@ def test_who_wishes_so_finds_the_scan_gone_on(outage: Outage) -> None:
     bench.scans.resume()
     assert outage.reconnection is Reconnection.RESUMING
     assert "attempt 2 of" in outage.told
-    assert outage.told.endswith("The scan goes on by itself when it answers.")
+    assert outage.told.endswith("The scan resumes automatically when it answers.")
     outage.is_gone = False
     outage.wait(RETRY_S)
     assert phase(bench) is Phase.DONE
-    assert ("info", "The rig is connected again. The scan goes on.") in bench.notifier.told
+    assert ("info", "The rig is reconnected. The scan resumes.") in bench.notifier.told
 
 
 def test_no_attempt_follows_a_stop(outage: Outage) -> None:
@@ -496,7 +496,7 @@ def test_no_attempt_follows_a_stop(outage: Outage) -> None:
     outage.is_gone = False
     outage.wait(RETRY_S)
     assert (outage.reconnection, outage.link) == (Reconnection.GIVEN_UP, Link.LOST)
-    assert outage.told.endswith("The rig is no longer being connected.")
+    assert outage.told.endswith("Reconnecting was stopped.")
 
 
 def test_a_rig_that_a_person_connects_is_back_too(outage: Outage) -> None:

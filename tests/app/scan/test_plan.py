@@ -75,7 +75,7 @@ def test_a_pattern_set_of_another_projector_is_refused(bench: ScanBench, tmp_pat
     before = bench.state.plan.value
     assert bench.scans.open(design(tmp_path, width_px=320))
     assert bench.state.plan.value is before
-    assert "320 columns wide, the projector has 640" in bench.notifier.told[-1][1]
+    assert "320 columns wide, but the projector has 640" in bench.notifier.told[-1][1]
 
 
 @pytest.mark.parametrize(
@@ -154,7 +154,7 @@ def test_combs_of_three_colours_stay_so_when_something_else_is_edited(qtbot: QtB
     editor.plan_changed.connect(told.append)
     comb = LineComb(period_px=64, shifts_px=(0, 21, 42))
     editor.set_plan(CapturePlan(spectral=comb), 1000 / 60)
-    assert editor.patterns.currentText() == "Combs, one a colour"
+    assert editor.patterns.currentText() == "Combs, one per colour"
     editor.code.setCurrentIndex(1)
     editor.code.activated.emit(1)
     editor.patterns.setCurrentIndex(0)
@@ -183,6 +183,6 @@ def test_buttons_ask_for_files(qtbot: QtBot) -> None:
     editor = PlanEditor()
     qtbot.addWidget(editor)
     editor.show()
-    for button, signal in ((editor.open, editor.open_wanted), (editor.save, editor.save_wanted)):
+    for button, signal in ((editor.open, editor.open_requested), (editor.save, editor.save_requested)):
         with qtbot.waitSignal(signal):
             QTest.mouseClick(button, Qt.MouseButton.LeftButton)

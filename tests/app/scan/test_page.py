@@ -99,7 +99,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     assert not page.plan.isEnabled()
     click(page.run.pause)
     qtbot.waitUntil(in_phase(bench, Phase.PAUSED), timeout=60_000)
-    assert page.run.pause.text() == "&Go on"
+    assert page.run.pause.text() == "&Continue"
     click(page.run.pause)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert SessionReader(tmp_path / "first.dsl").missing() == []
@@ -156,7 +156,7 @@ def test_a_lost_camera_is_said_over_the_page(
         assert page.stop.isVisible()
         click(page.stop)
         assert not page.stop.isVisible()
-        assert "no longer" in page.banner.text
+        assert "was stopped" in page.banner.text
         qtbot.waitUntil(lambda: bench.rig.state.link.value is Link.LOST)
     click(page.banner.action)
     assert not page.banner.action.isEnabled()
@@ -196,7 +196,7 @@ def test_an_edited_plan_is_ones_own(ready: Bench) -> None:
     assert spectral.step_px == 3
     assert spectral.period_px == 3 * round(SHORT.spectral.period_px / 3)
     assert page.plan.period.value() == spectral.period_px
-    assert page.plan.preset.currentText() == "Own plan"
+    assert page.plan.preset.currentText() == "Custom plan"
 
 
 def test_exposures_snap_to_whole_cycles(ready: Bench) -> None:
@@ -401,5 +401,5 @@ def test_the_curve_is_saved_as_a_figure(qtbot: QtBot, ready: Bench, predicted: N
     figure = page.figure()
     assert figure is not None
     save_figure(figure, tmp_path / "curve.svg", DARK)
-    assert "Time on the rig" in (tmp_path / "curve.svg").read_text("utf-8")
+    assert "Capture time" in (tmp_path / "curve.svg").read_text("utf-8")
     assert plot.backgroundBrush().color().name() == DARK.base

@@ -1,0 +1,81 @@
+"""What the Scan page's controls say and allow, for every phase."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.scan.controls import RECONNECT, RESUME, banner_controls, progress_text, run_controls
+from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
+
+from dsl_core.capture.status import State, Status
+
+FREE = Facts(76, 12.0, 1000, 10**9)
+BLOCKED = Facts(76, 12.0, 1000, 10**9, obstacles=("No rig is connected.", "The disk is full."))
+HALF = InterruptedScan(Path("half.dsl"), 30, 76)
+
+
+@pytest.mark.parametrize(
+    ("phase", "can_start", "can_pause", "can_cancel", "role"),
+    [
+        (Phase.PLANNING, True, False, False, "muted"),
+        (Phase.STARTING, False, False, True, "muted"),
+        (Phase.RUNNING, False, True, True, "muted"),
+        (Phase.PAUSED, False, True, True, "warn"),
+        (Phase.STOPPING, False, False, False, "muted"),
+        (Phase.DONE, True, False, False, "good"),
+        (Phase.STOPPED, True, False, False, "warn"),
+        (Phase.LOST, True, False, False, "bad"),
+    ],
+)
+def test_buttons_follow_the_phase(
+    phase: Phase, can_start: bool, can_pause: bool, can_cancel: bool, role: str
+) -> None:
+    shown = run_controls(phase, None, FREE, "", has_finished=True)
+    assert (shown.can_start, shown.can_pause, shown.can_cancel) == (can_start, can_pause, can_cancel)
+    assert (shown.phase, shown.phase_role) == (f"● {phase.value}", role)
+    assert shown.pause == ("&Continue" if phase is Phase.PAUSED else "&Pause")
+    assert shown.can_reconstruct_again is not phase.is_busy
+
+
+def test_obstacles_keep_a_plan_from_starting_but_not_from_being_shown() -> None:
+    shown = run_controls(Phase.PLANNING, None, BLOCKED, "", has_finished=False)
+    assert (shown.can_start, shown.phase, shown.remarks_role) == (False, "● not ready", "warn")
+    assert shown.remarks == "No rig is connected.\nThe disk is full."
+    running = run_controls(Phase.RUNNING, None, BLOCKED, "", has_finished=False)
+    assert (running.remarks, running.remarks_role) == ("", "muted")
+
+
+def test_an_interrupted_scan_is_resumed_or_left() -> None:
+    shown = run_controls(Phase.LOST, HALF, FREE, "A note.", has_finished=False)
+    assert (shown.start, shown.is_resumable, shown.can_reconstruct_again) == ("&Resume scan", True, False)
+    assert shown.remarks == "half.dsl contains 30 of 76 frames.\nA note."
+    assert not run_controls(Phase.RUNNING, HALF, FREE, "", has_finished=False).is_resumable
+
+
+@pytest.mark.parametrize(
+    ("reconnection", "action", "tip", "is_enabled", "can_stop"),
+    [
+        (Reconnection.NONE, "Resume", RESUME, True, False),
+        (Reconnection.TRYING, "Reconnect and resume", RECONNECT, True, True),
+        (Reconnection.RESUMING, "Reconnect and resume", RECONNECT, False, True),
+        (Reconnection.GIVEN_UP, "Reconnect and resume", RECONNECT, True, False),
+        (Reconnection.BACK, "Resume", RESUME, True, False),
+    ],
+)
+def test_the_banner_follows_the_reconnection(
+    reconnection: Reconnection, action: str, tip: str, is_enabled: bool, can_stop: bool
+) -> None:
+    shown = banner_controls(reconnection)
+    assert (shown.action, shown.tip, shown.is_enabled, shown.can_stop) == (action, tip, is_enabled, can_stop)
+
+
+def test_progress_is_empty_until_there_is_some() -> None:
+    assert progress_text(Status(State.IDLE)).frames == ""
+    half = Status(State.RUNNING, done=38, total=76, elapsed_s=20.0, remaining_s=20.0)
+    assert (progress_text(half).frames, progress_text(half).time) == (
+        "38 of 76 frames saved",
+        "20 s so far, 20 s left",
+    )
+    over = Status(State.FINISHED, done=76, total=76, elapsed_s=41.0)
+    assert progress_text(over).time == "took 41 s"
