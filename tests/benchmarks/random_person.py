@@ -10,14 +10,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from dsl_app.compare.page import ComparePage
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.results.page import ResultsPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import WORKERS
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shell.application import ExceptionHook, make_window
+from dsl_app.shell.application import ExceptionHook
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QDrag
@@ -48,10 +48,8 @@ class RandomPerson:
         self._home, self._dice = home, dice
         self.done: list[str] = []
         self.scans = 0
-        self._composition = Composition(Wish())
-        self.window: MainWindow = make_window(
-            self._composition.pages, home, "light" if theme == "light" else "dark", self._composition.commands
-        )
+        self._composition = Composition(StartOptions())
+        self.window: MainWindow = self._composition.open_window(home, "light" if theme == "light" else "dark")
         self.window.parts.settings.output_folder = str(home / "scans")
         self._hook = ExceptionHook(self.window.toasts)
         self._hook.install()
@@ -60,7 +58,7 @@ class RandomPerson:
         self._questions.setInterval(int(1000 * QUESTION_S))
         self._questions.timeout.connect(_give_up)
         self._questions.start()
-        self._composition.session(self.window).start()
+        self._composition.session.start()
 
     # At random -------------------------------------------------------------------------------------
 
@@ -156,7 +154,7 @@ class RandomPerson:
     def scan(self) -> None:
         """Connect where need be, scan and reconstruct; one in five is cancelled in between."""
         self.rest()
-        rig = self._composition.rig(self.window)
+        rig = self._composition.rig
         if rig.state.link.value is not Link.OPEN or rig.state.choice.value != RIG:
             self.done.append("connect")
             rig.connect(RIG)
@@ -164,7 +162,7 @@ class RandomPerson:
         page = self.window.open_page("scan")
         assert isinstance(page, ScanPage)
         self.rest()
-        state, control = page._state, self._composition._scans
+        state, control = page._state, self._composition.scans
         assert control is not None
         control.plan_new_scan()
         control.plans.choose_preset("preview")

@@ -31,11 +31,11 @@ MOUSE_S = 0.008
 TO_THE_SCREEN = """
 import os, time
 import dsl_app.__main__
-from dsl_app.shell.application import ExceptionHook, make_application, make_window
-from dsl_app.composition.window import IMPORTS, Composition, Wish
+from dsl_app.shell.application import ExceptionHook, make_application
+from dsl_app.composition.window import Composition, StartOptions
 application = make_application([])
-composition = Composition(Wish())
-window = make_window(composition.pages, commands=composition.commands, imports=IMPORTS)
+composition = Composition(StartOptions())
+window = composition.open_window(in_background=True)
 seen = []
 note = lambda: seen.append((time.time(), sum(os.times()[:2])))
 window.painted.connect(note)

@@ -101,9 +101,9 @@ class WindowJobs:
             collect_garbage(window)
             self._wait(lambda: window.stack.count() > 0)
         with self._job("connect at the start"):
-            self.stage.composition.start(window)
+            self.stage.composition.start()
             self._warm_up.start()
-            rig = self.stage.composition.rig(window)
+            rig = self.stage.composition.rig
             self._wait(lambda: rig.state.link.value is Link.OPEN)
         with self._job("at rest after the start"):
             self._wait(lambda: self._warm_up.is_over)
@@ -117,9 +117,9 @@ class WindowJobs:
             self.stage.connect(LIVE_RIG)
         page = self.stage.window.open_page("rig")
         assert isinstance(page, RigPage)
-        rig = self.stage.composition.rig(self.stage.window)
+        rig = self.stage.composition.rig
         with self._job("live view full size"):
-            rig.start_live()
+            self.stage.composition.live.start()
             self._live_for(LIVE_S)
         self._cancel("live view", rig.stop_live, lambda: not rig.state.live.value)
         self.stage.idle()
@@ -130,7 +130,7 @@ class WindowJobs:
         page = self.stage.window.open_page("scan")
         assert isinstance(page, ScanPage)
         self.stage.idle()
-        control = self.stage.composition._scans
+        control = self.stage.composition.scans
         assert control is not None
         return page, control
 
@@ -201,7 +201,7 @@ class WindowJobs:
     def _calibrate(self, name: str) -> None:
         campaign = self.stage.copied(self.stage.material.complete)
         info = CampaignFolder.open(campaign).info
-        rig = self.stage.composition.rig(self.stage.window)
+        rig = self.stage.composition.rig
         choice = RigChoice(info.rig, tuple(info.options.items()))
         if rig.state.choice.value != choice or rig.state.link.value is not Link.OPEN:
             self.stage.connect(choice)

@@ -21,7 +21,7 @@ def live(stage: Stage) -> None:
     stage.open()
     stage.connect()
     stage.shoot("connected")
-    rig = stage.composition.rig(stage.window)
+    rig = stage.composition.live
     rig.show("white", 0.8)
     rig.set_exposure(20.0)
     stage.press("Start live view")
@@ -38,7 +38,7 @@ def live(stage: Stage) -> None:
 def refused(stage: Stage) -> None:
     """A rig with options that make no sense."""
     stage.open()
-    rig = stage.composition.rig(stage.window)
+    rig = stage.composition.rig
     rig.connect(RigChoice("twin", (("scene", "chart"), ("size", "huge"))))
     stage.wait(lambda: rig.state.link.value is Link.CLOSED)
     stage.shoot()

@@ -38,7 +38,7 @@ def planned_scan(stage: Stage, rig: RigChoice = CHART_RIG, preset: str = "previe
     page = stage.window.open_page("scan")
     assert isinstance(page, ScanPage)
     stage.idle()
-    controller = stage.composition._scans
+    controller = stage.composition.scans
     assert controller is not None
     controller.plans.choose_preset(preset)
     return Scan(page, page._state, controller)
@@ -89,7 +89,7 @@ def lost(stage: Stage) -> None:
     """The camera's cable is pulled in the middle."""
     stage.open()
     scan = planned_scan(stage)
-    rig = stage.composition.rig(stage.window)
+    rig = stage.composition.rig
     devices = rig.state.devices.value
     assert devices is not None
     rig.state.devices.set(with_faults(devices, FaultPlan(camera_gone_at=20)))

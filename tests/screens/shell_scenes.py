@@ -7,9 +7,9 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from dsl_app.importing.dialog import TakeInDialog
-from dsl_app.session.keeper import SessionKeeper
+from dsl_app.importing.dialog import ImportDialog
 from dsl_app.session.records import ResultsPart, Session
+from dsl_app.session.store import SessionStore
 from dsl_app.shell.actions import PAGES
 from dsl_app.shell.tour import Tour
 from PySide6.QtWidgets import QMenu
@@ -90,9 +90,9 @@ def recovery(stage: Stage) -> None:
     part = ResultsPart(path=scans / "chart.zarr", view="view_depth", cursor=(60, 40))
     _crash(stage.folder / "home" / "sessions", Session(page="results", results=part))
     stage.open()
-    stage.composition.session(stage.window).start()
+    stage.composition.session.start()
     stage.shoot()
-    stage.press("Open again")
+    stage.press("Restore session")
     stage.wait(lambda: stage.window.page == "results")
     stage.idle()
     stage.shoot("opened")
@@ -102,7 +102,7 @@ def _crash(folder: Path, session: Session) -> None:
     """Leave the session of a program behind that is no more."""
     process = os.spawnlp(os.P_NOWAIT, "true", "true")
     os.waitpid(process, 0)
-    keeper = SessionKeeper(folder, lambda: session, process)
+    keeper = SessionStore(folder, lambda: session, process)
     keeper.touch()
     assert not keeper.save()
 
@@ -118,17 +118,17 @@ def take_in(stage: Stage) -> None:
     (lines / "white.png").write_bytes(kept)
     stage.open()
     stage.window.open_path(folders.scene)
-    dialog = stage.dialog(TakeInDialog)
+    dialog = stage.dialog(ImportDialog)
     stage.shoot("flaws")
     gone.write_bytes(kept)
-    stage.composition.importer(stage.window).control.change(base=str(folders.own))
+    stage.composition.importer.control.change(base=str(folders.own))
     stage.idle()
     stage.shoot("ready")
     for name, folder in (("calibration", folders.rig), ("nothing", folders.folder)):
-        stage.composition.importer(stage.window).look(folder)
+        stage.composition.importer.look(folder)
         stage.idle()
         stage.shoot(name)
-    stage.composition.importer(stage.window).look(folders.scene)
+    stage.composition.importer.look(folders.scene)
     stage.idle()
     stage.press("Import", dialog)
     stage.wait(lambda: stage.window.page == "results", 60)

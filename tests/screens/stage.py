@@ -10,10 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from dsl_app.composition.window import IMPORTS, Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.shared.settings import HOME_VARIABLE
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtGui import QCursor, QGuiApplication
@@ -56,15 +55,8 @@ class Stage:
         path = home / "settings.json"
         if not path.exists():
             path.write_text(json.dumps({"tour_seen": True, **told, **settings}, default=str))
-        self.composition = Composition(Wish())
-        self.window = make_window(
-            self.composition.pages,
-            home,
-            self._look.theme,
-            commands=self.composition.commands,
-            imports=IMPORTS if page_waits else None,
-            takers=self.composition.takers,
-        )
+        self.composition = Composition(StartOptions())
+        self.window = self.composition.open_window(home, self._look.theme, in_background=page_waits)
         QCursor.setPos(QGuiApplication.primaryScreen().geometry().bottomRight())
         self.window.show()
         self.window.move(0, 0)
@@ -73,7 +65,7 @@ class Stage:
 
     def connect(self, choice: RigChoice = CHART_RIG) -> None:
         """Connect a rig and wait for it."""
-        rig = self.composition.rig(self.window)
+        rig = self.composition.rig
         rig.connect(choice)
         self.wait(lambda: rig.state.link.value is Link.OPEN)
 

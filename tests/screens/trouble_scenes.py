@@ -34,7 +34,7 @@ def damaged_session(stage: Stage) -> None:
     for manifest in (scans / "chart.dsl").glob("*.json"):
         manifest.write_text("{ cut off")
     stage.open()
-    stage.composition.session(stage.window).start()
+    stage.composition.session.start()
     stage.window.open_path(scans / "chart.dsl")
     stage.shoot()
 
@@ -62,7 +62,7 @@ def two_scans(stage: Stage) -> None:
     stage.press("Start scan", scan.page)
     stage.wait(lambda: scan.state.status.value.done > 2)
     scan.controller.start()
-    stage.composition.rig(stage.window).start_live()
+    stage.composition.live.start()
     stage.window.do("live_demo")
     stage.settle()
     stage.shoot()

@@ -1,39 +1,40 @@
-"""Which page gets which controller and state; pages are imported when they are first opened."""
+"""Builds each page from its slice; pages are imported and made when they are first opened."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
 
-from dsl_app.composition.calibrations import CalibrationDesk
-from dsl_app.composition.imports import TakeInDesk
-from dsl_app.composition.reconstruct_again import AgainDesk
+from dsl_app.composition.calibrations import CalibrationInUse
+from dsl_app.composition.dialogs import ImportAction, ReconstructAgainAction
 from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.settings import data_folder
 from dsl_app.shared.widgets.page import PageWidget
-from dsl_app.shell.main_window import Command, MainWindow, PageMaker, Taker, page_commands
+from dsl_app.shell.application import make_window, open_first_page
+from dsl_app.shell.main_window import MainWindow
 
 if TYPE_CHECKING:
+    from dsl_app.calibrate.wizard.controller import WizardController
+    from dsl_app.calibrate.wizard.state import WizardState
     from dsl_app.composition.demo import DemoController
-    from dsl_app.composition.projector_screens import ProjectorScreens
-    from dsl_app.composition.session_restore import SessionDesk
     from dsl_app.connection.controller import RigController
+    from dsl_app.rig.controller import LiveController
+    from dsl_app.rig.projector_screens import ProjectorScreens
     from dsl_app.scan.controller import ScanController
     from dsl_app.scan.state import ScanState
+    from dsl_app.session.restore import SessionRestore
 
 
-#: What the window does behind any page.
-_SHARED = (
-    "dsl_app.connection.controller",
-    "dsl_app.composition.projector_screens",
-    "dsl_app.composition.session_restore",
-)
-#: What pages are made of; imported by a thread where one is opened first of all.
+#: What every page needs.
+_SHARED = ("dsl_app.connection.controller", "dsl_app.rig.projector_screens", "dsl_app.session.restore")
+#: What each page is made of; imported by a thread if it is the first page to open.
 IMPORTS = {
     "rig": (*_SHARED, "dsl_core.devices.registry", "dsl_app.rig.page"),
     "calibrate": (*_SHARED, "dsl_app.calibrate.controller", "dsl_app.calibrate.page"),
@@ -52,40 +53,47 @@ IMPORTS = {
         "dsl_app.compare.page",
     ),
 }
-#: How long the first page is on screen before the rig is asked for, ms.
+#: How long the first page is on screen before the rig is connected, ms.
 CONNECT_AFTER_MS = 200
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What the command line asked for; None leaves it to the settings."""
+class StartOptions:
+    """What the command line requested; None leaves it to the settings."""
 
     rig: RigChoice | None = None
     open: Path | None = None
     demo: bool = False
     #: Whether accuracy against time is predicted unasked, a minute or two of computing for each new rig.
     predicts: bool = False
-    #: Whether a person sits before the window, who may be offered the tour at the first start.
-    is_first_contact: bool = False
+    #: Whether to offer the tour at the first start.
+    offers_tour: bool = False
 
 
 class Composition(QObject):
-    """Makes the pages of one window and what they share, and does what only all of them together can do."""
+    """Makes one window, its pages and what they share, and does what needs several of them."""
 
-    def __init__(self, wish: Wish) -> None:
+    window: MainWindow
+
+    def __init__(self, options: StartOptions) -> None:
         super().__init__()
-        self._wish = wish
-        self._rig: RigController | None = None
-        self._screens: ProjectorScreens | None = None
-        self._scans: ScanController | None = None
-        self._demo: DemoController | None = None
-        self._session: SessionDesk | None = None
-        self._desk: CalibrationDesk | None = None
-        self._again: AgainDesk | None = None
-        self._importer: TakeInDesk | None = None
+        self._options = options
+        #: The controller of the Scan page, once that has been opened.
+        self.scans: ScanController | None = None
+
+    def open_window(
+        self, folder: Path | None = None, theme: str | None = None, in_background: bool = False
+    ) -> MainWindow:
+        """Make the window with its settings of a folder (default: the system's) and the page opened last.
+
+        ``in_background`` imports that page in a thread once the window is painted.
+        """
+        self.window = make_window(self.pages, folder, theme, self.commands, self.handlers)
+        open_first_page(self.window, IMPORTS if in_background else None)
+        return self.window
 
     @property
-    def pages(self) -> dict[str, PageMaker]:
+    def pages(self) -> dict[str, Callable[[], PageWidget]]:
         """Makers of all pages by key."""
         return {
             "rig": self._rig_page,
@@ -96,129 +104,160 @@ class Composition(QObject):
         }
 
     @property
-    def takers(self) -> dict[Kind, Taker]:
-        """What takes files and folders that no page opens, by what they are."""
-        return {Kind.PUBLISHED: lambda window, path: self.importer(window).look(path)}
+    def handlers(self) -> dict[Kind, Callable[[Path], object]]:
+        """What opens files and folders that no page opens, by kind."""
+        return {Kind.PUBLISHED: lambda path: self.importer.look(path)}
 
     @property
-    def commands(self) -> dict[str, Command]:
-        """Actions of the whole application, by key."""
+    def commands(self) -> dict[str, Callable[[], object]]:
+        """Actions that need several pages, by key."""
         return {
-            "demo": lambda window: self.demo(window).show(),
-            "live_demo": lambda window: self.demo(window).scan_live(),
-            "import": lambda window: self.importer(window).begin(),
-            "reconstruct_again": lambda window: self.again(window).begin(),
-            **page_commands(),
+            "demo": lambda: self.demo.show(),
+            "live_demo": lambda: self.demo.scan_live(),
+            "import": lambda: self.importer.begin(),
+            "reconstruct_again": lambda: self.reconstruct_again.begin(),
         }
 
-    def start(self, window: MainWindow) -> None:
-        """Connect the rig and open what was asked for, once the window is on screen."""
-        QTimer.singleShot(CONNECT_AFTER_MS, self, lambda: self._begin(window))
+    def start(self) -> None:
+        """Connect the rig and open what was requested, once the window is on screen."""
+        QTimer.singleShot(CONNECT_AFTER_MS, self, self._start_now)
 
-    def _begin(self, window: MainWindow) -> None:
-        self.session(window).start()
-        rig = self.rig(window)
-        if rig.state.link.value is Link.CLOSED:
-            rig.connect(rig.state.choice.value)
-        if self._wish.open is not None:
-            window.open_path(self._wish.open)
-        if self._wish.demo:
-            self.demo(window).show()
-        if self._wish.is_first_contact and not window.parts.settings.tour_seen:
-            # Said once: who closes it finds the tour in the Help menu.
-            window.parts.settings.tour_seen = True
-            window.toasts.offer(
-                "New here? A tour of seven steps shows what is where; Help, Guided tour has it later too.",
-                {"Take the tour": lambda: window.do("tour")},
+    def _start_now(self) -> None:
+        self.session.start()
+        if self.rig.state.link.value is Link.CLOSED:
+            self.rig.connect(self.rig.state.choice.value)
+        if self._options.open is not None:
+            self.window.open_path(self._options.open)
+        if self._options.demo:
+            self.demo.show()
+        if self._options.offers_tour and not self.window.parts.settings.tour_seen:
+            # Offered once; the Help menu always has it.
+            self.window.parts.settings.tour_seen = True
+            self.window.toasts.offer(
+                "New here? The guided tour shows the window in seven steps. It is also in the Help menu.",
+                {"Take the tour": lambda: self.window.do("tour")},
             )
 
-    def rig(self, window: MainWindow) -> RigController:
+    # What several pages share ----------------------------------------------------------------------
+
+    @cached_property
+    def rig(self) -> RigController:
         """The one rig of the application."""
-        if self._rig is None:
-            from dsl_app.composition.projector_screens import ProjectorScreens
-            from dsl_app.connection.controller import RigController
-            from dsl_app.connection.projector_window import ScreenProjector
+        from dsl_app.connection.controller import RigController
+        from dsl_app.rig.projector_window import ScreenProjector
 
-            settings = window.parts.settings
-            remembered = RigChoice(settings.rig, tuple(settings.rig_options.items()))
-            state = RigState(self._wish.rig or remembered)
-            state.choice.changed.connect(lambda choice: _remember(window, choice))
-            self._screens = screens = ProjectorScreens(window)
-            state.used_by.changed.connect(lambda _: screens.hide_names())
-            self._rig = RigController(
-                state, window.parts.runner, window.toasts, lambda own: ScreenProjector(screens.beam, own)
-            )
-        return self._rig
+        window, settings = self.window, self.window.parts.settings
+        remembered = RigChoice(settings.rig, tuple(settings.rig_options.items()))
+        state = RigState(self._options.rig or remembered)
+        state.choice.changed.connect(self._remember_rig)
+        screens = self.screens
+        state.used_by.changed.connect(lambda _: screens.hide_names())
+        return RigController(
+            state, window.parts.runner, window.toasts, lambda own: ScreenProjector(screens.beam, own)
+        )
 
-    def demo(self, window: MainWindow) -> DemoController:
+    def _remember_rig(self, choice: RigChoice) -> None:
+        settings = self.window.parts.settings
+        settings.rig, settings.rig_options = choice.name, dict(choice.options)
+
+    @cached_property
+    def screens(self) -> ProjectorScreens:
+        """The screens that the projector may be."""
+        from dsl_app.rig.projector_screens import ProjectorScreens
+
+        screens = ProjectorScreens(self.window, self.window.toasts)
+        self.window.closed.connect(screens.close)
+        return screens
+
+    @cached_property
+    def live(self) -> LiveController:
+        """Live view and trial pictures of the rig."""
+        from dsl_app.rig.controller import LiveController
+
+        return LiveController(self.rig, self.window.toasts)
+
+    @cached_property
+    def demo(self) -> DemoController:
         """The demo of the application."""
-        if self._demo is None:
-            from dsl_app.composition.demo import DemoController
+        from dsl_app.composition.demo import DemoController
 
-            self._demo = DemoController(
-                _demo_folder(),
-                self.rig(window),
-                window.parts.runner,
-                window.toasts,
-                lambda path: self._show_result(window, path),
-                lambda: self._open_scan_page(window),
-            )
-        return self._demo
+        parts, toasts = self.window.parts, self.window.toasts
+        return DemoController(
+            _demo_folder(), self.rig, parts.runner, toasts, self._show_result, self._open_scan_page
+        )
 
-    @staticmethod
-    def _show_result(window: MainWindow, path: Path) -> None:
-        window.open_page("results")
-        window.open_path(path)
+    def _show_result(self, path: Path) -> None:
+        self.window.open_page("results")
+        self.window.open_path(path)
 
-    def session(self, window: MainWindow) -> SessionDesk:
-        """What keeps the session of the window."""
-        if self._session is None:
-            from dsl_app.composition.session_restore import SessionDesk
+    def _open_scan_page(self) -> ScanController:
+        self.window.open_page("scan")
+        assert self.scans is not None
+        return self.scans
 
-            self._session = SessionDesk(window)
-        return self._session
+    @cached_property
+    def session(self) -> SessionRestore:
+        """Saves the session of the window, and restores one after a crash."""
+        from dsl_app.session.restore import SessionRestore
 
-    def _open_scan_page(self, window: MainWindow) -> ScanController:
-        window.open_page("scan")
-        assert self._scans is not None
-        return self._scans
+        return SessionRestore(self.window)
 
-    def desk(self, window: MainWindow) -> CalibrationDesk:
-        """What all calibrations of the application share."""
-        if self._desk is None:
-            self._desk = CalibrationDesk(window, self.rig(window))
-        return self._desk
+    @cached_property
+    def calibration_in_use(self) -> CalibrationInUse:
+        """The calibration that scans use."""
+        return CalibrationInUse(self.window.parts.settings)
 
-    def again(self, window: MainWindow) -> AgainDesk:
-        """What reconstructs scans again."""
-        if self._again is None:
-            self._again = AgainDesk(window)
-        return self._again
+    @cached_property
+    def reconstruct_again(self) -> ReconstructAgainAction:
+        """Reconstructs scans again."""
+        return ReconstructAgainAction(self.window)
 
-    def importer(self, window: MainWindow) -> TakeInDesk:
-        """What imports folders of other programs."""
-        if self._importer is None:
-            self._importer = TakeInDesk(window)
-        return self._importer
-
-    def _calibrate_page(self, window: MainWindow) -> PageWidget:
-        return self.desk(window).page()
+    @cached_property
+    def importer(self) -> ImportAction:
+        """Imports folders of other programs."""
+        return ImportAction(self.window)
 
     # Pages -----------------------------------------------------------------------------------------
 
-    def _rig_page(self, window: MainWindow) -> PageWidget:
+    def _rig_page(self) -> PageWidget:
         from dsl_app.rig.page import RigPage
         from dsl_core.devices.registry import rig_names
 
-        rig = self.rig(window)
-        page = RigPage(rig.state, rig, rig_names())
-        assert self._screens is not None
-        self._screens.serve(page)
-        page.selftest_wanted.connect(lambda: window.do("calibrate_selftest"))
-        page.apply_theme(window.theme)
+        page = RigPage(self.live, rig_names())
+        self.screens.serve(page)
+        page.selftest_requested.connect(lambda: self.window.do("calibrate_selftest"))
         return page
 
-    def _scan_page(self, window: MainWindow) -> PageWidget:
+    def _calibrate_page(self) -> PageWidget:
+        from dsl_app.calibrate.campaign_status import Kinds
+        from dsl_app.calibrate.controller import CalibrateController
+        from dsl_app.calibrate.page import CalibratePage
+        from dsl_app.calibrate.state import CalibrateState, CampaignFacts
+
+        window, settings, state = self.window, self.window.parts.settings, CalibrateState()
+        state.in_use.set(settings.calibration)
+        kinds = Kinds(ageing_days=settings.ageing_days)
+        control = CalibrateController(state, self.rig, window.parts.runner, window.toasts, kinds=kinds)
+        control.wizard_ready.connect(lambda pair: self._open_wizard(*pair))
+        self.calibration_in_use.serve_library(state)
+        last = Path(settings.campaign)
+        if settings.campaign and last.is_dir():
+            control.open_campaign(last)
+
+        def remember(facts: CampaignFacts | None) -> None:
+            if facts is not None:
+                settings.campaign, settings.campaigns_folder = str(facts.path), str(facts.path.parent)
+
+        state.campaign.changed.connect(remember)
+        home = Path(settings.campaigns_folder or Path.home() / "dsl-campaigns")
+        return CalibratePage(state, self.rig.state, control, home)
+
+    def _open_wizard(self, state: WizardState, control: WizardController) -> None:
+        from dsl_app.calibrate.wizard.window import CalibrationWizard
+
+        CalibrationWizard(state, control, self.window.theme, self.window).open()
+
+    def _scan_page(self) -> PageWidget:
         from dsl_app.scan.command_line import fresh_target
         from dsl_app.scan.controller import ScanController
         from dsl_app.scan.effects.controller import EffectsController
@@ -230,84 +269,70 @@ class Composition(QObject):
         from dsl_app.scan.state import Phase, ScanState
         from dsl_core.model.plan import CapturePlan
 
-        parts = window.parts
+        window, parts, rig = self.window, self.window.parts, self.rig
         folder = Path(parts.settings.output_folder or Path.home() / "dsl-scans")
         state = ScanState(CapturePlan(), fresh_target(folder, datetime.now()))
         state.phase.changed.connect(
-            lambda phase: _remember_folder(window, state) if phase is Phase.DONE else None
+            lambda phase: self._remember_folder(state) if phase is Phase.DONE else None
         )
-        self._scans = controller = ScanController(
-            state, self.rig(window), parts.runner, window.toasts, parts.undo, hidden=_demo_folder()
+        self.scans = controller = ScanController(
+            state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder()
         )
-        self.desk(window).serve(controller)
-        self.session(window).serve_scan(controller)
+        self.calibration_in_use.serve_scans(controller)
+        self.session.serve_scan(controller)
         foreseen = ForecastState()
         forecast = ForecastController(
             foreseen,
             state,
-            self.rig(window).state,
+            rig.state,
             controller.plans,
             parts.runner,
             window.toasts,
             data_folder() / "forecasts",
-            self._wish.predicts,
+            self._options.predicts,
         )
         rendered = EffectsState()
-        effects = EffectsController(rendered, state, self.rig(window), parts.runner, window.toasts)
+        effects = EffectsController(rendered, state, rig, parts.runner, window.toasts)
         page = ScanPage(
-            state,
-            controller,
-            ForecastPanel(foreseen, forecast),
-            rendered,
-            effects,
-            window.open_path,
+            state, controller, ForecastPanel(foreseen, forecast), rendered, effects, window.open_path
         )
         page.reconstruct_requested.connect(lambda: window.do("reconstruct_again"))
-        page.apply_theme(window.theme)
         return page
 
-    def _results_page(self, window: MainWindow) -> PageWidget:
+    def _remember_folder(self, state: ScanState) -> None:
+        folder = state.target.value.parent
+        if folder != _demo_folder():
+            self.window.parts.settings.output_folder = str(folder)
+
+    def _results_page(self) -> PageWidget:
         from dsl_app.results.controller import ResultsController
         from dsl_app.results.page import ResultsPage
         from dsl_app.results.state import ResultsState
         from dsl_app.results.welcome import Welcome
 
-        parts, state = window.parts, ResultsState()
+        window, parts, state = self.window, self.window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
-        welcome = Welcome(parts.recent, window.open_path, lambda: self.demo(window).show())
-        self.session(window).serve_results(controller)
+        welcome = Welcome(parts.recent, window.open_path, lambda: self.demo.show())
+        self.session.serve_results(controller)
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)
         page.again_wanted.connect(lambda: window.do("reconstruct_again"))
-        page.apply_theme(window.theme)
         return page
 
-    def _compare_page(self, window: MainWindow) -> PageWidget:
+    def _compare_page(self) -> PageWidget:
         from dsl_app.compare.page import ComparePage
         from dsl_app.compare.pair.controller import CompareController
         from dsl_app.compare.pair.state import CompareState
         from dsl_app.compare.series.controller import SeriesController
         from dsl_app.compare.series.state import SeriesState
 
-        parts, state, several = window.parts, CompareState(), SeriesState()
-        controller = CompareController(state, parts.runner, window.toasts)
-        series = SeriesController(several, parts.runner, window.toasts, parts.undo)
-        self.session(window).serve_comparison(controller, series)
-        page = ComparePage(state, controller, several, series)
-        page.apply_theme(window.theme)
-        return page
+        parts, toasts = self.window.parts, self.window.toasts
+        state, series_state = CompareState(), SeriesState()
+        controller = CompareController(state, parts.runner, toasts)
+        series = SeriesController(series_state, parts.runner, toasts, parts.undo)
+        self.session.serve_comparison(controller, series)
+        return ComparePage(state, controller, series_state, series)
 
 
 def _demo_folder() -> Path:
     return data_folder() / "demo"
-
-
-def _remember(window: MainWindow, choice: RigChoice) -> None:
-    window.parts.settings.rig = choice.name
-    window.parts.settings.rig_options = dict(choice.options)
-
-
-def _remember_folder(window: MainWindow, state: ScanState) -> None:
-    if state.target.value.parent == _demo_folder():
-        return
-    window.parts.settings.output_folder = str(state.target.value.parent)

@@ -1,4 +1,4 @@
-"""The rig as the window knows it: which one, whether it is there, what it sees."""
+"""The rig as the window knows it: which one, whether it is connected, what uses it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from dsl_app.shared.evented import Value
 if TYPE_CHECKING:
     # The window comes up before numpy.
     from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
-    from dsl_core.model.frames import Frame
 
 
 class Link(Enum):
@@ -42,21 +41,12 @@ class RigChoice:
         return ", ".join((self.name, *(f"{key} {value}" for key, value in self.options)))
 
 
-@dataclass(frozen=True)
-class FrameCounts:
-    """Live frames so far: shown, lost on the way from the camera, and skipped because the window was busy."""
-
-    shown: int = 0
-    lost: int = 0
-    skipped: int = 0
-
-
 class RigState:
     """Values that the rig's controller sets and pages follow.
 
-    ``frame`` is the latest live frame; ``trouble`` a sentence on why the rig is not there (empty: nothing).
-    ``is_exposing`` says that an exposure is being looked for. ``used_by`` names the work that has the rig for
-    itself and would be spoilt by another picture (empty: none).
+    ``trouble`` is a sentence on why the rig is not connected (empty: nothing). ``live`` says whether a live
+    view uses the rig, which gives way to jobs. ``used_by`` names the job that uses the rig alone and whose
+    frames another picture would spoil (empty: none).
     """
 
     def __init__(self, choice: RigChoice) -> None:
@@ -65,10 +55,6 @@ class RigState:
         self.devices: Value[DeviceRig | None] = Value(None)
         self.trouble = Value("")
         self.live = Value(False)
-        self.frame: Value[Frame | None] = Value(None)
-        self.exposure_ms = Value(1000.0 / 6.0)
-        self.counts = Value(FrameCounts())
-        self.is_exposing = Value(False)
         self.used_by = Value("")
 
     @property

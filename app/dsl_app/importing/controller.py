@@ -1,4 +1,4 @@
-"""Imports folders of other programs: says what is missing or misnamed, then takes them in. No Qt."""
+"""Imports folders of other programs: says what is missing or misnamed, then imports them. No Qt."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dsl_app.importing.state import PUBLISHED, Found, TakeInOrder, TakeInState
-from dsl_app.importing.words import (
+from dsl_app.importing.state import (
+    PUBLISHED,
     SUFFIXES,
+    Found,
+    ImportOrder,
+    ImportState,
     command_of,
     rows_of,
     summary_of,
@@ -21,16 +24,16 @@ from dsl_core.io.calibration_library import CalibrationLibrary, load_calibration
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
-#: What decides whether a folder can be imported; a change of them needs another look.
-_LOOKED_AT = {"folder", "base", "camera_px"}
+#: Fields that decide whether a folder can be imported; after a change it is checked again.
+_CHECKED = {"folder", "base", "camera_px"}
 
 
-class TakeInController:
-    """Looks at a folder, keeps the order for it, and carries it out."""
+class ImportController:
+    """Checks a folder, keeps the order to import it, and carries that out."""
 
     def __init__(
         self,
-        state: TakeInState,
+        state: ImportState,
         runner: JobRunner,
         notifier: Notifier,
         library: CalibrationLibrary | None = None,
@@ -40,28 +43,28 @@ class TakeInController:
         self._looks = 0
 
     def look(self, folder: Path, home: Path) -> None:
-        """Look at a folder; what is imported of it is proposed to lie in ``home``."""
+        """Check a folder; the proposed target is in the folder ``home``."""
         self.state.library.set(self._library.names())
         before = self.state.order.value
-        # Folders of one rig come one after the other.
-        order = TakeInOrder(folder, home, PUBLISHED if before is None else before.base)
+        # Folders of one rig are often imported one after the other.
+        order = ImportOrder(folder, home, PUBLISHED if before is None else before.base)
 
         def done(found: Found) -> None:
             self.state.order.set(replace(order, target=target_for(folder, found.kind, home)))
-            self._take(found)
+            self._show(found)
             self.state.ready.emit(found)
 
         self._look(order, done)
 
     def change(self, **what: Any) -> None:
-        """Change fields of the order; looks at the folder again where that matters."""
+        """Change fields of the order; checks the folder again if that matters."""
         order, found = self.state.order.value, self.state.found.value
         if order is None or found is None:
             return
         order = replace(order, **what)
         self.state.order.set(order)
-        if _LOOKED_AT & set(what):
-            self._look(order, self._take)
+        if _CHECKED & set(what):
+            self._look(order, self._show)
         else:
             self.state.trouble.set(trouble_of(found, order))
 
@@ -73,17 +76,17 @@ class TakeInController:
             plain = name.strip().removesuffix(suffix).replace("/", "-")
             self.change(target=home.expanduser() / f"{plain}{suffix}")
 
-    def _look(self, order: TakeInOrder, done: Any) -> None:
+    def _look(self, order: ImportOrder, done: Any) -> None:
         self._looks += 1
         number = self._looks
-        self.state.busy.set(f"Looking at {order.folder.name}")
+        self.state.busy.set(f"Checking {order.folder.name}")
 
         def work(progress: Progress) -> Found:
-            progress.report("look at the files", 0, 0)
+            progress.report("check the files", 0, 0)
             return look_at(order, self._library)
 
         def looked(found: Found) -> None:
-            # A look that was overtaken by another says nothing any more.
+            # The outcome of a check is dropped once another one has begun.
             if number == self._looks:
                 self.state.busy.set("")
                 done(found)
@@ -94,9 +97,9 @@ class TakeInController:
             self._tell(error)
 
         ended = lambda: self.state.busy.set("")  # noqa: E731
-        self._runner.submit(Job(f"Look at {order.folder.name}", work, looked, failed, ended, is_minor=True))
+        self._runner.submit(Job(f"Check {order.folder.name}", work, looked, failed, ended, is_minor=True))
 
-    def _take(self, found: Found) -> None:
+    def _show(self, found: Found) -> None:
         assert self.state.order.value is not None
         self.state.found.set(found)
         self.state.trouble.set(trouble_of(found, self.state.order.value))
@@ -107,16 +110,16 @@ class TakeInController:
         return "" if found is None or order is None else command_of(found, order)
 
     def start(self) -> bool:
-        """Import in a job; False where that cannot be, and why is told."""
+        """Import in a job; if that is not possible, a message says why and the answer is False."""
         found, order = self.state.found.value, self.state.order.value
-        # Something of that name may have come meanwhile.
+        # Something of that name may exist by now.
         trouble = "Choose a folder first." if found is None or order is None else trouble_of(found, order)
         self.state.trouble.set(trouble)
         if found is None or order is None or trouble:
             self._notifier.tell("warning", trouble)
             return False
-        take = take_calibration if found.kind == "calibration" else take_scan
-        work = lambda progress: take(order, self._library, progress)  # noqa: E731
+        carry_out = import_calibration if found.kind == "calibration" else import_scan
+        work = lambda progress: carry_out(order, self._library, progress)  # noqa: E731
         self._runner.submit(Job(f"Import {order.folder.name}", work, self.state.done.emit, self._tell))
         return True
 
@@ -124,8 +127,8 @@ class TakeInController:
         self._notifier.tell("error", sentence_of(error))
 
 
-def look_at(order: TakeInOrder, library: CalibrationLibrary) -> Found:
-    """What the folder of an order holds; raises `StoreError`."""
+def look_at(order: ImportOrder, library: CalibrationLibrary) -> Found:
+    """What the folder of an order contains; raises `StoreError`."""
     from dsl_core.workflows import exchange
 
     look = exchange.look_at(order.folder, base_of(order, library), _size(order))
@@ -134,8 +137,8 @@ def look_at(order: TakeInOrder, library: CalibrationLibrary) -> Found:
     )
 
 
-def take_scan(order: TakeInOrder, library: CalibrationLibrary, progress: Progress) -> Path:
-    """Make a scan of a dataset, whole or not at all."""
+def import_scan(order: ImportOrder, library: CalibrationLibrary, progress: Progress) -> Path:
+    """Make a scan of a dataset, complete or not at all."""
     from dsl_core.io.staging import staged
     from dsl_core.workflows import exchange
 
@@ -144,7 +147,7 @@ def take_scan(order: TakeInOrder, library: CalibrationLibrary, progress: Progres
     return order.target
 
 
-def take_calibration(order: TakeInOrder, library: CalibrationLibrary, progress: Progress) -> Path:
+def import_calibration(order: ImportOrder, library: CalibrationLibrary, progress: Progress) -> Path:
     """Make a rig's file of a published calibration."""
     from dsl_core.io.rig_file import save_rig
     from dsl_core.workflows import exchange
@@ -154,12 +157,12 @@ def take_calibration(order: TakeInOrder, library: CalibrationLibrary, progress: 
     return save_rig(rig, order.target)
 
 
-def base_of(order: TakeInOrder, library: CalibrationLibrary) -> Rig:
+def base_of(order: ImportOrder, library: CalibrationLibrary) -> Rig:
     """The rig that gives film, sensor and scales; raises what `load_calibration` raises."""
     from dsl_core.simulation.published_rig import published_rig
 
     return published_rig() if order.base == PUBLISHED else load_calibration(order.base, library)
 
 
-def _size(order: TakeInOrder) -> tuple[int, int] | None:
+def _size(order: ImportOrder) -> tuple[int, int] | None:
     return order.camera_px if all(order.camera_px) else None

@@ -1,9 +1,9 @@
-"""What was found in a folder of another program, and where what is imported of it is stored."""
+"""The import dialog: what was found in a folder of another program, and where to save it."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -15,34 +15,24 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.importing.state import PUBLISHED, FileRow, Found, TakeInOrder, TakeInState
+from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportOrder, ImportState, import_view
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.dialogs import OrderCommands, OrderDialog
+from dsl_app.shared.widgets.dialogs import OrderDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 
-_COLUMNS = ("Wanted", "Found", "Status", "What to do")
+if TYPE_CHECKING:
+    from dsl_app.importing.controller import ImportController
+
+_COLUMNS = ("Expected", "Found", "Status", "What to do")
 _LARGEST_PX = 20000
 
 
-class TakeInCommands(OrderCommands, Protocol):
-    """What the dialog asks of its controller."""
+class ImportDialog(OrderDialog):
+    """Follows an `ImportState` whose folder has been checked; the controller imports."""
 
-    def look(self, folder: Path, home: Path) -> None:
-        """Look at another folder."""
-
-    def change(self, **what: Any) -> None:
-        """Change fields of the order."""
-
-    def rename(self, name: str, home: Path) -> None:
-        """Store what is imported by a name in a folder."""
-
-
-class TakeInDialog(OrderDialog):
-    """Follows a `TakeInState` whose folder was looked at; the controller imports."""
-
-    def __init__(self, state: TakeInState, commands: TakeInCommands, parent: QWidget) -> None:
+    def __init__(self, state: ImportState, commands: ImportController, parent: QWidget) -> None:
         super().__init__(commands, parent)
         order = state.order.value
         assert order is not None
@@ -71,38 +61,42 @@ class TakeInDialog(OrderDialog):
         self.other = push_button("&Another folder…", "Choose another folder to import")
         self._summary = label("")
         self.table = ReadTable(
-            "Files of the folder", "What the published layout wants, what is there, and what to do", _COLUMNS
+            "Files of the folder",
+            "What the published layout expects, what was found, what to do",
+            _COLUMNS,
         )
         self.table.wrap(len(_COLUMNS) - 1)
         for column in (0, 1):
             self.table.horizontalHeader().setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
         self.base = ChoiceBox(
             "Film, sensor and scales of",
-            "The folder does not say how the film lies, how the sensor answers and how bright white is.\n"
+            "The folder does not contain the film's pose, the sensor's response and the scale of white.\n"
             "A scan needs the calibration of the rig that took it.",
         )
         self.base.addItem("The published rig", PUBLISHED)
         for name in self._state.library.value:
             self.base.addItem(name, name)
-        self.file = push_button("&File…", "Choose the file of a calibration (.json)")
+        self.file = push_button("&File…", "Choose a calibration file (.json)")
         self._size = QWidget()
         self.width_px, self.height_px = (
             WholeBox(f"{what} of the camera's images", 0, _LARGEST_PX, 0, "px",
-                     f"{what} in pixels; needed only where the calibration's file does not say it")
+                     f"{what} in pixels; needed only if the calibration file does not contain it")
             for what in ("Width", "Height")
         )  # fmt: skip
         for box in (self.width_px, self.height_px):
             box.setSpecialValueText("as in the file")
 
-    def _make_target(self, order: TakeInOrder) -> None:
+    def _make_target(self, order: ImportOrder) -> None:
         self.name = QLineEdit(order.target.stem)
         self.name.setAccessibleName("Name")
-        self.name.setToolTip("Name of what is imported; its ending is added")
+        self.name.setToolTip("Name of the imported scan or calibration; the ending is added")
         self.home = QLineEdit(str(order.target.parent))
-        self.home.setAccessibleName("Folder to store it in")
-        self.home.setToolTip("What is imported is stored here; the folder it comes from stays as it is")
-        self.browse = push_button("&Choose…", "Choose the folder to store it in")
-        self.name_buttons("Import", "Take it in; whole or not at all", "Import nothing (Escape)")
+        self.home.setAccessibleName("Folder to save in")
+        self.home.setToolTip("Folder of the imported scan or calibration; the source folder is not changed")
+        self.browse = push_button("&Choose…", "Choose the folder to save in")
+        self.name_buttons(
+            "Import", "Import the folder, completely or not at all", "Close without importing (Escape)"
+        )
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()
@@ -146,7 +140,7 @@ class TakeInDialog(OrderDialog):
             return
         self._folder.setText(_breakable(str(found.folder)))
         self._summary.setText(found.summary)
-        self._form.setRowVisible(self._size, found.kind == "calibration")
+        self._form.setRowVisible(self._size, import_view(self._state).asks_size)
         self.table.show_rows([self._items(row) for row in found.rows])
 
     def _items(self, row: FileRow) -> tuple[Any, ...]:
@@ -155,18 +149,18 @@ class TakeInDialog(OrderDialog):
         colour = theme.good if not row.is_odd else theme.warn if harmless else theme.bad
         return (
             cell(_breakable(row.expected or "–")),
-            cell("as wanted" if row.found == row.expected else _breakable(row.found or "–"), theme.muted),
+            cell("as expected" if row.found == row.expected else _breakable(row.found or "–"), theme.muted),
             cell(row.status, colour),
             cell(row.advice),
         )
 
-    def _show_order(self, order: TakeInOrder | None) -> None:
+    def _show_order(self, order: ImportOrder | None) -> None:
         if order is None:
             return
         if self.base.findData(order.base) < 0:
             self.base.addItem(Path(order.base).name, order.base)
         self.base.setCurrentIndex(self.base.findData(order.base))
-        # Who types is not corrected meanwhile.
+        # Text that is being typed is not replaced.
         is_other, self._shown = order.folder != self._shown, order.folder
         for field, text in ((self.name, order.target.stem), (self.home, str(order.target.parent))):
             if is_other or not field.hasFocus():
@@ -174,15 +168,11 @@ class TakeInDialog(OrderDialog):
         self._judge()
 
     def _judge(self) -> None:
-        busy, trouble = self._state.busy.value, self._state.trouble.value
-        order, found = self._state.order.value, self._state.found.value
-        target = "" if order is None else f"Makes {order.target.name}."
-        if found is not None and found.kind == "calibration":
-            target += " It is taken into the library of calibrations."
-        self.judge("" if busy else trouble, f"{busy}…" if busy else target, bool(busy))
+        view = import_view(self._state)
+        self.judge(view.trouble, view.remark, view.is_busy)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         self._show_found(self._state.found.value)
 
@@ -204,7 +194,7 @@ class TakeInDialog(OrderDialog):
             self._commands.change(base=name)
 
     def _choose_home(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, "Store it in", self.home.text())
+        name = QFileDialog.getExistingDirectory(self, "Save in", self.home.text())
         if name:
             self.home.setText(name)
             self._rename()

@@ -1,20 +1,28 @@
-"""A folder of another program that is to be imported: what was found in it, and what becomes of it."""
+"""A folder of another program that is to be imported: what was found in it, and how to import it. No Qt."""
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Literal
+from itertools import groupby
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Literal
 
 from dsl_app.shared.evented import Event, Value
 
-#: Key of the published rig, whose film, sensor and scales are taken where nothing else is said.
+if TYPE_CHECKING:
+    from dsl_core.io.published import FileRecord
+
+#: Key of the published rig, whose film, sensor and scales are the default.
 PUBLISHED = ""
+SUFFIXES = {"scan": ".dsl", "calibration": ".json"}
+KINDS = {"scan": "dataset", "calibration": "calibration"}
 
 
 @dataclass(frozen=True)
 class FileRow:
-    """A line of the table: one file, or several in a row that have the same fate."""
+    """A line of the table: one file, or several in a row with the same status."""
 
     expected: str
     found: str
@@ -30,7 +38,7 @@ class FileRow:
 
 @dataclass(frozen=True)
 class Found:
-    """What a folder holds; ``summary`` counts it, ``obstacle`` (if any) keeps it from being imported."""
+    """What a folder contains; ``summary`` counts it, ``obstacle`` (if any) prevents its import."""
 
     folder: Path
     kind: Literal["scan", "calibration"]
@@ -40,7 +48,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class TakeInOrder:
+class ImportOrder:
     """How to import: ``base`` is `PUBLISHED`, a name of the library or the path of a file.
 
     ``camera_px`` is the image size of a calibration; 0 leaves it to the file.
@@ -52,18 +60,119 @@ class TakeInOrder:
     camera_px: tuple[int, int] = (0, 0)
 
 
-class TakeInState:
+class ImportState:
     """Values that the controller sets and the dialog follows.
 
-    ``busy`` says what is looked at (empty: nothing), ``trouble`` why nothing can be imported (empty: it can).
-    ``ready`` fires when a folder was looked at for the first time, ``done`` with what was imported.
+    ``busy`` says what is being checked (empty: nothing), ``trouble`` why the import cannot start (empty: it
+    can). ``ready`` fires when a folder has been checked for the first time, ``done`` with what was imported.
     """
 
     def __init__(self) -> None:
         self.found: Value[Found | None] = Value(None)
-        self.order: Value[TakeInOrder | None] = Value(None)
+        self.order: Value[ImportOrder | None] = Value(None)
         self.library: Value[tuple[str, ...]] = Value(())
         self.busy = Value("")
         self.trouble = Value("")
         self.ready: Event[Found] = Event()
         self.done: Event[Path] = Event()
+
+
+def rows_of(records: Iterable[FileRecord]) -> tuple[FileRow, ...]:
+    """The table of files, with one line for files in a row with the same status."""
+
+    def group(record: FileRecord) -> tuple[str, str]:
+        name = record.expected or record.found or ""
+        folder = str(PurePosixPath(name).parent)
+        # Files outside a folder are not a series.
+        return record.status, name if folder == "." else folder
+
+    return tuple(_row(tuple(rows)) for _, rows in groupby(records, group))
+
+
+def _row(records: Sequence[FileRecord]) -> FileRow:
+    first = records[0]
+    advice = first.advice
+    if len({record.advice for record in records}) > 1:
+        advice += " (and so on)"
+    return FileRow(
+        _span([record.expected for record in records]),
+        _span([record.found or "" for record in records]),
+        first.status,
+        advice,
+        len(records),
+    )
+
+
+def _span(names: Sequence[str]) -> str:
+    """The first and the last of several names.
+
+    >>> _span(["a/0.png", "a/1.png", "a/2.png"])
+    'a/0.png … 2.png (3)'
+    """
+    if not names[0] or len(names) == 1:
+        return names[0]
+    return f"{names[0]} … {PurePosixPath(names[-1]).name} ({len(names)})"
+
+
+def summary_of(kind: str, records: Sequence[FileRecord]) -> str:
+    """How much of a folder matches the published layout."""
+    from dsl_core.io.published.layout import as_published
+
+    good, expected = as_published(records)
+    return f"A published {KINDS[kind]}: {good} of {expected} entries are as published."
+
+
+def target_for(folder: Path, kind: str, home: Path) -> Path:
+    """A path for what is imported that does not exist yet."""
+    target, count = home / f"{folder.name}{SUFFIXES[kind]}", 1
+    while target.exists():
+        count += 1
+        target = home / f"{folder.name}-{count}{SUFFIXES[kind]}"
+    return target
+
+
+def trouble_of(found: Found, order: ImportOrder) -> str:
+    """Why nothing can be imported, and what to do; empty when it can."""
+    if found.obstacle:
+        return found.obstacle
+    if not order.target.stem.strip() or order.target.name.startswith("."):
+        return "Enter a name."
+    if order.target.exists():
+        return f"{order.target.name} exists already. Choose another name or folder."
+    return ""
+
+
+def command_of(found: Found, order: ImportOrder) -> str:
+    """The command that does the same."""
+    words = ["dsl-scan import", _quoted(order.folder), "-o", _quoted(order.target)]
+    if order.base != PUBLISHED:
+        words.append(f"--calibration {_quoted(order.base)}")
+    if found.kind == "calibration" and all(order.camera_px):
+        words.append("--camera-size {}x{}".format(*order.camera_px))
+    return " ".join(words)
+
+
+def _quoted(text: object) -> str:
+    return shlex.quote(str(text))
+
+
+@dataclass(frozen=True)
+class ImportView:
+    """What the dialog says below its form: ``trouble`` prevents the import, ``remark`` says what it makes."""
+
+    trouble: str
+    remark: str
+    is_busy: bool
+    asks_size: bool
+
+
+def import_view(state: ImportState) -> ImportView:
+    """The dialog's texts and rows for what is known now."""
+    busy, order, found = state.busy.value, state.order.value, state.found.value
+    is_calibration = found is not None and found.kind == "calibration"
+    remark = "" if order is None else f"Creates {order.target.name}."
+    if is_calibration:
+        remark += " The calibration is also added to the library."
+    return ImportView(
+        "" if busy else state.trouble.value, f"{busy}…" if busy else remark, bool(busy), is_calibration
+    )

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from dsl_app.connection.state import FrameCounts
+from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_app.shared.widgets.pictures import Region, RegionBox, arrow_step, cut, moved_within
@@ -22,7 +22,7 @@ from dsl_core.model.frames import Frame
 FIGURES_S = 0.25
 NO_RIG = "No picture yet. Connect a rig and start the live view."
 NO_PICTURE = "No picture yet. Start the live view."
-#: A shown pixel is a cell of so many raw ones a side.
+#: Side of the cell of raw pixels that is shown as one, px.
 CELL_PX = 2
 _CHANNELS = ("R", "G", "B")
 _COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
@@ -40,7 +40,7 @@ class LiveView(QWidget):
         self.view = pg.GraphicsLayoutWidget()
         self.view.setAccessibleName("Live picture")
         self.view.setToolTip(
-            "Wheel to zoom, drag to pan, F to see all; arrow keys move the pixel that is read, Shift by ten"
+            "Wheel to zoom, drag to pan, F to fit; arrow keys move the pixel that is read, with Shift by ten"
         )
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
@@ -54,14 +54,14 @@ class LiveView(QWidget):
         self.rectangle.sigRegionChangeFinished.connect(self._repaint)
         self.view.scene().sigMouseMoved.connect(self._hover)
         self.saturation = QCheckBox("Saturation")
-        self.saturation.setToolTip("Paint cells red that hold a raw pixel at full scale")
+        self.saturation.setToolTip("Paint cells red that contain a raw pixel at full scale")
         self.saturation.setChecked(True)
         self.saturation.toggled.connect(self._repaint)
         self.region_box = QCheckBox("Region")
-        self.region_box.setToolTip("Limit histogram, figures and automatic exposure to a rectangle; drag it")
+        self.region_box.setToolTip("Limit histogram, figures and auto exposure to a rectangle; drag it")
         self.region_box.toggled.connect(self._show_region)
         self.fit = QPushButton("Fit")
-        self.fit.setToolTip("See the whole picture (F)")
+        self.fit.setToolTip("Show the whole picture (F)")
         self.fit.clicked.connect(self.show_all)
         self.logarithmic = QCheckBox("Logarithmic")
         self.logarithmic.setToolTip("Show the histogram's counts on a logarithmic scale")
@@ -82,7 +82,7 @@ class LiveView(QWidget):
         self._saturated = label("")
         self._saturated.setWordWrap(True)
         self._focus = label("", "muted")
-        self._pixel = label("Move over the picture to read raw counts.", "muted")
+        self._pixel = label("Point at the picture to read raw counts.", "muted")
         self._empty = label(NO_RIG, "muted")
         self._empty.setWordWrap(True)
         self._lay_out()
@@ -147,7 +147,7 @@ class LiveView(QWidget):
         set_role(self._counts, "warn" if counts.lost else "muted")
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self.rectangle.apply_theme(theme)
         for widget in (self.view, self._histogram):
             widget.setBackground(theme.base)
@@ -243,5 +243,5 @@ class LiveView(QWidget):
         self._repaint()
 
     def show_all(self) -> None:
-        """See the whole picture."""
+        """Show the whole picture."""
         self._box.autoRange(padding=0.01, items=[self._item])

@@ -15,32 +15,33 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.connection.controller import RigController
-from dsl_app.connection.state import Link, RigChoice, RigState
+from dsl_app.connection.state import Link, RigChoice
+from dsl_app.rig.controller import LiveController
 from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.projector_panel import ProjectorPanel
+from dsl_app.rig.state import rig_view
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, set_role
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.page import PageWidget
-from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
+from dsl_core.devices.base import DeviceRig
 
 #: How often the newest live frame is fetched, ms.
 FETCH_MS = 15
 SIDE_PX = 268
-_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
 
 
 class RigPage(PageWidget):
-    """Follows a `RigState` and asks a controller; ``selftest_wanted`` asks for the self-test's wizard."""
+    """Follows the states of rig and live view; ``selftest_requested`` asks for the self-test's wizard."""
 
-    selftest_wanted = Signal()
+    selftest_requested = Signal()
 
-    def __init__(self, state: RigState, commands: RigController, rigs: Sequence[str]) -> None:
+    def __init__(self, live: LiveController, rigs: Sequence[str]) -> None:
         """``rigs`` are the names of the rigs that are installed."""
         super().__init__()
-        self._state, self._commands = state, commands
+        self._rig_commands, self._commands = live.rig, live
+        self._state, self._live_state = live.rig.state, live.state
         self._stops: list[Callable[[], None]] = []
         self._live = Deferred(self._make_live)
         self._live.setObjectName("live-view")
@@ -53,34 +54,34 @@ class RigPage(PageWidget):
         self._options = QLineEdit()
         self._options.setAccessibleName("Options of the rig")
         self._options.setPlaceholderText("scene=color-checker size=445x290")
-        self._options.setToolTip("Options as key=value, separated by spaces; see Help on this page")
+        self._options.setToolTip("Options as key=value, separated by spaces; see the help on this page (F1)")
         self._connect_button = QPushButton("Connect")
         self._connect_button.setProperty("role", "primary")
-        self._connect_button.setToolTip("Open the devices of this rig, or let them go")
+        self._connect_button.setToolTip("Open or close the devices of this rig")
         self._light = label("")
         self._trouble = label("")
         self._trouble.setProperty("role", "bad")
         self._trouble.setWordWrap(True)
         self._camera_text, self._projector_text = label("–"), label("–")
         self._live_button = QPushButton("Start live view")
-        self._live_button.setToolTip("Look through the camera until it is needed for something else")
+        self._live_button.setToolTip("Show what the camera sees until something else needs it")
         self.selftest = QPushButton("Self-&test…")
-        self.selftest.setToolTip("Test camera, projector, timing, focus and room, and say what to do (F4)")
-        self.selftest.clicked.connect(self.selftest_wanted)
+        self.selftest.setToolTip("Test camera, projector, timing, focus and room, with advice (F4)")
+        self.selftest.clicked.connect(self.selftest_requested)
         low, high = 0.01, 30_000.0
         self._exposure = NumberBox(
-            "Exposure", low, high, state.exposure_ms.value, "ms", 2, "Exposure of live frames"
+            "Exposure", low, high, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
         )
         self.auto = QPushButton("&Auto exposure")
         self.auto.setToolTip(
-            "Expose as long as nothing that matters saturates, for whole LED cycles; only the region counts,"
-            " where one is shown"
+            "Find the longest exposure, in whole LED cycles, that saturates nothing important; if a region is"
+            " shown, only that counts"
         )
         self._cycles = label("", "muted")
         self._cycles.setWordWrap(True)
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(commands.take_frame)
+        self._timer.timeout.connect(live.fetch_frame)
         self._lay_out()
         self._connect()
 
@@ -90,8 +91,8 @@ class RigPage(PageWidget):
         return self._live.content
 
     def _make_live(self) -> LiveView:
-        state, made = self._state, LiveView()
-        made.set_camera(state.camera)
+        state, made = self._live_state, LiveView()
+        made.set_camera(self._state.camera)
         self._stops += [state.frame.follow(made.show_frame), state.counts.follow(made.show_counts)]
         return made
 
@@ -126,87 +127,83 @@ class RigPage(PageWidget):
         row.addWidget(right)
 
     def _connect(self) -> None:
-        state, commands = self._state, self._commands
+        state, live, commands = self._state, self._live_state, self._commands
         self._connect_button.clicked.connect(self._toggle_link)
         self._live_button.clicked.connect(self._toggle_live)
         self._exposure.valueChanged.connect(commands.set_exposure)
         self.auto.clicked.connect(self._expose)
-        self.projector.wanted.connect(commands.show)
+        self.projector.requested.connect(commands.show)
         self._stops += [
             state.choice.follow(self._show_choice),
-            state.link.follow(self._show_link),
             state.devices.follow(self._show_devices),
-            state.trouble.follow(self._show_trouble),
-            state.live.follow(self._show_live),
-            state.exposure_ms.follow(self._show_exposure),
+            state.live.follow(self._switch_timer),
+            live.exposure_ms.follow(self._show_exposure),
             state.used_by.follow(self.projector.set_user),
-            state.is_exposing.follow(lambda _: self._show_auto()),
+            *(value.changed.connect(lambda _: self._show()) for value in (state.link, state.trouble)),
+            live.is_exposing.changed.connect(lambda _: self._show()),
         ]
 
     def _toggle_link(self) -> None:
         if self._state.link.value is Link.OPEN:
-            self._commands.disconnect()
+            self._rig_commands.disconnect()
             return
-        self._commands.connect(RigChoice(str(self._rig.currentData()), parse_options(self._options.text())))
+        choice = RigChoice(str(self._rig.currentData()), parse_options(self._options.text()))
+        self._rig_commands.connect(choice)
 
     def _toggle_live(self) -> None:
         if self._state.live.value:
-            self._commands.stop_live()
+            self._commands.stop()
         else:
-            self._commands.start_live()
+            self._commands.start()
 
     def _expose(self) -> None:
         self._commands.expose_automatically(self.live.region)
 
+    def _show(self) -> None:
+        view = rig_view(self._state, self._live_state)
+        self._light.setText(view.link)
+        set_role(self._light, view.link_role)
+        self._trouble.setText(view.trouble)
+        self._trouble.setVisible(bool(view.trouble))
+        self._camera_text.setText(view.camera)
+        self._projector_text.setText(view.projector)
+        self._connect_button.setText(view.connect)
+        self._connect_button.setEnabled(view.can_connect)
+        for widget in (self._live_button, self.selftest, self._exposure):
+            widget.setEnabled(view.has_devices)
+        self._live_button.setText(view.live)
+        self.auto.setEnabled(view.can_expose)
+        self._cycles.setText(view.cycles)
+        self._cycles.setVisible(bool(view.cycles))
+
     def _show_choice(self, choice: RigChoice) -> None:
-        """Show what is connected, whoever asked for it."""
+        """Show what is connected, whichever page requested it."""
         self._rig.setCurrentIndex(max(self._rig.findData(choice.name), 0))
         self._options.setText(" ".join(f"{key}={value}" for key, value in choice.options))
 
-    def _show_link(self, link: Link) -> None:
-        self._light.setText(f"● {link.value}")
-        set_role(self._light, _ROLES[link])
-        self._connect_button.setText("Disconnect" if link is Link.OPEN else "Connect")
-        self._connect_button.setEnabled(link is not Link.OPENING)
-
     def _show_devices(self, devices: DeviceRig | None) -> None:
-        camera, projector = self._state.camera, self._state.projector
-        self._camera_text.setText("–" if camera is None else _describe(camera))
-        self._projector_text.setText("–" if projector is None else _describe(projector))
+        camera = self._state.camera
         if self._live.made is not None:
             self._live.made.set_camera(camera)
-        self.projector.set_projector(projector)
-        self._live_button.setEnabled(devices is not None)
-        self.selftest.setEnabled(devices is not None)
-        self._exposure.setEnabled(devices is not None)
-        self._show_exposure(self._state.exposure_ms.value)
-        self._show_auto()
+        self.projector.set_projector(self._state.projector)
+        self._show_exposure(self._live_state.exposure_ms.value)
         if camera is not None:
             self._exposure.setRange(*camera.exposure_range_ms)
 
     def _show_exposure(self, exposure_ms: float) -> None:
-        # The box shows two decimals; what was asked for stays exact.
+        # The box shows two decimals; the state keeps the exact value.
         self._exposure.blockSignals(True)
         self._exposure.setValue(exposure_ms)
         self._exposure.setSingleStep(self._state.cycle_ms or 1.0)
         self._exposure.blockSignals(False)
-        text = cycles_text(exposure_ms, self._state.cycle_ms)
-        self._cycles.setText(text)
-        self._cycles.setVisible(bool(text))
+        self._show()
 
-    def _show_auto(self) -> None:
-        self.auto.setEnabled(self._state.devices.value is not None and not self._state.is_exposing.value)
-
-    def _show_trouble(self, text: str) -> None:
-        self._trouble.setText(text)
-        self._trouble.setVisible(bool(text))
-
-    def _show_live(self, on: bool) -> None:
-        self._live_button.setText("Stop live view" if on else "Start live view")
-        if on:
+    def _switch_timer(self, is_live: bool) -> None:
+        if is_live:
             self._timer.start()
         else:
             self._timer.stop()
+        self._show()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
         """What the buttons do, for menus and keys."""
@@ -221,38 +218,18 @@ class RigPage(PageWidget):
         return f"dsl-scan selftest {self._state.choice.value.command}"
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._live.apply_theme(theme)
 
     def release(self) -> None:
-        """Stop looking and let the devices go."""
+        """Stop the live view and follow nothing more."""
         for stop in self._stops:
             stop()
         self._timer.stop()
-        self._commands.stop_live()
-
-
-def _describe(info: CameraInfo | ProjectorInfo) -> str:
-    return f"{info.model}\n{info.width_px} × {info.height_px} px"
+        self._commands.stop()
 
 
 def parse_options(text: str) -> tuple[tuple[str, str], ...]:
-    """Options from ``key=value`` texts separated by spaces; a word without ``=`` is switched on."""
+    """Options from ``key=value`` texts separated by spaces; a word without ``=`` means ``on``."""
     pairs = [part.partition("=") for part in text.split()]
     return tuple((key, value if sign else "on") for key, sign, value in pairs)
-
-
-def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
-    """How many LED cycles an exposure holds, and what is wrong with a part of one.
-
-    >>> cycles_text(50.0, 1000 / 60)
-    '3 LED cycles'
-    """
-    if not cycle_ms:
-        return ""
-    cycles = exposure_ms / cycle_ms
-    whole = round(cycles)
-    # The box rounds to a hundredth of a millisecond.
-    if whole and abs(exposure_ms - whole * cycle_ms) < 0.006:
-        return f"{whole} LED cycle{'' if whole == 1 else 's'}"
-    return f"{cycles:.2f} LED cycles: colours vary"

@@ -1,4 +1,4 @@
-"""What the projector shows by hand: fields, crosshair, checker, one line; and on which screen."""
+"""Trial pictures on the projector: fields, crosshair, checkerboard, one line; and the screen to use."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
     QVBoxLayout,
 )
 
+from dsl_app.rig.state import panel_view
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
 from dsl_core.devices.base import ProjectorInfo
 from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
@@ -21,20 +22,20 @@ from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
 #: How fast a looped line moves, ms a step.
 LOOP_MS = 120
 NO_SCREEN = "The rig's own"
-#: Stands for a screen that went away while it was used; choosing it changes nothing.
+#: Stands for a screen that was disconnected while it was used; choosing it changes nothing.
 LOST = "lost"
 
 
 class ProjectorPanel(QGroupBox):
-    """Asks for pictures by ``wanted(kind, level, column)`` and for screens by name ("" for none)."""
+    """Requests pictures by ``requested(kind, level, column)`` and screens by name ("" for none)."""
 
-    wanted = Signal(str, float, int)
+    requested = Signal(str, float, int)
     screen_chosen = Signal(str)
     identify = Signal()
 
     def __init__(self) -> None:
         super().__init__("Projector")
-        self._screen = ChoiceBox("Projector screen", "The screen that the projector is; never this one")
+        self._screen = ChoiceBox("Projector screen", "The projector's screen; never the one with this window")
         # Names of screens are longer than the box.
         self._screen.view().setMinimumWidth(260)
         self._identify = QPushButton("Identify screens")
@@ -47,9 +48,9 @@ class ProjectorPanel(QGroupBox):
         self._column = WholeBox("Line column", 0, 639, 320, "px", "First column of the line")
         self._slider = QSlider(Qt.Orientation.Horizontal)
         self._slider.setAccessibleName("Line column")
-        self._slider.setToolTip("Move the line over the projector's columns")
+        self._slider.setToolTip("Move the line across the projector's columns")
         self._loop = QCheckBox("Loop")
-        self._loop.setToolTip("Let the line wander over the frame")
+        self._loop.setToolTip("Sweep the line across the frame")
         self._timer = QTimer(self)
         self._timer.setInterval(LOOP_MS)
         self._note = label("", "muted")
@@ -90,7 +91,7 @@ class ProjectorPanel(QGroupBox):
         )
 
     def set_projector(self, info: ProjectorInfo | None) -> None:
-        """Offer what this projector can show."""
+        """Adapt to what this projector can show."""
         self._info = info
         if info is not None:
             last = info.width_px - LINE_PX
@@ -99,42 +100,36 @@ class ProjectorPanel(QGroupBox):
         self._show_state()
 
     def set_user(self, title: str) -> None:
-        """Leave the projector to work of this title, whose frames a picture would spoil; empty for none."""
+        """Leave the projector to a job of this title, whose frames a picture would spoil; empty for none."""
         self._user = title
         self._show_state()
 
     def _show_state(self) -> None:
-        info, is_free = self._info, not self._user
-        can_show = info is not None and is_free
-        if not can_show:
+        view = panel_view(self._info, self._user)
+        if not view.can_show:
             self._loop.setChecked(False)
         for shown in (self._kind, self._level, self._column, self._slider, self._loop):
-            shown.setEnabled(can_show)
-        self._screen.setEnabled(is_free)
-        self._identify.setEnabled(is_free)
-        if not is_free:
-            self._note.setText(f"{self._user} has the projector. Pictures can be shown when it has ended.")
-        elif info is None:
-            self._note.setText("No projector is connected. Connect a rig to show pictures.")
-        else:
-            self._note.setText(f"{info.model}, {info.width_px} × {info.height_px} logical pixels")
+            shown.setEnabled(view.can_show)
+        self._screen.setEnabled(view.can_choose_screen)
+        self._identify.setEnabled(view.can_choose_screen)
+        self._note.setText(view.note)
 
     def refresh_screens(self, chosen: str, lost: str = "") -> None:
-        """List the screens that there are now, and mark the chosen one, or the one that is ``lost``."""
+        """List the current screens, and select the chosen one, or the one that is ``lost``."""
         self._screen.blockSignals(True)
         self._screen.clear()
         self._screen.addItem(NO_SCREEN, "")
         for screen in QGuiApplication.screens():
             self._screen.addItem(_describe(screen), screen.name())
         if lost:
-            self._screen.addItem(f"{lost} was lost", LOST)
+            self._screen.addItem(f"{lost} (disconnected)", LOST)
         index = self._screen.findData(LOST if lost else chosen)
         self._screen.setCurrentIndex(max(index, 0))
         self._screen.blockSignals(False)
 
     def _ask(self) -> None:
         kind: PictureKind = self._kind.currentData()
-        self.wanted.emit(kind, self._level.value(), self._column.value())
+        self.requested.emit(kind, self._level.value(), self._column.value())
 
     def _line_moved(self) -> None:
         if self._kind.currentData() == "line":

@@ -1,4 +1,4 @@
-"""What each page gives to the session and how it comes back to it. No Qt."""
+"""What each page saves in the session, and how it is restored from it. No Qt."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from dsl_core.model.presets import on_cycles
 
 E = TypeVar("E", bound=Enum)
 T = TypeVar("T")
-#: The plan that a page begins with is nothing to come back to.
+#: The plan that a page begins with does not need to be restored.
 _FIRST_PLAN = "reference"
 
 
@@ -47,8 +47,8 @@ def results_part(state: ResultsState) -> ResultsPart | None:
     )
 
 
-def come_back_to_result(part: ResultsPart, control: ResultsController) -> None:
-    """Open the result again, and look at it as before once it is there."""
+def restore_result(part: ResultsPart, control: ResultsController) -> None:
+    """Open the result again, and restore its views once it is read."""
     state = control.state
 
     def look(result: ResultArrays) -> None:
@@ -70,7 +70,7 @@ def come_back_to_result(part: ResultsPart, control: ResultsController) -> None:
 
 
 def scan_part(state: ScanState) -> ScanPart | None:
-    """The plan and where it goes, unless it is the one that everybody begins with."""
+    """The plan and its target, unless it is the initial plan."""
     preset = preset_of(on_cycles(state.plan.value, state.period_ms.value), state.period_ms.value)
     is_begun = state.phase.value.is_busy or state.interrupted.value is not None
     if not is_begun and preset is not None and preset.key == _FIRST_PLAN:
@@ -83,10 +83,10 @@ def scan_part(state: ScanState) -> ScanPart | None:
     )
 
 
-def come_back_to_scan(part: ScanPart, control: ScanController) -> None:
-    """Plan the same again; a scan that the crash interrupted is offered to be gone on with.
+def restore_scan(part: ScanPart, control: ScanController) -> None:
+    """Restore the plan, or offer to resume the scan that the crash interrupted.
 
-    That a calibration is used although settings differ is asked anew: a crash is no reason to skip the check.
+    Whether to use a calibration although settings differ is asked again: a crash must not skip the check.
     """
     control.state.then_reconstruct.set(part.then_reconstruct)
     if (part.target / MANIFEST_NAME).is_file() and not is_complete(part.target):
@@ -108,7 +108,7 @@ def compare_part(state: CompareState) -> ComparePart | None:
     return ComparePart(first=_path(first), second=None if truth else _path(second), with_truth=truth)
 
 
-def come_back_to_comparison(part: ComparePart, control: CompareController) -> None:
+def restore_comparison(part: ComparePart, control: CompareController) -> None:
     """Open A, then B or the truth of A."""
 
     def then(_: Side | None) -> None:
@@ -126,7 +126,7 @@ def come_back_to_comparison(part: ComparePart, control: CompareController) -> No
 
 
 def series_part(state: SeriesState) -> SeriesPart | None:
-    """The results with their positions, and what is asked of them."""
+    """The results with their positions, and what is compared."""
     rows = state.rows.value
     if not rows:
         return None
@@ -139,14 +139,14 @@ def series_part(state: SeriesState) -> SeriesPart | None:
     )
 
 
-def come_back_to_series(part: SeriesPart, control: SeriesController) -> None:
-    """Ask the same of the same results."""
+def restore_series(part: SeriesPart, control: SeriesController) -> None:
+    """Compare the same results in the same way."""
     state = control.state
     _set_named(state.kind, Kind, part.kind)
     for figure in FIGURES:
         if figure.field == part.figure:
             state.figure.set(figure)
-    control.come_back(part.rows, part.against, part.region)
+    control.restore(part.rows, part.against, part.region)
 
 
 def _path(side: Side | None) -> Path | None:
@@ -164,7 +164,7 @@ def _set_named(value: Value[E], kind: type[E], name: str) -> None:
 
 
 def _once(event: Event[T], do: Callable[[T], object], if_: Callable[[T], bool]) -> None:
-    """Do something the first time that an event is what is waited for."""
+    """Call ``do`` for the first event that meets a condition."""
 
     def judge(now: T) -> None:
         if if_(now):

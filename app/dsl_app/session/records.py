@@ -1,4 +1,4 @@
-"""What was open and how it was looked at: enough to come back to it after a crash. No Qt."""
+"""What was open and how it was shown: enough to restore it after a crash. No Qt."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class _Part(BaseModel):
 
 
 class ResultsPart(_Part):
-    """The open result and its views; pins, regions and references lie beside it and are kept there."""
+    """The open result and its views; pins, regions and references are saved next to the result."""
 
     path: Path
     view: str = ""
@@ -29,7 +29,7 @@ class ResultsPart(_Part):
 
 
 class ScanPart(_Part):
-    """What would have been scanned next, or was being scanned."""
+    """The planned scan, or the one that was running."""
 
     plan: CapturePlan
     target: Path
@@ -38,7 +38,7 @@ class ScanPart(_Part):
 
 
 class ComparePart(_Part):
-    """The two sides; ``with_truth`` says that B was what the twin knows of A."""
+    """The two sides; ``with_truth`` says that B was the twin's truth of A."""
 
     first: Path | None = None
     second: Path | None = None
@@ -46,7 +46,7 @@ class ComparePart(_Part):
 
 
 class SeriesPart(_Part):
-    """The results of a series, where the stage stood for each, and what they were asked."""
+    """The results of a series, the stage's position for each, and what is compared."""
 
     rows: tuple[tuple[Path, float | None], ...]
     kind: str = ""
@@ -56,7 +56,7 @@ class SeriesPart(_Part):
 
 
 class Session(_Part):
-    """All of it; parts are missing where a page held nothing."""
+    """Everything that is restored; parts are None where a page showed nothing."""
 
     schema_version: Literal[1] = 1
     page: str = "rig"
@@ -67,7 +67,7 @@ class Session(_Part):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What it holds, as a person would name it; empty when there is nothing worth coming back to."""
+        """What it holds, as a person would name it; empty when there is nothing to restore."""
         found = []
         if self.results is not None:
             found.append(self.results.path.name)
@@ -81,3 +81,8 @@ class Session(_Part):
             count = len(self.series.rows)
             found.append(f"a series of {count} result{'' if count == 1 else 's'}")
         return tuple(found)
+
+    @property
+    def offer(self) -> str:
+        """The sentence that offers to restore it."""
+        return f"The program did not end normally last time. These were open: {', '.join(self.names)}."

@@ -6,10 +6,9 @@ import builtins
 import logging
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Literal
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
@@ -24,8 +23,9 @@ from dsl_app.shared.settings import RecentFiles, load_settings, settings_folder
 from dsl_app.shared.theme import DARK, LIGHT, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.icons import icon
+from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.log import LogRecords
-from dsl_app.shell.main_window import Command, MainWindow, PageMaker, Taker
+from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import Parts
 from dsl_app.shell.warm_up import import_early
 
@@ -37,7 +37,7 @@ _SCHEMES = {
 }
 
 
-#: How long a thread keeps Python's lock that the window wants, s: the window asks often while it paints.
+#: How long a thread keeps Python's lock while the window waits for it, s: painting needs it often.
 SWITCH_S = 0.001
 
 
@@ -45,7 +45,7 @@ def make_application(arguments: Sequence[str]) -> QApplication:
     """The one Qt application, in a style that looks alike on all systems."""
     sys.setswitchinterval(SWITCH_S)
     limit_heaps()
-    _import_plainly()
+    _remove_import_hook()
     application = QApplication.instance()
     if not isinstance(application, QApplication):
         application = QApplication(list(arguments))
@@ -66,10 +66,10 @@ def collect_garbage(window: MainWindow) -> GarbageCollector:
     return collector
 
 
-def _import_plainly() -> None:
-    """Undo that PySide reads and keeps the source of every module, to see if it wants ``snake_case`` names.
+def _remove_import_hook() -> None:
+    """Undo PySide's import hook, which reads and keeps the source of every module to find ``snake_case`` use.
 
-    It makes imports slower by a tenth and the program larger by a hundred megabytes.
+    The hook makes imports slower by a tenth and the process larger by a hundred megabytes.
     """
     builtins.__import__ = getattr(builtins, "__orig_import__", builtins.__import__)
 
@@ -88,54 +88,59 @@ def set_theme(name: str) -> Theme:
 
 
 def make_window(
-    pages: dict[str, PageMaker],
+    pages: Mapping[str, Callable[[], PageWidget]],
     folder: Path | None = None,
-    theme: Literal["system", "light", "dark"] | None = None,
-    commands: dict[str, Command] | None = None,
-    imports: Mapping[str, Sequence[str]] | None = None,
-    takers: dict[Kind, Taker] | None = None,
+    theme: str | None = None,
+    commands: Mapping[str, Callable[[], object]] | None = None,
+    handlers: Mapping[Kind, Callable[[Path], object]] | None = None,
 ) -> MainWindow:
-    """The window with its settings of a folder (default: the system's); told troubles become toasts.
+    """The window with its settings of a folder (default: the system's); unreadable ones are told by a toast.
 
-    ``theme`` overrides that of the settings. The page that was open last is there at once, or, where
-    ``imports`` says what pages need, after the first paint and once a thread has imported that.
+    ``theme`` overrides that of the settings; see `MainWindow` for the rest. No page is open yet.
     """
     path = (folder or settings_folder()) / "settings.json"
     settings, trouble = load_settings(path)
-    settings.theme = theme or settings.theme
+    if theme is not None:
+        settings.theme = theme  # type: ignore[assignment]
     records = LogRecords()
     logging.getLogger().addHandler(records)
     logging.getLogger("dsl_core").setLevel(logging.INFO)
     parts = Parts(settings, path, records, QtRunner(), UndoStack(), set_theme, RecentFiles(settings))
-    window = MainWindow(parts, pages, commands, takers)
+    settings.page = settings.page if settings.page in pages else next(iter(pages))
+    window = MainWindow(parts, pages, commands or {}, handlers or {})
     records.setParent(window)
     parts.runner.setParent(window)
     window.setWindowIcon(app_icon(window.theme))
-    settings.page = settings.page if settings.page in pages else next(iter(pages))
-    if imports is None:
-        window.open_page(settings.page)
-    else:
-        window.painted.connect(lambda: _open_imported(window, imports[window.page]))
     if trouble:
         window.toasts.tell("warning", trouble)
     return window
 
 
-def _open_imported(window: MainWindow, modules: Sequence[str]) -> None:
-    """Open the page once a thread has imported what it needs, or another one that was chosen meanwhile."""
+def open_first_page(window: MainWindow, imports: Mapping[str, Sequence[str]] | None = None) -> None:
+    """Open the page that was open last: now, or after the first paint if ``imports`` lists its modules.
+
+    These are then imported by a thread first; another page may be chosen meanwhile.
+    """
+    if imports is None:
+        window.open_page(window.page)
+        return
 
     def show(_: object) -> None:
         window.open_page(window.page)
 
-    # What cannot be imported fails again while the page is made, where a person is told.
-    job = Job("Open the page", lambda progress: import_early(modules), show, show, is_minor=True)
-    window.parts.runner.submit(job)
+    def begin() -> None:
+        modules = imports[window.page]
+        # A failing import fails again while the page is made, where the person is told.
+        job = Job("Open the page", lambda progress: import_early(modules), show, show, is_minor=True)
+        window.parts.runner.submit(job)
+
+    window.painted.connect(begin)
 
 
 class ExceptionHook(QObject):
-    """Turns what nobody caught, in any thread, into a toast and a log entry; the window stays usable."""
+    """Turns uncaught errors of any thread into a toast and a log entry; the window stays usable."""
 
-    #: Crosses from the thread of the error to that of the window.
+    #: Emitted in the thread of the error, received in that of the window.
     caught = Signal(str)
 
     def __init__(self, notifier: Notifier) -> None:
@@ -143,7 +148,7 @@ class ExceptionHook(QObject):
         self.caught.connect(lambda text: notifier.tell("error", text))
 
     def install(self) -> None:
-        """Take the place of Python's hooks."""
+        """Replace Python's hooks."""
         sys.excepthook = self.handle
         threading.excepthook = lambda args: self.handle(
             args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback
@@ -152,7 +157,7 @@ class ExceptionHook(QObject):
     def handle(
         self, kind: type[BaseException], error: BaseException, traceback: TracebackType | None
     ) -> None:
-        """Log an exception and tell of it."""
+        """Log an exception and show it."""
         if issubclass(kind, KeyboardInterrupt):
             application = QApplication.instance()
             if application is not None:
@@ -160,8 +165,8 @@ class ExceptionHook(QObject):
             return
         _log.error("Unexpected error: %s", error, exc_info=(kind, error, traceback))
         self.caught.emit(
-            f"Something unexpected happened ({kind.__name__}: {error}). Your data are safe; the log has the"
-            " details (Help, Save a report bundle).",
+            f"Unexpected error ({kind.__name__}: {error}). Your data are safe; the log has the details"
+            " (Help, Save a report bundle).",
         )
 
 

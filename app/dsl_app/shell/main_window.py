@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -11,52 +11,34 @@ from PySide6.QtWidgets import QAbstractSpinBox, QDockWidget, QLineEdit
 
 from dsl_app.shared.known_files import Kind
 from dsl_app.shared.widgets.page import PageWidget
-from dsl_app.shell.actions import ACTIONS, PAGES, Action
+from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.log import LogPanel
 from dsl_app.shell.menus import Menus, RecentMenu
 from dsl_app.shell.paged_window import PagedWindow, Parts, restore_layout
 from dsl_app.shell.window_actions import THEMES, WindowActions
-
-PageMaker = Callable[["MainWindow"], PageWidget]
-Command = Callable[["MainWindow"], object]
-Taker = Callable[["MainWindow", Path], object]
-
-
-def page_commands() -> dict[str, Command]:
-    """Actions whose key begins with the name of a page: each opens that page, which does it."""
-
-    def command(page: str, key: str) -> Command:
-        return lambda window: window.open_page(page).page_actions()[key]()
-
-    keys = {page.key for page in PAGES}
-    first = {action.key: action.key.partition("_")[0] for action in ACTIONS}
-    return {key: command(page, key) for key, page in first.items() if page in keys}
 
 
 class MainWindow(PagedWindow):
     """The application's window.
 
     ``pages`` makes the widget of each page of the rail; ``commands`` do the actions of the table that neither
-    a page nor the window itself can do; ``takers`` take what is opened or dropped and no page's.
+    a page nor the window itself can do; ``handlers`` open files and folders of kinds that no page opens.
     """
 
     def __init__(
         self,
         parts: Parts,
-        pages: dict[str, PageMaker],
-        commands: dict[str, Command] | None = None,
-        takers: dict[Kind, Taker] | None = None,
+        pages: Mapping[str, Callable[[], PageWidget]],
+        commands: Mapping[str, Callable[[], object]],
+        handlers: Mapping[Kind, Callable[[Path], object]],
     ) -> None:
-        super().__init__(
-            parts,
-            {key: partial(make, self) for key, make in pages.items()},
-            {kind: partial(take, self) for kind, take in (takers or {}).items()},
-        )
+        super().__init__(parts, pages, handlers)
         self._log_dock = self._make_log_dock()
         self._acts: dict[str, Callable[[], object]] = {
             **WindowActions(self).all(),
             "show_log": self._show_log,
-            **{key: partial(command, self) for key, command in (commands or {}).items()},
+            **self._page_commands(),
+            **commands,
         }
         self.menuBar().setObjectName("menu-bar")
         menus = Menus(self, ACTIONS, self.do)
@@ -85,10 +67,10 @@ class MainWindow(PagedWindow):
     # Actions ---------------------------------------------------------------------------------------
 
     def do(self, key: str) -> None:
-        """Do the action of a key: of the open page where it offers it, else of the window."""
+        """Do the action of a key: by the open page if it has it, else by the window."""
         typed = self.focusWidget()
         if isinstance(typed, QLineEdit | QAbstractSpinBox):
-            # What is being typed counts, as it would after a click on a button.
+            # Text that is being typed is committed, as by a click on a button.
             typed.clearFocus()
             typed.setFocus()
         if not key.startswith(("page_", "theme_")):
@@ -98,8 +80,17 @@ class MainWindow(PagedWindow):
                 return
         self._acts[key]()
 
+    def _page_commands(self) -> dict[str, Callable[[], object]]:
+        """Actions whose key begins with the name of a page: each opens that page, which does it."""
+
+        def do_on(page: str, key: str) -> None:
+            self.open_page(page).page_actions()[key]()
+
+        pages = {action.key: action.key.partition("_")[0] for action in ACTIONS}
+        return {key: partial(do_on, page, key) for key, page in pages.items() if page in self.pages}
+
     def _can(self, action: Action) -> bool:
-        """Whether anybody here does an action; what nobody does is not shown."""
+        """Whether something does an action; others are not shown."""
         return bool(action.page) or action.key in self._acts
 
     def _offer_actions(self, page: str) -> None:

@@ -1,4 +1,4 @@
-"""A window with a rail of pages and toasts: opens pages and files, shows a theme, ends well."""
+"""A window with a rail of pages and toasts: opens pages and files, applies themes, closes safely."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from dsl_app.shell.toasts import Toasts
 
 _log = logging.getLogger(__name__)
 SMALLEST = QSize(1024, 700)
-#: Rises when docks change, so that a layout of an older version is not restored.
+#: Increased when docks change, so that a layout of an older version is not restored.
 LAYOUT_VERSION = 1
 
 
 @dataclass
 class Parts:
-    """What the window is made of and hands to its pages."""
+    """What the window is made of and passes to its pages."""
 
     settings: Settings
     settings_path: Path
@@ -43,10 +43,10 @@ class Parts:
 
 
 class PagedWindow(QMainWindow):
-    """Pages are made by ``makers`` when they are first opened; ``takers`` take files that are no page's.
+    """Pages are made by ``makers`` when they are first opened; ``handlers`` open files of other kinds.
 
     ``opened`` tells the key of the page that is open now, ``painted`` once that the window is on screen,
-    ``closed`` that it ends well.
+    ``closed`` that it has closed.
     """
 
     opened = Signal(str)
@@ -57,10 +57,10 @@ class PagedWindow(QMainWindow):
         self,
         parts: Parts,
         makers: Mapping[str, Callable[[], PageWidget]],
-        takers: Mapping[Kind, Callable[[Path], object]],
+        handlers: Mapping[Kind, Callable[[Path], object]],
     ) -> None:
         super().__init__()
-        self._takers = takers
+        self._handlers = handlers
         self.parts = parts
         self.theme: Theme = DARK
         self._is_painted = False
@@ -119,17 +119,18 @@ class PagedWindow(QMainWindow):
         """The widget of a page, made when it is asked for first; it need not be open."""
         if key not in self._made:
             self._made[key] = self._makers[key]()
+            self._made[key].apply_theme(self.theme)
             self.stack.addWidget(self._made[key])
         return self._made[key]
 
     # Files -----------------------------------------------------------------------------------------
 
     def open_path(self, path: Path) -> None:
-        """Open a file or folder on the page that knows it, the open page first; says why when none does."""
+        """Open a file or folder on the page that can, the open page first; a message tells why none does."""
         path = meant_by(path)
         kind = kind_of(path)
-        if kind in self._takers:
-            self._takers[kind](path)
+        if kind in self._handlers:
+            self._handlers[kind](path)
             return
         if kind not in (Kind.MISSING, Kind.UNKNOWN):
             for key in (self.page, *(key for key in self._makers if key != self.page)):
@@ -154,10 +155,10 @@ class PagedWindow(QMainWindow):
     def _is_reading(self) -> bool:
         return any(page.is_reading for page in self._made.values())
 
-    # Look, memory, end -----------------------------------------------------------------------------
+    # Theme, settings, closing ----------------------------------------------------------------------
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Tell of the first paint, once what was painted has reached the screen."""
+        """Emit ``painted`` after the first paint has reached the screen."""
         super().paintEvent(event)
         if not self._is_painted:
             self._is_painted = True
@@ -171,22 +172,22 @@ class PagedWindow(QMainWindow):
         for page in self._made.values():
             page.apply_theme(self.theme)
 
-    def remember(self) -> None:
-        """Write the settings, the layout among them."""
-        keep_layout(self, self.parts.settings)
+    def save_settings(self) -> None:
+        """Write the settings, including the layout."""
+        save_layout(self, self.parts.settings)
         trouble = save_settings(self.parts.settings, self.parts.settings_path)
         if trouble:
             _log.warning("%s", trouble)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Ask before work is stopped; end all threads and remember the layout."""
+        """Ask before jobs are stopped; end all threads and save the layout."""
         if not self._may_stop():
             event.ignore()
             return
         for page in self._made.values():
             page.release()
         self.parts.runner.shut_down()
-        self.remember()
+        self.save_settings()
         self.closed.emit()
         # Python's logging outlives the window and must not call into it.
         logging.getLogger().removeHandler(self.parts.records)
@@ -198,14 +199,14 @@ class PagedWindow(QMainWindow):
             return True
         answer = QMessageBox.question(
             self,
-            "Work is running",
-            f"{titles} is still running. Stop it and leave? What is captured is kept and can be resumed.",
+            "Jobs are running",
+            f"{titles} is still running. Stop it and quit? Captured frames are kept and can be resumed.",
         )
         return answer == QMessageBox.StandardButton.Yes
 
 
 class OpenQueue(QObject):
-    """Opens files one after the other, each once what was opened before it is read."""
+    """Opens files one after the other, each after the previous one has been read."""
 
     def __init__(
         self, open_path: Callable[[Path], object], is_reading: Callable[[], bool], parent: QObject
@@ -221,7 +222,7 @@ class OpenQueue(QObject):
         QTimer.singleShot(0, self, self.open_next)
 
     def open_next(self) -> None:
-        """Open what waits as far as nothing is read; called whenever work begins, moves on or ends."""
+        """Open waiting files while nothing is being read; called when a job starts, progresses or ends."""
         if self._is_opening:
             return  # opening a file begins work itself
         self._is_opening = True
@@ -233,16 +234,16 @@ class OpenQueue(QObject):
 
 
 def restore_layout(window: QMainWindow, settings: Settings) -> None:
-    """Place window and docks as they lay; Qt leaves them where it cannot make sense of what was kept."""
+    """Restore window and docks; Qt ignores a layout that it cannot read."""
     window.restoreGeometry(QByteArray.fromBase64(settings.window_geometry.encode()))
     window.restoreState(QByteArray.fromBase64(settings.window_state.encode()), LAYOUT_VERSION)
 
 
-def keep_layout(window: QMainWindow, settings: Settings) -> None:
-    """Note in the settings how window and docks lie."""
+def save_layout(window: QMainWindow, settings: Settings) -> None:
+    """Store the layout of window and docks in the settings."""
     settings.window_geometry = _text(window.saveGeometry())
     settings.window_state = _text(window.saveState(LAYOUT_VERSION))
 
 
-def _text(kept: QByteArray) -> str:
-    return bytes(kept.toBase64().data()).decode()
+def _text(data: QByteArray) -> str:
+    return bytes(data.toBase64().data()).decode()

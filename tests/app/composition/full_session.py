@@ -18,7 +18,7 @@ from dsl_app.calibrate.state import RowState
 from dsl_app.calibrate.wizard.settings_page import BoardEdit
 from dsl_app.calibrate.wizard.state import Doing
 from dsl_app.calibrate.wizard.window import CalibrationWizard
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link
 from dsl_app.results.export_dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
@@ -26,7 +26,7 @@ from dsl_app.results.state import ResultsState, View
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
-from dsl_app.shell.application import ExceptionHook, make_application, make_window
+from dsl_app.shell.application import ExceptionHook, make_application
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QPoint, QPointF, Qt, QtMsgType, qInstallMessageHandler
 from PySide6.QtTest import QTest
@@ -74,10 +74,8 @@ class Session:
 
     def __init__(self, home: Path) -> None:
         self.home = home
-        self.composition = Composition(Wish())
-        self.window: MainWindow = make_window(
-            self.composition.pages, home, commands=self.composition.commands
-        )
+        self.composition = Composition(StartOptions())
+        self.window: MainWindow = self.composition.open_window(home)
         self.hook = ExceptionHook(self.window.toasts)
         self.hook.install()
         self.window.setGeometry(0, 0, 1280, 800)
@@ -103,7 +101,7 @@ class Session:
         assert isinstance(page, RigPage)
         write(page._options, RIG)
         click(page._connect_button)
-        rig = self.composition.rig(self.window)
+        rig = self.composition.rig
         wait(lambda: rig.state.link.value is Link.OPEN, "the rig to answer")
 
     def self_test(self) -> None:
@@ -179,14 +177,14 @@ class Session:
         key(Qt.Key.Key_1, self.window, CONTROL)
         page = self.window.page_of("rig")
         assert isinstance(page, RigPage)
-        rig = self.composition.rig(self.window).state
+        rig = self.composition.rig.state
         click(page._connect_button)
         wait(lambda: rig.link.value is Link.CLOSED, "the rig to be let go")
         self.idle()
         click(page._connect_button)
         wait(lambda: rig.link.value is Link.OPEN, "the rig to answer")
         choose(page.projector._screen, PROJECTOR[:2])
-        wait(lambda: self.composition._screens and self.composition._screens.beam.is_armed, "the beam")
+        wait(lambda: self.composition.screens.beam.is_armed, "the beam")
         devices = rig.devices.value
         assert devices is not None
         reader = BeamReader(devices.projector, PROJECTOR)
@@ -228,7 +226,7 @@ class Session:
             toast.dismiss()
         key(Qt.Key.Key_1, self.window, CONTROL)
         choose(rig.projector._screen, PROJECTOR[:2])
-        wait(lambda: self.composition._screens and self.composition._screens.beam.is_armed, "the beam")
+        wait(lambda: self.composition.screens.beam.is_armed, "the beam")
         key(Qt.Key.Key_3, self.window, CONTROL)
         click(scan.banner.action)
         wait(lambda: state.phase.value is Phase.DONE, "the rest of the scan")
@@ -345,7 +343,7 @@ def main(home: Path) -> None:
     assert value is not None
     assert value.path == result
     assert [(mark.kind, mark.name) for mark in again.results.marks.value] == marks
-    rig = again.composition.rig(again.window).state.choice.value
+    rig = again.composition.rig.state.choice.value
     assert rig.options == tuple(tuple(part.split("=")) for part in RIG.split())
     again.close()
     _say(f"opened again with: {[kind for kind, _ in marks]}")

@@ -5,11 +5,10 @@ from pathlib import Path
 import pytest
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.calibrate.wizard.window import CalibrationWizard
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import RigChoice
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -26,11 +25,11 @@ OPTIONS = {"scene": "plane", "size": "64x48"}
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
-    composition = Composition(Wish(RigChoice("twin", tuple(OPTIONS.items()))))
-    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    composition = Composition(StartOptions(RigChoice("twin", tuple(OPTIONS.items()))))
+    made = composition.open_window(tmp_path)
     qtbot.addWidget(made)
     made.show()
-    rig = composition.rig(made)
+    rig = composition.rig
     rig.connect(rig.state.choice.value)
     qtbot.waitUntil(lambda: rig.state.devices.value is not None, timeout=60_000)
     return made

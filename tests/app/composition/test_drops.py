@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.page import ResultsPage
 from dsl_app.scan.page import ScanPage
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
@@ -23,8 +22,8 @@ from tests.app.support.small_result import RED, write_reference, write_small_res
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
-    composition = Composition(Wish())
-    made = make_window(composition.pages, tmp_path / "home", commands=composition.commands)
+    composition = Composition(StartOptions())
+    made = composition.open_window(tmp_path / "home")
     qtbot.addWidget(made)
     made.show()
     return made

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.shell.actions import ACTIONS, Action
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.tour import Tour
 from PySide6.QtCore import QTimer
@@ -34,11 +33,11 @@ def window(qapp: QApplication, home: Path) -> Iterator[MainWindow]:
     """One window with a result and a connected rig for all actions, as a person has it."""
     patch = pytest.MonkeyPatch()
     patch.setenv("DSL_SCAN_HOME", str(home))
-    composition = Composition(Wish(TWIN))
-    made = make_window(composition.pages, home, commands=composition.commands)
+    composition = Composition(StartOptions(TWIN))
+    made = composition.open_window(home)
     made.resize(1280, 800)
     made.show()
-    rig = composition.rig(made)
+    rig = composition.rig
     rig.connect(TWIN)
     wait_until(lambda: rig.state.link.value is Link.OPEN)
     made.open_path(write_small_result(home))

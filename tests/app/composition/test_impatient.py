@@ -11,14 +11,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import View
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
 from dsl_app.shell.actions import PAGES
-from dsl_app.shell.application import ExceptionHook, make_window
+from dsl_app.shell.application import ExceptionHook
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import SMALLEST
 from PySide6.QtCore import Qt, QTimer
@@ -44,14 +44,12 @@ class Bench:
     """A composed window with a connected twin."""
 
     def __init__(self, folder: Path) -> None:
-        self.composition = Composition(Wish(TWIN))
-        self.window: MainWindow = make_window(
-            self.composition.pages, folder, commands=self.composition.commands
-        )
+        self.composition = Composition(StartOptions(TWIN))
+        self.window: MainWindow = self.composition.open_window(folder)
         self.window.parts.settings.output_folder = str(folder / "scans")
         self.hook = ExceptionHook(self.window.toasts)
         self.window.show()
-        rig = self.composition.rig(self.window)
+        rig = self.composition.rig
         rig.connect(TWIN)
         self.wait(lambda: rig.state.link.value is Link.OPEN)
 
@@ -175,7 +173,7 @@ def test_closing_during_a_scan_asks_and_the_frames_stay(
 
 def test_a_projector_that_is_pulled_out_interrupts_and_its_scan_goes_on(bench: Bench) -> None:
     page = bench.scan_page()
-    state, rig = page._state, bench.composition.rig(bench.window).state
+    state, rig = page._state, bench.composition.rig.state
     whole = rig.devices.value
     assert whole is not None
     rig.devices.set(with_faults(whole, FaultPlan(projector_gone_at=8)))
@@ -215,10 +213,10 @@ def test_every_page_fits_the_smallest_window(bench: Bench, tmp_path: Path) -> No
 def test_the_window_opens_at_one_and_a_half_times_the_size(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path;"
-        "from dsl_app.shell.application import make_application, make_window;"
-        "from dsl_app.composition.window import Composition, Wish; app = make_application([]);"
-        "made = Composition(Wish());"
-        "window = make_window(made.pages, Path(sys.argv[1]), commands=made.commands); window.show();"
+        "from dsl_app.shell.application import make_application;"
+        "from dsl_app.composition.window import Composition, StartOptions; app = make_application([]);"
+        "made = Composition(StartOptions());"
+        "window = made.open_window(Path(sys.argv[1])); window.show();"
         "[(window.open_page(key), app.processEvents(), window.grab()) for key in made.pages];"
         "print(window.devicePixelRatioF(), window.grab().width() / window.width()); window.close()"
     )

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 from dsl_app.calibrate.campaign_box import NewCampaignDialog
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.export_dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.actions import PAGES
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.toasts import Toast
 from PySide6.QtGui import QAccessible
@@ -51,8 +50,8 @@ INTERACTIVE = (
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> Iterator[MainWindow]:
-    composition = Composition(Wish())
-    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    composition = Composition(StartOptions())
+    made = composition.open_window(tmp_path)
     qtbot.addWidget(made)
     made.show()
     yield made

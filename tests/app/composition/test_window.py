@@ -6,10 +6,9 @@ import time
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.page import ScanPage
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
@@ -24,8 +23,8 @@ TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 
 @pytest.fixture
 def composed(qtbot: QtBot, tmp_path: Path) -> tuple[Composition, MainWindow]:
-    composition = Composition(Wish(TWIN))
-    window = make_window(composition.pages, tmp_path)
+    composition = Composition(StartOptions(TWIN))
+    window = composition.open_window(tmp_path)
     qtbot.addWidget(window)
     window.show()
     return composition, window
@@ -34,9 +33,9 @@ def composed(qtbot: QtBot, tmp_path: Path) -> tuple[Composition, MainWindow]:
 def test_the_rig_is_connected_once_the_window_is_there(
     qtbot: QtBot, composed: tuple[Composition, MainWindow]
 ) -> None:
-    composition, window = composed
-    composition.start(window)
-    rig = composition.rig(window)
+    composition, _ = composed
+    composition.start()
+    rig = composition.rig
     assert rig.state.link.value is Link.CLOSED
     qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
 
@@ -54,7 +53,7 @@ def test_the_rig_is_remembered(
     qtbot: QtBot, composed: tuple[Composition, MainWindow], tmp_path: Path
 ) -> None:
     composition, window = composed
-    rig = composition.rig(window)
+    rig = composition.rig
     rig.connect(RigChoice("twin", (("scene", "box"), ("size", "64x48"))))
     qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=30_000)
     window.close()
@@ -73,13 +72,13 @@ def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
         return made_up_prediction(rig, plan, latency_ms)
 
     monkeypatch.setattr(prediction, "predict", predict)
-    composition = Composition(Wish(TWIN, predicts=True))
-    window = make_window(composition.pages, tmp_path)
+    composition = Composition(StartOptions(TWIN, predicts=True))
+    window = composition.open_window(tmp_path)
     qtbot.addWidget(window)
     window.show()
     page = window.open_page("scan")
     assert isinstance(page, ScanPage)
-    composition.start(window)
+    composition.start()
     qtbot.waitUntil(lambda: len(page.forecast._state.points.value) > 3, timeout=60_000)
     assert page.curve.marker.isVisible()
     window.close()
@@ -105,9 +104,7 @@ def test_nothing_stays_on_any_screen_when_the_window_closes(
     qtbot: QtBot, composed: tuple[Composition, MainWindow], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     composition, window = composed
-    composition.rig(window)
-    screens = composition._screens
-    assert screens is not None
+    screens = composition.screens
     screens.beam.show()
     screens.identify()
     (name,) = screens._labels
@@ -124,9 +121,8 @@ def test_nothing_stays_on_any_screen_when_the_window_closes(
 
 
 def test_names_of_screens_leave_before_a_scan(composed: tuple[Composition, MainWindow]) -> None:
-    composition, window = composed
-    state, screens = composition.rig(window).state, composition._screens
-    assert screens is not None
+    composition, _ = composed
+    state, screens = composition.rig.state, composition.screens
     screens.identify()
     (name,) = screens._labels
     state.used_by.set("Scan first")

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 from dsl_app.compare.page import ComparePage
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.again.dialog import AgainDialog
 from dsl_app.results.page import ResultsPage
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -38,8 +37,8 @@ def window(
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
-    composition = Composition(Wish())
-    made = make_window(composition.pages, tmp_path / "home", commands=composition.commands)
+    composition = Composition(StartOptions())
+    made = composition.open_window(tmp_path / "home")
     qtbot.addWidget(made)
     made.show()
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
@@ -132,7 +131,7 @@ def test_who_works_elsewhere_is_not_torn_away(qtbot: QtBot, window: MainWindow, 
     qtbot.waitUntil(lambda: (tmp_path / "small-2.zarr").exists(), timeout=PATIENCE_MS)
     qtbot.waitUntil(lambda: bool(window.toasts.shown), timeout=PATIENCE_MS)
     assert window.page == "rig"
-    (show,) = [b for b in window.toasts.shown[-1].findChildren(QPushButton) if b.text() == "Show it"]
+    (show,) = [b for b in window.toasts.shown[-1].findChildren(QPushButton) if b.text() == "Show result"]
     show.click()
     assert window.page == "results"
 

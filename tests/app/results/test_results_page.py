@@ -33,8 +33,7 @@ from dsl_app.shared.theme import LIGHT
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.spectrum_curve import split_by_share
-from dsl_app.shell.application import make_window
-from dsl_app.shell.main_window import MainWindow
+from dsl_app.shell.application import make_window, open_first_page
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QImage, QMouseEvent, QWheelEvent
@@ -72,9 +71,10 @@ class Bench:
         self.page: ResultsPage
         self.asked: list[str] = []
         self.window = make_window({"results": self._make}, folder)
+        open_first_page(self.window)
 
-    def _make(self, window: MainWindow) -> PageWidget:
-        runner = InlineRunner()
+    def _make(self) -> PageWidget:
+        runner, window = InlineRunner(), self.window
         self.control = ResultsController(self.state, runner, window.toasts, window.parts.undo)
         welcome = Welcome(window.parts.recent, window.open_path, lambda: self.asked.append("demo"))
         self.page = ResultsPage(self.state, self.control, runner, welcome)

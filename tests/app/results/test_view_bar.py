@@ -8,7 +8,7 @@ import pytest
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import ResultsState
 from dsl_app.results.view_bar import ViewBar
-from dsl_app.session.parts import come_back_to_result, results_part
+from dsl_app.session.parts import restore_result, results_part
 from dsl_app.shared.undo import UndoStack
 from pytestqt.qtbot import QtBot
 
@@ -137,7 +137,7 @@ def test_what_eyes_were_adapted_to_comes_back_with_its_tick(
     part = results_part(bench.state)
     assert part is not None
     again = Bench(qtbot)
-    come_back_to_result(part, again.control)
+    restore_result(part, again.control)
     assert again.shown == ("D65", False)
     assert again.bar.nm.text() == "560 nm"
     again.control.open(few)

@@ -6,7 +6,7 @@ import sys
 import threading
 
 import numpy as np
-from dsl_app.connection.projector_window import ProjectorWindow, ScreenProjector, mirrors, pixel_size
+from dsl_app.rig.projector_window import ProjectorWindow, ScreenProjector, mirrors, pixel_size
 from numpy.typing import NDArray
 from PySide6.QtCore import QCoreApplication, QTimer
 from PySide6.QtGui import QGuiApplication, QImage, QScreen

@@ -3,7 +3,7 @@ from __future__ import annotations
 import logging
 import threading
 import zipfile
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,7 +11,7 @@ from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.undo import Change
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.actions import ACTIONS, PAGES
-from dsl_app.shell.application import ExceptionHook, make_window
+from dsl_app.shell.application import ExceptionHook, make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtWidgets import QFileDialog, QLabel, QMessageBox, QVBoxLayout
 from pytestqt.qtbot import QtBot
@@ -22,8 +22,8 @@ from tests.app.support.doubles import RecordingNotifier
 class Page(PageWidget):
     """A page that only says which one it is."""
 
-    def __init__(self, window: MainWindow, key: str) -> None:
-        super().__init__(window)
+    def __init__(self, key: str) -> None:
+        super().__init__()
         self.opened: list[Path] = []
         self.released = False
         QVBoxLayout(self).addWidget(QLabel(key))
@@ -41,11 +41,8 @@ class Page(PageWidget):
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
-    pages: dict[str, Callable[[MainWindow], PageWidget]] = {
-        page.key: lambda window, key=page.key: Page(window, key)  # type: ignore[misc]
-        for page in PAGES
-    }
-    made = make_window(pages, tmp_path)
+    made = make_window({page.key: partial(Page, page.key) for page in PAGES}, tmp_path)
+    open_first_page(made)
     qtbot.addWidget(made)
     made.show()
     return made
@@ -162,7 +159,8 @@ def test_only_work_that_somebody_would_miss_keeps_the_window_open(
 
 def test_the_window_can_be_there_before_its_page(qtbot: QtBot, tmp_path: Path) -> None:
     imports = {"rig": ("json", "there.is.no.such.module")}
-    made = make_window({"rig": lambda window: Page(window, "rig")}, tmp_path, imports=imports)
+    made = make_window({"rig": partial(Page, "rig")}, tmp_path)
+    open_first_page(made, imports)
     qtbot.addWidget(made)
     made.show()
     assert made.stack.count() == 0

@@ -4,9 +4,8 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.tour import STEPS, Tour, beside
 from PySide6.QtCore import QRect, Qt
@@ -17,8 +16,8 @@ from pytestqt.qtbot import QtBot
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
-    composition = Composition(Wish())
-    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    composition = Composition(StartOptions())
+    made = composition.open_window(tmp_path)
     qtbot.addWidget(made)
     made.show()
     qtbot.waitExposed(made)
@@ -100,11 +99,11 @@ def test_a_card_stands_where_there_is_room() -> None:
 
 def test_a_person_is_offered_the_tour_once(qtbot: QtBot, tmp_path: Path) -> None:
     for offered in (True, False):
-        composition = Composition(Wish(is_first_contact=True))
-        window = make_window(composition.pages, tmp_path)
+        composition = Composition(StartOptions(offers_tour=True))
+        window = composition.open_window(tmp_path)
         qtbot.addWidget(window)
         window.show()
-        composition._begin(window)
+        composition._start_now()
         toasts, runner = window.toasts.shown, window.parts.runner
         buttons = [button.text() for toast in toasts for button in toast.findChildren(QPushButton)]
         assert ("Take the tour" in buttons) is offered

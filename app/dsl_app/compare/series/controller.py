@@ -50,7 +50,7 @@ class SeriesController:
         else:
             self._set_rows((*self.state.rows.value, *new))
 
-    def come_back(
+    def restore(
         self, rows: Sequence[tuple[Path, float | None]], against: Path | None, region: Region | None
     ) -> None:
         """Take results with their positions, and ask the same of them again; what is gone is told."""

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.shared.widgets.help_window import HelpWindow, help_of, help_pages, help_window, slug, title_of
 from dsl_app.shell.actions import PAGES
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -20,8 +19,8 @@ NAMES = {page.stem: page for page in help_pages()}
 
 @pytest.fixture
 def window(qtbot: QtBot, tmp_path: Path) -> Iterator[MainWindow]:
-    composition = Composition(Wish())
-    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    composition = Composition(StartOptions())
+    made = composition.open_window(tmp_path)
     qtbot.addWidget(made)
     made.show()
     qtbot.waitExposed(made)

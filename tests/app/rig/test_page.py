@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import pytest
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
-from dsl_app.rig.page import RigPage, cycles_text, parse_options
+from dsl_app.rig.controller import LiveController
+from dsl_app.rig.page import RigPage, parse_options
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import LIGHT
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -23,7 +24,7 @@ Bench = tuple[RigPage, RigState, QtRunner, RecordingNotifier]
 def bench(qtbot: QtBot) -> Iterator[Bench]:
     state = RigState(RigChoice("twin", (("scene", "plane"), ("size", "64x48"))))
     runner, notifier = QtRunner(), RecordingNotifier()
-    page = RigPage(state, RigController(state, runner, notifier), ["replay", "twin"])
+    page = RigPage(LiveController(RigController(state, runner, notifier), notifier), ["replay", "twin"])
     qtbot.addWidget(page)
     page.apply_theme(LIGHT)
     page.show()
@@ -118,7 +119,7 @@ def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> Non
     connect(qtbot, page, state)
     assert not page.live.rectangle.isVisible()
     click(page._live_button)
-    qtbot.waitUntil(lambda: state.frame.value is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
     page.live.region_box.click()
     region = page.live.region
     assert region is not None
@@ -142,21 +143,15 @@ def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, _ = bench
     connect(qtbot, page, state)
     click(page._live_button)
-    qtbot.waitUntil(lambda: state.frame.value is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
     click(page._live_button)
     qtbot.waitUntil(lambda: not state.live.value)
     QTest.keyClick(page.live, Qt.Key.Key_Right)
     QTest.keyClick(page.live, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
-    frame = state.frame.value
+    frame = page._live_state.frame.value
     assert frame is not None
     assert page.live._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN"
     QTest.keyClick(page.live, Qt.Key.Key_F)
-
-
-def test_parts_of_a_cycle_are_named() -> None:
-    assert cycles_text(1000 / 6, 1000 / 60) == "10 LED cycles"
-    assert cycles_text(160.0, 1000 / 60) == "9.60 LED cycles: colours vary"
-    assert cycles_text(160.0, None) == ""
 
 
 def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:
@@ -182,7 +177,7 @@ def test_a_scan_has_the_projector_for_itself(qtbot: QtBot, bench: Bench) -> None
         panel._kind, panel._level, panel._column, panel._slider, panel._loop, panel._screen, panel._identify,
     )  # fmt: skip
     assert not any(widget.isEnabled() for widget in controls)
-    assert panel._note.text() == "Scan first has the projector. Pictures can be shown when it has ended."
+    assert panel._note.text() == "Scan first is using the projector. Pictures can be shown when it has ended."
     state.used_by.set("")
     assert all(widget.isEnabled() for widget in controls)
     assert "640 × 360" in panel._note.text()

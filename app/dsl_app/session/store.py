@@ -1,7 +1,7 @@
-"""Keeps the session on disk while the program runs, and finds the one that a crash left behind. No Qt.
+"""Saves the session on disk while the program runs, and finds the session of a program that crashed. No Qt.
 
-Each running program has a file of its own, named by its process. A program that ends well removes it, so that
-a file whose process is gone was left by a crash.
+Each running program has a file of its own, named by its process. It removes the file when it ends normally:
+a file whose process does not run any more is from a crash.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _log = logging.getLogger(__name__)
 _PREFIX = "session-"
 
 
-class SessionKeeper:
+class SessionStore:
     """Writes what ``collect`` gives, some time after one of the watched values changed."""
 
     def __init__(self, folder: Path, collect: Callable[[], Session], process: int | None = None) -> None:
@@ -47,7 +47,7 @@ class SessionKeeper:
     def save(self) -> str:
         """Write if something changed since last time; returns a sentence the first time that it fails.
 
-        Called by a clock, so that many changes cost one write.
+        Called by a timer, so that many changes cost one write.
         """
         if not self._is_changed:
             return ""
@@ -59,7 +59,7 @@ class SessionKeeper:
             self._folder.mkdir(parents=True, exist_ok=True)
             write_atomic(self._path, session.model_dump_json(indent=1).encode())
         except (OSError, StoreError) as error:
-            return self._complain(f"What is open cannot be kept for after a crash: {error}")
+            return self._complain(f"The open session cannot be saved for recovery after a crash: {error}")
         self._written = session
         return ""
 
@@ -68,14 +68,14 @@ class SessionKeeper:
         first, self._has_complained = not self._has_complained, True
         return text if first else ""
 
-    def end(self) -> None:
-        """The program ends well: nothing has to be come back to."""
+    def remove(self) -> None:
+        """Remove the file: the program ends normally, and nothing has to be restored."""
         self._path.unlink(missing_ok=True)
 
-    def left_behind(self) -> tuple[Session | None, str]:
+    def crashed_session(self) -> tuple[Session | None, str]:
         """The newest session of a program that crashed, and a sentence on one that cannot be read.
 
-        All that were left are taken away, so that they are offered once.
+        All sessions of crashed programs are removed, so that they are offered once.
         """
         newest: Session | None = None
         trouble = ""
@@ -87,8 +87,8 @@ class SessionKeeper:
                 found = Session.model_validate_json(path.read_bytes())
             except (OSError, ValidationError) as error:
                 trouble = (
-                    f"What was open before the crash could not be read ({type(error).__name__})."
-                    f"{set_aside(path)} Open your files by File, Open recent."
+                    f"The session before the crash could not be read ({type(error).__name__})."
+                    f"{set_aside(path)} Use File, Open recent to open your files."
                 )
                 continue
             path.unlink(missing_ok=True)
@@ -105,7 +105,7 @@ def _age(path: Path) -> float:
 
 
 def is_running(process: int) -> bool:
-    """Whether a process of that number runs and is a Python program, as a later one may have the number."""
+    """Whether a process of that number runs and is a Python program: another one may have got the number."""
     import psutil
 
     try:

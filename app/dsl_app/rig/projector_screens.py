@@ -1,4 +1,4 @@
-"""The projector's screen: chosen by name on the Rig page, watched, and never that of the window itself."""
+"""The projector's screen: chosen by name on the Rig page, monitored, and never that of the window itself."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
 from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QWidget
 
-from dsl_app.connection.projector_window import ProjectorWindow, ScreenLabel, describe_screen
 from dsl_app.rig.projector_panel import LOST
-from dsl_app.shell.main_window import MainWindow
+from dsl_app.rig.projector_window import ProjectorWindow, ScreenLabel, describe_screen
+from dsl_app.shared.notify import Notifier
 from dsl_core.errors import DslError
 
 if TYPE_CHECKING:
@@ -19,29 +20,29 @@ IDENTIFY_MS = 3000
 
 
 class ProjectorScreens(QObject):
-    """Holds the window on the projector's screen and does what the Rig page asks of screens."""
+    """Owns the window on the projector's screen, and serves the Rig page's choice of screens."""
 
-    def __init__(self, window: MainWindow) -> None:
+    def __init__(self, window: QWidget, notifier: Notifier) -> None:
         super().__init__(window)
-        self._window = window
+        self._window, self._notifier = window, notifier
         self._labels: list[ScreenLabel] = []
         self.beam = ProjectorWindow()
         self.beam.lost.connect(
-            lambda name: window.toasts.tell(
+            lambda name: notifier.tell(
                 "error",
-                f"The projector's screen {name} is gone. Connect it again and choose it on the Rig page.",
+                f"The projector's screen {name} was disconnected. Connect it again and choose it on the Rig"
+                " page.",
             )
         )
         self.beam.restored.connect(
-            lambda name: window.toasts.tell(
-                "info", f"The screen {name} is there again. Choose it on the Rig page to use it."
+            lambda name: notifier.tell(
+                "info", f"The screen {name} is connected again. Choose it on the Rig page to use it."
             )
         )
-        window.closed.connect(self.leave)
         window.destroyed.connect(self.beam.close)
 
     def serve(self, page: RigPage) -> None:
-        """Do what a Rig page asks, and tell it of screens that come and go."""
+        """Serve a Rig page, and update its list when screens are connected or disconnected."""
         page.projector.identify.connect(self.identify)
         page.projector.screen_chosen.connect(lambda name: self._choose(page, name))
         application = QGuiApplication.instance()
@@ -58,13 +59,13 @@ class ProjectorScreens(QObject):
             QTimer.singleShot(IDENTIFY_MS, label, self.hide_names)
 
     def hide_names(self) -> None:
-        """Take the names away; frames must not show them."""
+        """Remove the names; frames must not show them."""
         labels, self._labels = self._labels, []
         for label in labels:
             label.close()
 
-    def leave(self) -> None:
-        """Leave all screens to others."""
+    def close(self) -> None:
+        """Release all screens."""
         self.hide_names()
         self.beam.close()
 
@@ -86,5 +87,5 @@ class ProjectorScreens(QObject):
             else:
                 self.beam.arm(found)
         except DslError as error:
-            self._window.toasts.tell("error", str(error))
+            self._notifier.tell("error", str(error))
         self._list(page)

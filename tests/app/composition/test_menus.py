@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
-from dsl_app.shell.application import make_window
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -21,12 +20,12 @@ TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48"), ("realtime", "o
 @pytest.fixture
 def composition(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Composition:
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
-    return Composition(Wish(TWIN))
+    return Composition(StartOptions(TWIN))
 
 
 @pytest.fixture
 def window(qtbot: QtBot, composition: Composition, tmp_path: Path) -> Iterator[MainWindow]:
-    made = make_window(composition.pages, tmp_path, commands=composition.commands)
+    made = composition.open_window(tmp_path)
     made.parts.settings.output_folder = str(tmp_path / "scans")
     qtbot.addWidget(made)
     made.show()
@@ -39,7 +38,7 @@ def window(qtbot: QtBot, composition: Composition, tmp_path: Path) -> Iterator[M
 def test_a_rig_is_watched_and_scans_from_the_results_page(
     qtbot: QtBot, window: MainWindow, composition: Composition
 ) -> None:
-    state = composition.rig(window).state
+    state = composition.rig.state
 
     def do_from_results(key: str) -> None:
         window.open_page("results")
@@ -59,8 +58,8 @@ def test_a_rig_is_watched_and_scans_from_the_results_page(
 
     do_from_results("scan_start")
     assert window.page == "scan"
-    assert composition._scans is not None
-    scan = composition._scans.state
+    assert composition.scans is not None
+    scan = composition.scans.state
     qtbot.waitUntil(lambda: scan.phase.value is Phase.RUNNING, timeout=20000)
     do_from_results("scan_pause")
     qtbot.waitUntil(lambda: scan.phase.value is Phase.PAUSED, timeout=20000)
@@ -99,6 +98,6 @@ def test_a_name_that_is_being_typed_counts(
     page.target.name.selectAll()
     QTest.keyClicks(page.target.name, "leaf")
     window.do("scan_start")
-    assert composition._scans is not None
-    assert composition._scans.state.target.value.stem == "leaf"
+    assert composition.scans is not None
+    assert composition.scans.state.target.value.stem == "leaf"
     assert page.target.name.hasFocus()

@@ -5,10 +5,9 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
 import pytest
-from dsl_app.connection.controller import LOST_AFTER, RIG, RigController
-from dsl_app.connection.state import FrameCounts, Link, RigChoice, RigState
+from dsl_app.connection.controller import RIG, RigController
+from dsl_app.connection.state import Link, RigChoice, RigState
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import WORKERS, QtRunner
 from pytestqt.qtbot import QtBot
@@ -16,12 +15,10 @@ from pytestqt.qtbot import QtBot
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
-from dsl_core.patterns.trial_pictures import PictureKind
 from dsl_core.progress import Progress
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
-Live = Callable[[], tuple[RigController, RecordingNotifier, QtRunner]]
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 
 
@@ -29,6 +26,13 @@ def controller(runner: object = None) -> tuple[RigController, RecordingNotifier]
     notifier = RecordingNotifier()
     made = RigController(RigState(TWIN), runner or InlineRunner(), notifier)  # type: ignore[arg-type]
     return made, notifier
+
+
+def look(progress: Progress) -> None:
+    """A live view: runs until it is cancelled."""
+    while True:
+        progress.report("live", 0, 0)
+        time.sleep(0.005)
 
 
 def test_a_rig_is_connected_and_let_go() -> None:
@@ -47,121 +51,6 @@ def test_a_rig_that_cannot_be_opened_says_why() -> None:
     assert rig.state.link.value is Link.CLOSED
     assert "moon" in rig.state.trouble.value
     assert notifier.told[0][0] == "error"
-
-
-def test_what_is_shown_reaches_the_camera() -> None:
-    rig, _ = controller()
-    rig.connect(TWIN)
-    devices = rig.state.devices.value
-    assert devices is not None
-    means = []
-    kinds: tuple[PictureKind, ...] = ("black", "white")
-    for kind in kinds:
-        rig.show(kind)
-        means.append(float(devices.camera.snap().pixels.mean()))
-    assert means[1] > means[0] + 50
-
-
-def test_the_exposure_stays_within_the_camera() -> None:
-    rig, _ = controller()
-    rig.connect(TWIN)
-    rig.set_exposure(1e9)
-    assert rig.state.exposure_ms.value == 30_000.0
-
-
-def test_showing_without_a_rig_says_what_to_do() -> None:
-    rig, notifier = controller()
-    rig.show("white")
-    assert "Connect a rig first" in notifier.told[0][1]
-
-
-@pytest.fixture
-def live(qtbot: QtBot) -> Live:
-    def start() -> tuple[RigController, RecordingNotifier, QtRunner]:
-        runner = QtRunner()
-        rig, notifier = controller(runner)
-        rig.connect(TWIN)
-        qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=60_000)
-        rig.start_live()
-        return rig, notifier, runner
-
-    return start
-
-
-def test_live_frames_arrive_until_the_view_stops(qtbot: QtBot, live: Live) -> None:
-    rig, _, runner = live()
-    frames: list[Frame | None] = []
-    rig.state.frame.changed.connect(frames.append)
-
-    def seen() -> bool:
-        rig.take_frame()
-        return len(frames) >= 3
-
-    qtbot.waitUntil(seen)
-    rig.stop_live()
-    qtbot.waitUntil(lambda: not rig.state.live.value)
-    assert isinstance(frames[0], Frame)
-    assert frames[0].pixels.dtype == np.uint16
-    runner.shut_down()
-
-
-def test_a_job_waits_for_the_live_view_to_stop(qtbot: QtBot, live: Live) -> None:
-    rig, _, runner = live()
-    states: list[bool] = []
-    done: list[str] = []
-    rig.run(Job("Scan", lambda progress: states.append(rig.state.live.value), lambda _: done.append("scan")))
-    qtbot.waitUntil(lambda: done == ["scan"])
-    assert states == [False]
-    runner.shut_down()
-
-
-def test_a_camera_that_goes_silent_is_lost_and_told(
-    qtbot: QtBot, live: Live, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
-        time.sleep(0.001)
-        raise DeviceError("The camera sent no frame. Check its cable.")
-
-    monkeypatch.setattr(SimCamera, "snap", silent)
-    rig, notifier, runner = live()
-    qtbot.waitUntil(lambda: rig.state.link.value is Link.LOST)
-    assert rig._counts.lost == LOST_AFTER
-    assert "Check its cable" in notifier.told[-1][1]
-    runner.shut_down()
-
-
-def test_one_click_exposes_for_whole_cycles_of_what_the_camera_sees(qtbot: QtBot, live: Live) -> None:
-    rig, notifier, _ = live()
-    rig.show("white", 0.3)
-    rig.set_exposure(900.0)
-    rig.expose_automatically((8, 8, 40, 30))
-    assert rig.state.is_exposing.value
-
-    def is_done() -> bool:
-        rig.take_frame()
-        return not rig.state.is_exposing.value
-
-    qtbot.waitUntil(is_done, timeout=20_000)
-    cycle_ms, frame = rig.state.cycle_ms, rig.state.frame.value
-    assert cycle_ms is not None
-    assert frame is not None
-    cycles = rig.state.exposure_ms.value / cycle_ms
-    assert cycles == pytest.approx(round(cycles), abs=1e-6)
-    assert notifier.told[-1][1].startswith("Exposed for")
-    part = frame.pixels[8:38, 8:48]
-    assert np.quantile(part, 0.99) < 4095
-    rig.stop_live()
-
-
-def test_frames_that_nobody_took_are_counted_as_skipped() -> None:
-    rig, _ = controller()
-    for number in range(3):
-        rig._post(Frame(np.zeros((4, 4), np.uint16), 10.0, frame_id=number))
-    rig.take_frame()
-    assert rig.state.counts.value == FrameCounts(shown=1, lost=0, skipped=2)
-    frame = rig.state.frame.value
-    assert frame is not None
-    assert frame.frame_id == 2
 
 
 def test_the_cycle_is_the_calibrated_one() -> None:
@@ -209,27 +98,6 @@ def busy(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Busy]:
     runner.shut_down()
 
 
-def test_no_picture_reaches_the_projector_while_a_job_has_the_rig(qtbot: QtBot, busy: Busy) -> None:
-    rig, devices = busy.rig, busy.rig.state.devices.value
-    assert devices is not None
-    world = devices.camera.world  # type: ignore[attr-defined]
-    rig.show("black")
-    before = world.image
-    busy.hold()
-    assert rig.state.used_by.value == "Scan first"
-    rig.show("white")
-    assert world.image is before
-    assert busy.notifier.told[-1] == (
-        "info",
-        "Scan first has the projector. Wait for its end, or cancel it.",
-    )
-    busy.gate.set()
-    qtbot.waitUntil(busy.is_idle)
-    assert rig.state.used_by.value == ""
-    rig.show("white")
-    assert world.image is not before
-
-
 def test_what_follows_a_job_finds_the_rig_free() -> None:
     rig, _ = controller()
     seen: list[str] = []
@@ -261,7 +129,7 @@ def test_a_rig_that_something_else_takes_after_the_live_view_stays_connected(
 ) -> None:
     rig, state = busy.rig, busy.rig.state
     devices = state.devices.value
-    rig.start_live()
+    rig.start_live(look)
     busy.hold()
     rig.disconnect()
     rig.connect(TWIN)
@@ -275,7 +143,7 @@ def test_a_rig_that_something_else_takes_after_the_live_view_stays_connected(
 def test_disconnecting_twice_while_the_live_view_stops_is_once(qtbot: QtBot, busy: Busy) -> None:
     rig, state = busy.rig, busy.rig.state
     devices = state.devices.value
-    rig.start_live()
+    rig.start_live(look)
     rig.disconnect()
     rig.disconnect()
     qtbot.waitUntil(lambda: busy.closed == [devices] and busy.is_idle())
@@ -341,3 +209,13 @@ def test_devices_that_do_not_close_keep_nobody_from_another_rig(monkeypatch: pyt
     monkeypatch.setattr(DeviceRig, "close", close)
     rig.connect(TWIN)
     assert rig.state.link.value is Link.OPEN
+
+
+def test_a_job_waits_for_the_live_view_to_stop(qtbot: QtBot, busy: Busy) -> None:
+    rig = busy.rig
+    rig.start_live(look)
+    states: list[bool] = []
+    done: list[str] = []
+    rig.run(Job("Scan", lambda progress: states.append(rig.state.live.value), lambda _: done.append("scan")))
+    qtbot.waitUntil(lambda: done == ["scan"])
+    assert states == [False]

@@ -1,4 +1,4 @@
-"""Keeps what is open while the window lives, and offers it again after a crash."""
+"""Saves what is open while the window lives, and offers to restore it after a crash."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, QTimer
 
-from dsl_app.session.keeper import SessionKeeper
 from dsl_app.session.records import Session
+from dsl_app.session.store import SessionStore
 from dsl_app.shell.main_window import MainWindow
 
 if TYPE_CHECKING:
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from dsl_app.results.controller import ResultsController
     from dsl_app.scan.controller import ScanController
 
-#: How long changes are gathered before they are written, ms.
+#: Interval between two saves of what has changed, ms.
 SAVE_MS = 1000
 
 
-class SessionDesk(QObject):
+class SessionRestore(QObject):
     """Knows the controllers of the pages that were made so far."""
 
     def __init__(self, window: MainWindow) -> None:
@@ -30,7 +30,7 @@ class SessionDesk(QObject):
         self._scans: ScanController | None = None
         self._compare: CompareController | None = None
         self._series: SeriesController | None = None
-        self.keeper = SessionKeeper(window.parts.settings_path.parent / "sessions", self.collect)
+        self.store = SessionStore(window.parts.settings_path.parent / "sessions", self.collect)
         self._timer = QTimer(self)
         self._timer.setInterval(SAVE_MS)
         self._timer.timeout.connect(self.save)
@@ -38,9 +38,9 @@ class SessionDesk(QObject):
     # Pages -----------------------------------------------------------------------------------------
 
     def serve_results(self, control: ResultsController) -> None:
-        """Keep what the Results page shows."""
+        """Save what the Results page shows."""
         self._results, state = control, control.state
-        self.keeper.watch(
+        self.store.watch(
             state.result,
             state.view,
             state.cloud_by,
@@ -53,9 +53,9 @@ class SessionDesk(QObject):
         )
 
     def serve_scan(self, control: ScanController) -> None:
-        """Keep what the Scan page plans."""
+        """Save what the Scan page plans."""
         self._scans, state = control, control.state
-        self.keeper.watch(
+        self.store.watch(
             state.plan,
             state.target,
             state.phase,
@@ -65,13 +65,13 @@ class SessionDesk(QObject):
         )
 
     def serve_comparison(self, control: CompareController, series: SeriesController) -> None:
-        """Keep what the Compare page compares, two results and several."""
+        """Save what the Compare page compares: two results, and a series."""
         self._compare, self._series = control, series
         several = series.state
-        self.keeper.watch(control.state.first, control.state.second)
-        self.keeper.watch(several.rows, several.kind, several.figure, several.against, several.region)
+        self.store.watch(control.state.first, control.state.second)
+        self.store.watch(several.rows, several.kind, several.figure, several.against, several.region)
 
-    # Keep ------------------------------------------------------------------------------------------
+    # Save ------------------------------------------------------------------------------------------
 
     def collect(self) -> Session:
         """What is open now."""
@@ -87,38 +87,30 @@ class SessionDesk(QObject):
 
     def save(self) -> None:
         """Write what changed."""
-        trouble = self.keeper.save()
+        trouble = self.store.save()
         if trouble:
             self._window.toasts.tell("warning", trouble)
 
     def start(self) -> None:
-        """Offer what a crash left behind, once; keep what is open from now on, until the window closes."""
-        session, trouble = self.keeper.left_behind()
+        """Offer to restore what was open at a crash, once; then save what is open until the window closes."""
+        session, trouble = self.store.crashed_session()
         if trouble:
             self._window.toasts.tell("warning", trouble)
         if session is not None:
-            self._window.toasts.offer(
-                f"The program did not end well last time. This was open: {', '.join(session.names)}.",
-                {"Open again": lambda: self.come_back(session)},
-            )
+            self._window.toasts.offer(session.offer, {"Restore session": lambda: self.restore(session)})
         self._timer.start()
         self._window.closed.connect(self._end)
 
     def _end(self) -> None:
         self._timer.stop()
-        self.keeper.end()
+        self.store.remove()
 
-    # Come back -------------------------------------------------------------------------------------
+    # Restore ---------------------------------------------------------------------------------------
 
-    def come_back(self, session: Session) -> None:
-        """Open again what a session holds; what is gone is told."""
+    def restore(self, session: Session) -> None:
+        """Open again what a session holds; a message tells what does not exist any more."""
         from dsl_app.compare.page import ComparePage
-        from dsl_app.session.parts import (
-            come_back_to_comparison,
-            come_back_to_result,
-            come_back_to_scan,
-            come_back_to_series,
-        )
+        from dsl_app.session import parts
 
         window = self._window
         if session.results is not None:
@@ -127,19 +119,19 @@ class SessionDesk(QObject):
             if not session.results.path.exists():
                 window.open_path(session.results.path)
             else:
-                come_back_to_result(session.results, self._results)
+                parts.restore_result(session.results, self._results)
         if session.scan is not None:
             window.page_of("scan")
             assert self._scans is not None
-            come_back_to_scan(session.scan, self._scans)
+            parts.restore_scan(session.scan, self._scans)
         if session.compare is not None:
             window.page_of("compare")
             assert self._compare is not None
-            come_back_to_comparison(session.compare, self._compare)
+            parts.restore_comparison(session.compare, self._compare)
         if session.series is not None:
             page = window.page_of("compare")
             assert self._series is not None
-            come_back_to_series(session.series, self._series)
+            parts.restore_series(session.series, self._series)
             if session.compare is None:
                 assert isinstance(page, ComparePage)
                 page.show_series()

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from dsl_app.composition.window import Composition, Wish
-from dsl_app.importing.dialog import TakeInDialog
-from dsl_app.shell.application import make_window
+from dsl_app.composition.window import Composition, StartOptions
+from dsl_app.importing.dialog import ImportDialog
 from dsl_app.shell.main_window import MainWindow
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -34,10 +33,8 @@ def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
-    composition = Composition(Wish())
-    made = make_window(
-        composition.pages, tmp_path / "home", commands=composition.commands, takers=composition.takers
-    )
+    composition = Composition(StartOptions())
+    made = composition.open_window(tmp_path / "home")
     made.parts.settings.output_folder = str(tmp_path / "scans")
     qtbot.addWidget(made)
     made.show()
@@ -47,18 +44,18 @@ def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
     made.close()
 
 
-def opened(qtbot: QtBot, window: MainWindow) -> TakeInDialog:
-    found: list[TakeInDialog] = []
+def opened(qtbot: QtBot, window: MainWindow) -> ImportDialog:
+    found: list[ImportDialog] = []
 
     def look() -> bool:
-        found[:] = [each for each in window.findChildren(TakeInDialog) if each.isVisible()]
+        found[:] = [each for each in window.findChildren(ImportDialog) if each.isVisible()]
         return bool(found)
 
     qtbot.waitUntil(look, timeout=PATIENCE_MS)
     return found[0]
 
 
-def texts(dialog: TakeInDialog, column: int) -> list[str]:
+def texts(dialog: ImportDialog, column: int) -> list[str]:
     items = [dialog.table.item(row, column) for row in range(dialog.table.rowCount())]
     return [item.text().replace(chr(0x200B), "") for item in items if item is not None]
 
@@ -78,7 +75,7 @@ def test_a_dropped_scan_is_taken_in_and_offered(
     qtbot.waitUntil(lambda: dialog.go.isEnabled(), timeout=PATIENCE_MS)
     dialog.name.selectAll()
     QTest.keyClicks(dialog.name, "chart")
-    assert dialog.text.text() == "Makes chart.dsl."
+    assert dialog.text.text() == "Creates chart.dsl."
     QTest.mouseClick(dialog.go, Qt.MouseButton.LeftButton)
     target = tmp_path / "scans" / "chart.dsl"
     qtbot.waitUntil(lambda: window.page_of("results").subject() == target, timeout=PATIENCE_MS)

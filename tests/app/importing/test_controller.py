@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dsl_app.importing.controller import TakeInController, take_scan
-from dsl_app.importing.state import FileRow, Found, TakeInOrder, TakeInState
-from dsl_app.importing.words import rows_of
+from dsl_app.importing.controller import ImportController, import_scan
+from dsl_app.importing.state import FileRow, Found, ImportOrder, ImportState, rows_of
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.known_files import Kind, kind_of
 
@@ -57,8 +56,8 @@ class Bench:
         self.home = folder / "home"
         self.home.mkdir()
         self.library = CalibrationLibrary(folder / "library")
-        self.state, self.notifier = TakeInState(), RecordingNotifier()
-        self.control = TakeInController(self.state, InlineRunner(), self.notifier, self.library)
+        self.state, self.notifier = ImportState(), RecordingNotifier()
+        self.control = ImportController(self.state, InlineRunner(), self.notifier, self.library)
         self.done: list[Path] = []
         self.state.done.connect(self.done.append)
 
@@ -186,7 +185,7 @@ def test_nothing_is_replaced_and_names_are_free(bench: Bench, made: Folders) -> 
     bench.control.rename("rig", bench.home)
     assert "rig.json exists already" in bench.trouble
     bench.control.rename(" ", bench.home)
-    assert "Give it a name" in bench.trouble
+    assert "Enter a name" in bench.trouble
     bench.control.rename("room/12.json", bench.home)
     assert bench.trouble == ""
     (bench.home / "room-12.json").write_text("came meanwhile")
@@ -196,9 +195,9 @@ def test_nothing_is_replaced_and_names_are_free(bench: Bench, made: Folders) -> 
 
 def test_a_cancelled_import_leaves_nothing(made: Folders, bench: Bench) -> None:
     progress = CallbackProgress(lambda stage, done, total: progress.token.cancel() if done == 3 else None)
-    order = TakeInOrder(made.scene, bench.home / "a.dsl", str(made.own))
+    order = ImportOrder(made.scene, bench.home / "a.dsl", str(made.own))
     with pytest.raises(Cancelled):
-        take_scan(order, bench.library, progress)
+        import_scan(order, bench.library, progress)
     assert list(bench.home.iterdir()) == []
 
 
@@ -210,8 +209,8 @@ def test_a_base_that_is_gone_is_told(bench: Bench, made: Folders, tmp_path: Path
 
 
 def test_a_look_that_was_overtaken_says_nothing(made: Folders, tmp_path: Path) -> None:
-    runner, state = Waiting(), TakeInState()
-    control = TakeInController(state, runner, RecordingNotifier(), CalibrationLibrary(tmp_path / "library"))
+    runner, state = Waiting(), ImportState()
+    control = ImportController(state, runner, RecordingNotifier(), CalibrationLibrary(tmp_path / "library"))
     control.look(made.scene, tmp_path)
     control.look(made.rig, tmp_path)
     for job in reversed(runner.jobs):

@@ -14,24 +14,23 @@ from dsl_app.compare.pair.controller import CompareController
 from dsl_app.compare.pair.state import CompareState
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import Kind, SeriesState
-from dsl_app.composition.window import Composition, Wish
+from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import Quality, ResultsState, View
-from dsl_app.session.keeper import SessionKeeper, is_running
 from dsl_app.session.parts import (
-    come_back_to_comparison,
-    come_back_to_result,
-    come_back_to_scan,
-    come_back_to_series,
     compare_part,
+    restore_comparison,
+    restore_result,
+    restore_scan,
+    restore_series,
     results_part,
     scan_part,
     series_part,
 )
 from dsl_app.session.records import ResultsPart, ScanPart, SeriesPart, Session
+from dsl_app.session.store import SessionStore, is_running
 from dsl_app.shared.evented import Value
 from dsl_app.shared.undo import UndoStack
-from dsl_app.shell.application import make_window
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 
@@ -58,7 +57,7 @@ def gone() -> int:
 
 
 def test_a_session_is_written_only_after_a_change(tmp_path: Path) -> None:
-    keeper = SessionKeeper(tmp_path / "sessions", lambda: LEAF, process=7)
+    keeper = SessionStore(tmp_path / "sessions", lambda: LEAF, process=7)
     keeper.save()
     assert not (tmp_path / "sessions").exists()
     band = Value(1)
@@ -67,42 +66,42 @@ def test_a_session_is_written_only_after_a_change(tmp_path: Path) -> None:
     assert keeper.save() == ""
     (file,) = (tmp_path / "sessions").iterdir()
     assert Session.model_validate_json(file.read_bytes()) == LEAF
-    keeper.end()
+    keeper.remove()
     assert not file.exists()
 
 
 def test_what_a_crash_left_is_found_once(tmp_path: Path, gone: int) -> None:
-    crashed = SessionKeeper(tmp_path, lambda: LEAF, process=gone)
+    crashed = SessionStore(tmp_path, lambda: LEAF, process=gone)
     crashed.touch()
     crashed.save()
-    keeper = SessionKeeper(tmp_path, Session)
-    assert keeper.left_behind() == (LEAF, "")
-    assert keeper.left_behind() == (None, "")
+    keeper = SessionStore(tmp_path, Session)
+    assert keeper.crashed_session() == (LEAF, "")
+    assert keeper.crashed_session() == (None, "")
 
 
 def test_what_a_running_program_has_open_is_left_to_it(tmp_path: Path) -> None:
-    other = SessionKeeper(tmp_path, lambda: LEAF, process=os.getpid())
+    other = SessionStore(tmp_path, lambda: LEAF, process=os.getpid())
     other.touch()
     other.save()
     assert is_running(os.getpid())
-    assert SessionKeeper(tmp_path, Session, process=NOBODY).left_behind() == (None, "")
+    assert SessionStore(tmp_path, Session, process=NOBODY).crashed_session() == (None, "")
 
 
 def test_a_damaged_session_is_put_aside_with_a_sentence(tmp_path: Path) -> None:
     (tmp_path / f"session-{NOBODY}.json").write_text('{"results": {"path": ')
-    found, trouble = SessionKeeper(tmp_path, Session).left_behind()
+    found, trouble = SessionStore(tmp_path, Session).crashed_session()
     assert found is None
     assert "could not be read" in trouble
     assert (tmp_path / f"session-{NOBODY}.damaged.json").exists()
-    assert SessionKeeper(tmp_path, Session).left_behind() == (None, "")
+    assert SessionStore(tmp_path, Session).crashed_session() == (None, "")
 
 
 def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
     (tmp_path / "sessions").write_text("a file in the way")
     sessions = iter([LEAF, Session(page="scan")])
-    keeper = SessionKeeper(tmp_path / "sessions", lambda: next(sessions), process=7)
+    keeper = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
     keeper.touch()
-    assert "cannot be kept" in keeper.save()
+    assert "cannot be saved" in keeper.save()
     keeper.touch()
     assert keeper.save() == ""
 
@@ -126,7 +125,7 @@ def test_a_result_is_looked_at_as_before(tmp_path: Path) -> None:
     part = results_part(first.state)
     assert part is not None
     again = opened()
-    come_back_to_result(part, again)
+    restore_result(part, again)
     assert results_part(again.state) == part
     assert [mark.pixel for mark in again.state.marks.value] == [(7, 8)]
 
@@ -140,7 +139,7 @@ def test_a_plan_comes_back(tmp_path: Path) -> None:
     part = scan_part(first.state)
     assert part is not None
     again = make_bench(tmp_path)
-    come_back_to_scan(part, again.scans)
+    restore_scan(part, again.scans)
     assert again.state.plan.value == first.state.plan.value
     assert again.state.target.value == tmp_path / "leaf.dsl"
     assert not again.state.then_reconstruct.value
@@ -164,7 +163,7 @@ def test_a_scan_that_the_crash_interrupted_can_be_gone_on_with(
     first.scans.start()
     assert parts[0] is not None
     again = make_bench(tmp_path)
-    come_back_to_scan(parts[0], again.scans)
+    restore_scan(parts[0], again.scans)
     session = again.state.interrupted.value
     assert session is not None
     assert session.folder == tmp_path / "first.dsl"
@@ -184,7 +183,7 @@ def test_a_comparison_comes_back(tmp_path: Path) -> None:
     part = compare_part(first.state)
     assert part is not None
     again = compared()
-    come_back_to_comparison(part, again)
+    restore_comparison(part, again)
     assert again.state.pair.value is not None
     assert compare_part(again.state) == part
 
@@ -205,7 +204,7 @@ def test_a_depth_test_comes_back_with_its_positions_and_region(tmp_path: Path) -
     assert Session(series=part).names == ("a series of 3 results",)
     assert Session(series=SeriesPart(rows=part.rows[:1])).names == ("a series of 1 result",)
     again = several()
-    come_back_to_series(SeriesPart.model_validate_json(part.model_dump_json()), again)
+    restore_series(SeriesPart.model_validate_json(part.model_dump_json()), again)
     assert series_part(again.state) == part
     assert again.state.test.value == first.state.test.value is not None
 
@@ -221,7 +220,7 @@ def test_a_sweep_comes_back_without_what_is_gone(tmp_path: Path) -> None:
     assert part is not None
     shutil.rmtree(scans[0])
     again = several()
-    come_back_to_series(part, again)
+    restore_series(part, again)
     assert [row.path for row in again.state.rows.value] == [reference, *scans[1:]]
     assert (again.state.against.value, again.state.figure.value) == (reference, FIGURES[1])
     assert scans[0].name in again._notifier.told[-1][1]  # type: ignore[attr-defined]
@@ -231,11 +230,11 @@ class Bench:
     """A program that runs in a folder."""
 
     def __init__(self, qtbot: QtBot, folder: Path) -> None:
-        self.composition = Composition(Wish())
-        self.window = make_window(self.composition.pages, folder, commands=self.composition.commands)
+        self.composition = Composition(StartOptions())
+        self.window = self.composition.open_window(folder)
         qtbot.addWidget(self.window)
         self.window.show()
-        self.desk = self.composition.session(self.window)
+        self.session = self.composition.session
 
     def button(self, text: str) -> QPushButton:
         found = [
@@ -264,20 +263,20 @@ def test_after_a_crash_the_window_offers_once_what_was_open(
     with monkeypatch.context() as crashing:
         crashing.setattr(os, "getpid", lambda: gone)
         crashed = Bench(qtbot, tmp_path)
-    crashed.desk.start()
+    crashed.session.start()
     crashed.window.open_path(path)
     wait_until(lambda: not crashed.window.parts.runner.active)
     crashed.window.do("view_depth")
-    crashed.desk.save()
+    crashed.session.save()
     again = Bench(qtbot, tmp_path)
-    again.desk.start()
-    again.button("Open again").click()
+    again.session.start()
+    again.button("Restore session").click()
     wait_until(lambda: not again.window.parts.runner.active)
-    assert again.desk.collect() == crashed.desk.collect()
-    again.desk.save()
+    assert again.session.collect() == crashed.session.collect()
+    again.session.save()
     again.window.close()
     later = Bench(qtbot, tmp_path)
-    later.desk.start()
+    later.session.start()
     assert later.window.toasts.shown == ()
     later.window.close()
     crashed.window.close()
@@ -287,12 +286,12 @@ def test_a_series_comes_back_where_it_is_seen(qtbot: QtBot, tmp_path: Path) -> N
     stage = [write_stage(tmp_path, position) for position in (700.0, 725.0, 750.0)]
     part = SeriesPart(rows=tuple((path, None) for path in stage))
     bench = Bench(qtbot, tmp_path)
-    bench.desk.come_back(Session(page="compare", series=part))
+    bench.session.restore(Session(page="compare", series=part))
     wait_until(lambda: not bench.window.parts.runner.active)
     page = bench.window.page_of("compare")
     assert isinstance(page, ComparePage)
     assert page._shows_series
-    found = bench.desk.collect().series
+    found = bench.session.collect().series
     assert found is not None
     assert [path for path, _ in found.rows] == stage
     bench.window.close()
@@ -300,6 +299,6 @@ def test_a_series_comes_back_where_it_is_seen(qtbot: QtBot, tmp_path: Path) -> N
 
 def test_a_result_that_is_gone_is_told(qtbot: QtBot, tmp_path: Path) -> None:
     bench = Bench(qtbot, tmp_path)
-    bench.desk.come_back(LEAF)
+    bench.session.restore(LEAF)
     assert "leaf.zarr is not there any more" in bench.window.toasts.shown[-1].text
     bench.window.close()

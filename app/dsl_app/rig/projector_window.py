@@ -59,7 +59,7 @@ def describe_screen(screen: QScreen) -> str:
 
 
 def mirrors(screen: QScreen) -> list[QScreen]:
-    """Other screens that show some of the same area: patterns must not go where people read."""
+    """Other screens that show some of the same area: patterns must not cover the desktop."""
     return [
         other
         for other in QGuiApplication.screens()
@@ -70,14 +70,14 @@ def mirrors(screen: QScreen) -> list[QScreen]:
 class ProjectorWindow(QWidget):
     """Shows one image on one screen, pixel by pixel, enlarged by a whole factor.
 
-    ``lost`` tells that the screen is gone (the window hides at once and never comes back by itself),
-    ``restored`` that it is there again.
+    ``lost`` tells that the screen was disconnected (the window hides at once and stays hidden), ``restored``
+    that it is connected again.
     """
 
     lost = Signal(str)
     restored = Signal(str)
     #: As `show_pixels`, from any thread.
-    wanted = Signal(object, object)
+    requested = Signal(object, object)
 
     def __init__(self) -> None:
         super().__init__(
@@ -97,7 +97,7 @@ class ProjectorWindow(QWidget):
         self._image: QImage | None = None
         self._buffer: NDArray[np.uint8] | None = None
         self._on_painted: threading.Event | None = None
-        self.wanted.connect(self.show_pixels)
+        self.requested.connect(self.show_pixels)
         application = QGuiApplication.instance()
         assert isinstance(application, QGuiApplication)
         application.screenRemoved.connect(self._screen_removed)
@@ -128,7 +128,7 @@ class ProjectorWindow(QWidget):
         self.setVisible(True)
 
     def disarm(self) -> None:
-        """Leave the screen."""
+        """Release the screen."""
         self._screen_id, self._image = None, None
         self.hide()
 
@@ -139,7 +139,7 @@ class ProjectorWindow(QWidget):
 
     @property
     def lost_screen(self) -> str:
-        """Name of the screen that went away while it was covered; empty once another choice is made."""
+        """Name of the screen that was disconnected while it was covered; empty once another is chosen."""
         screen = self._screen_id
         return screen.name if screen is not None and not self.isVisible() else ""
 
@@ -218,13 +218,14 @@ class ScreenProjector(Projector):
         self.info.require_image(image)
         if self._window.lost_screen:
             raise DeviceError(
-                f"The projector's screen {self._window.lost_screen} is gone. Connect it again and choose it"
-                " on the Rig page."
+                f"The projector's screen {self._window.lost_screen} was disconnected. Connect it again and"
+                " choose it on the Rig page."
             )
         if not self._window.is_armed:
             if self._behind is None:
                 raise DeviceError(
-                    "The projector's screen is not there. Connect it and arm the projector window."
+                    "No projector screen is in use. Connect the projector and choose its screen on the Rig"
+                    " page."
                 )
             self._behind.show(image)
             return
@@ -240,7 +241,7 @@ class ScreenProjector(Projector):
             self._window.repaint()
             return
         painted = threading.Event()
-        self._window.wanted.emit(image, painted)
+        self._window.requested.emit(image, painted)
         if not painted.wait(PAINT_TIMEOUT_S):
             raise DeviceError(
                 "The projector window did not show a pattern in time."
@@ -248,13 +249,13 @@ class ScreenProjector(Projector):
             )
 
     def close(self) -> None:
-        """Leave the screen to others; the window itself belongs to the application."""
+        """Close the projector behind; the window itself belongs to the application."""
         if self._behind is not None:
             self._behind.close()
 
 
 class ScreenLabel(QWidget):
-    """A large name on each screen for a moment, so that people see which is which."""
+    """A large name on each screen for a moment, so that people can tell screens apart."""
 
     def __init__(self, screen: QScreen, text: str) -> None:
         super().__init__(None, Qt.WindowType.ToolTip | Qt.WindowType.WindowStaysOnTopHint)

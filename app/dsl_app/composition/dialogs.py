@@ -1,0 +1,133 @@
+"""Actions that ask in a dialog and open their outcome on a page: import, and reconstruct again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog
+
+from dsl_app.shell.main_window import MainWindow
+
+if TYPE_CHECKING:
+    from dsl_app.importing.controller import ImportController
+    from dsl_app.importing.dialog import ImportDialog
+    from dsl_app.results.again.controller import AgainController
+    from dsl_app.results.again.state import AgainDone
+
+#: Pages that the new result replaces; on other pages it is offered instead.
+REPLACED_PAGES = ("results", "scan")
+
+
+class ImportAction:
+    """Imports a folder of another program: asks which and how, and opens what was made of it."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window = window
+        self._dialog: ImportDialog | None = None
+
+    @cached_property
+    def control(self) -> ImportController:
+        """The controller, made when it is first needed."""
+        from dsl_app.importing.controller import ImportController
+        from dsl_app.importing.state import ImportState
+
+        control = ImportController(ImportState(), self._window.parts.runner, self._window.toasts)
+        control.state.ready.connect(lambda _: self._ask())
+        control.state.done.connect(self._window.open_path)
+        return control
+
+    def begin(self) -> None:
+        """Choose a folder and look at it; the dialog follows."""
+        title = "Import a folder of images or a calibration"
+        name = QFileDialog.getExistingDirectory(self._window, title, str(self._home))
+        if name:
+            self.look(Path(name))
+
+    def look(self, folder: Path) -> None:
+        """Look at a folder that was chosen or dropped; the dialog follows."""
+        self.control.look(folder, self._home)
+
+    @property
+    def _home(self) -> Path:
+        return Path(self._window.parts.settings.output_folder or Path.home() / "dsl-scans")
+
+    def _ask(self) -> None:
+        from dsl_app.importing.dialog import ImportDialog
+
+        if self._dialog is not None:
+            # It follows the state, which is about the other folder now.
+            return
+        self._dialog = dialog = ImportDialog(self.control.state, self.control, self._window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.apply_theme(self._window.theme)
+        dialog.finished.connect(self._forget)
+        dialog.open()
+
+    def _forget(self) -> None:
+        self._dialog = None
+
+
+class ReconstructAgainAction:
+    """Reconstructs the scan of a page again: asks how, and opens the new result next to the old one."""
+
+    def __init__(self, window: MainWindow) -> None:
+        self._window = window
+
+    @cached_property
+    def control(self) -> AgainController:
+        """The controller, made when it is first needed."""
+        from dsl_app.results.again.controller import AgainController
+        from dsl_app.results.again.state import AgainState
+
+        control = AgainController(AgainState(), self._window.parts.runner, self._window.toasts)
+        control.state.ready.connect(lambda _: self._ask())
+        control.state.done.connect(self._show)
+        return control
+
+    def begin(self) -> None:
+        """Look at the scan of the open page, or at one that is chosen; the dialog follows."""
+        window = self._window
+        path = window.page_of(window.page).subject() or self._choose()
+        if path is not None:
+            self.control.prepare(path)
+
+    def _choose(self) -> Path | None:
+        title = "Choose the scan to reconstruct again (NAME.dsl)"
+        name = QFileDialog.getExistingDirectory(
+            self._window, title, self._window.parts.settings.output_folder
+        )
+        return Path(name) if name else None
+
+    def _ask(self) -> None:
+        from dsl_app.results.again.dialog import AgainDialog
+
+        dialog = AgainDialog(self.control.state, self.control, self._window)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+    def _show(self, done: AgainDone) -> None:
+        window, replaces = self._window, self._window.page in REPLACED_PAGES
+        window.page_of("results").open_path(done.result)
+        window.parts.recent.add(done.result)
+        offers: dict[str, Callable[[], object]] = {}
+        if replaces:
+            window.open_page("results")
+        else:
+            offers["Show result"] = lambda: window.open_page("results")
+        text = f"{done.result.name} is open on the Results page."
+        if done.before is not None:
+            before = done.before
+            offers["Compare both"] = lambda: self._compare(before, done.result)
+            text += f" Compare it with {before.name} on the Compare page."
+        window.toasts.offer(text, offers)
+
+    def _compare(self, first: Path, second: Path) -> None:
+        from dsl_app.compare.page import ComparePage
+
+        page = self._window.open_page("compare")
+        assert isinstance(page, ComparePage)
+        page.compare(first, second)

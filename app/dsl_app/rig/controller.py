@@ -1,0 +1,184 @@
+"""What the Rig page decides: the live view, its exposure, and trial pictures. No Qt."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from dsl_app.connection.controller import RigController
+from dsl_app.connection.state import RigState
+from dsl_app.rig.state import FrameCounts, LiveState
+from dsl_app.shared.notify import Notifier
+from dsl_core.capture.auto_exposure import ExposureSearch
+from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import DeviceError, DslError
+from dsl_core.model.frames import Frame
+from dsl_core.patterns.trial_pictures import PictureKind, trial_picture
+from dsl_core.progress import Progress
+
+#: x, y, width, height in pixels of the camera.
+Region = tuple[int, int, int, int]
+NO_CAMERA = "No camera is connected. Connect a rig first."
+#: Lost frames in a row after which a camera counts as lost.
+LOST_AFTER = 3
+#: Shortest time between two live frames, s: a twin would else keep a core busy for nobody.
+LIVE_PERIOD_S = 1 / 30
+#: A frame belongs to the requested exposure if its own differs by less than this share: cameras round.
+SAME_EXPOSURE = 0.02
+
+
+class LiveController:
+    """Shows what the camera of a connected rig sees, and pictures on its projector."""
+
+    def __init__(self, rig: RigController, notifier: Notifier) -> None:
+        self.rig, self.state, self._notifier = rig, LiveState(), notifier
+        self._lock = threading.Lock()
+        self._latest: Frame | None = None
+        self._counts = FrameCounts()
+        self._exposer = AutoExposer(rig.state, self.state, notifier, self.set_exposure)
+        rig.state.devices.follow(lambda _: self.set_exposure(self.state.exposure_ms.value))
+        rig.state.live.changed.connect(self._live_changed)
+
+    # Live view -------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Show frames as they come until `stop`."""
+        devices = self.rig.state.devices.value
+        if devices is None:
+            self._notifier.tell("info", NO_CAMERA)
+        else:
+            self.rig.start_live(lambda progress: self._look(devices, progress))
+
+    def stop(self) -> None:
+        """Stop after the current frame."""
+        self.rig.stop_live()
+
+    def _live_changed(self, is_live: bool) -> None:
+        if not is_live:
+            self._exposer.end()
+
+    def fetch_frame(self) -> None:
+        """Publish the newest frame to the page; called by the window's clock."""
+        with self._lock:
+            frame, self._latest = self._latest, None
+        if frame is not None:
+            self.state.frame.set(frame)
+            self.state.counts.set(self._counts)
+            self._exposer.judge(frame)
+
+    def _look(self, devices: DeviceRig, progress: Progress) -> None:
+        lost, self._counts = 0, FrameCounts()
+        while True:
+            progress.report("live", self._counts.shown, 0)
+            start = time.monotonic()
+            try:
+                devices.camera.configure(self.state.exposure_ms.value)
+                frame = devices.camera.snap()
+            except DeviceError:
+                lost += 1
+                self._counts = replace(self._counts, lost=self._counts.lost + 1)
+                if lost >= LOST_AFTER:
+                    raise
+                continue
+            lost = 0
+            self._post(frame)
+            time.sleep(max(LIVE_PERIOD_S - (time.monotonic() - start), 0))
+
+    def _post(self, frame: Frame) -> None:
+        """Keep a frame for `fetch_frame`; one that was not fetched meanwhile is skipped."""
+        with self._lock:
+            skipped = int(self._latest is not None)
+            self._latest = frame
+        counts = self._counts
+        self._counts = replace(counts, shown=counts.shown + 1 - skipped, skipped=counts.skipped + skipped)
+
+    # Exposure --------------------------------------------------------------------------------------
+
+    def expose_automatically(self, region_px: Region | None) -> None:
+        """Find the exposure that suits a region of the picture; starts the live view if it is off."""
+        if self.rig.state.devices.value is None:
+            self._notifier.tell("info", NO_CAMERA)
+            return
+        self.start()
+        if self.rig.state.live.value:
+            self._exposer.begin(region_px)
+
+    def set_exposure(self, exposure_ms: float) -> None:
+        """Set the exposure of live frames, limited to what the camera can do."""
+        camera = self.rig.state.camera
+        if camera is not None:
+            low, high = camera.exposure_range_ms
+            exposure_ms = min(max(exposure_ms, low), high)
+        self.state.exposure_ms.set(exposure_ms)
+
+    # Projector -------------------------------------------------------------------------------------
+
+    def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
+        """Project a trial picture, unless it would spoil frames; the live view continues meanwhile."""
+        user, devices = self.rig.state.used_by.value, self.rig.state.devices.value
+        if user:
+            self._notifier.tell("info", f"{user} is using the projector. Wait until it ends, or cancel it.")
+            return
+        if devices is None:
+            self._notifier.tell("info", "No projector is connected. Connect a rig first.")
+            return
+        info = devices.projector.info
+        try:
+            picture = trial_picture(kind, (info.width_px, info.height_px), level, column_px)
+            devices.projector.show(picture)
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+
+
+class AutoExposer:
+    """Sets the live exposure by what live frames show; idle until `begin`, then `judge` gets every frame."""
+
+    def __init__(
+        self, rig: RigState, state: LiveState, notifier: Notifier, set_exposure: Callable[[float], None]
+    ) -> None:
+        self._rig, self._state, self._notifier, self._set = rig, state, notifier, set_exposure
+        self._search: ExposureSearch | None = None
+        self._region: Region | None = None
+
+    def begin(self, region: Region | None) -> None:
+        """Search for the exposure that suits a region, or the whole picture."""
+        devices = self._rig.devices.value
+        if devices is None:
+            return
+        info, known = devices.camera.info, devices.calibration
+        self._region = region
+        self._search = search = ExposureSearch(
+            info.exposure_range_ms,
+            2**info.bit_depth - 1,
+            self._rig.cycle_ms,
+            0.0 if known is None else known.sensor.black_level_dn,
+        )
+        self._state.is_exposing.set(True)
+        self._set(search.start_from(self._state.exposure_ms.value))
+
+    def judge(self, frame: Frame) -> None:
+        """Take a frame into account, unless it was exposed before the exposure was changed."""
+        search, asked_ms = self._search, self._state.exposure_ms.value
+        if search is None or abs(frame.exposure_ms - asked_ms) > SAME_EXPOSURE * asked_ms:
+            return
+        pixels = frame.pixels
+        if self._region is not None:
+            x, y, width, height = self._region
+            pixels = pixels[y : y + height, x : x + width]
+        # The number box rounds: the search continues from the exposure that was requested.
+        following_ms = search.judge(pixels, asked_ms)
+        if not search.is_over:
+            self._set(following_ms)
+            return
+        self.end()
+        if search.trouble:
+            self._notifier.tell("warning", search.trouble)
+        else:
+            self._notifier.tell("info", f"Exposed for {asked_ms:.4g} ms.")
+
+    def end(self) -> None:
+        """Stop the search."""
+        self._search = None
+        self._state.is_exposing.set(False)

@@ -1,0 +1,111 @@
+"""What the camera shows live, and what the Rig page makes of it: its labels and which buttons work. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from dsl_app.connection.state import Link, RigState
+from dsl_app.shared.evented import Value
+
+if TYPE_CHECKING:
+    # The window comes up before numpy.
+    from dsl_core.devices.base import CameraInfo, ProjectorInfo
+    from dsl_core.model.frames import Frame
+
+_LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
+
+
+@dataclass(frozen=True)
+class FrameCounts:
+    """Live frames so far: shown, lost on the way from the camera, and skipped because the window was busy."""
+
+    shown: int = 0
+    lost: int = 0
+    skipped: int = 0
+
+
+class LiveState:
+    """Values of the live view: the latest frame, its exposure, and whether an exposure is being searched."""
+
+    def __init__(self) -> None:
+        self.frame: Value[Frame | None] = Value(None)
+        self.exposure_ms = Value(1000.0 / 6.0)
+        self.counts = Value(FrameCounts())
+        self.is_exposing = Value(False)
+
+
+@dataclass(frozen=True)
+class RigView:
+    """What the Rig page shows of devices and live view, besides the picture."""
+
+    link: str
+    link_role: str
+    trouble: str
+    camera: str
+    projector: str
+    connect: str
+    can_connect: bool
+    #: Whether buttons that need devices work.
+    has_devices: bool
+    live: str
+    can_expose: bool
+    cycles: str
+
+
+def rig_view(rig: RigState, live: LiveState) -> RigView:
+    """Texts and buttons of the Rig page for what is known now."""
+    link, has_devices = rig.link.value, rig.devices.value is not None
+    return RigView(
+        link=f"● {link.value}",
+        link_role=_LINK_ROLES[link],
+        trouble=rig.trouble.value,
+        camera=_describe(rig.camera),
+        projector=_describe(rig.projector),
+        connect="Disconnect" if link is Link.OPEN else "Connect",
+        can_connect=link is not Link.OPENING,
+        has_devices=has_devices,
+        live="Stop live view" if rig.live.value else "Start live view",
+        can_expose=has_devices and not live.is_exposing.value,
+        cycles=cycles_text(live.exposure_ms.value, rig.cycle_ms),
+    )
+
+
+def _describe(info: CameraInfo | ProjectorInfo | None) -> str:
+    return "–" if info is None else f"{info.model}\n{info.width_px} × {info.height_px} px"
+
+
+def cycles_text(exposure_ms: float, cycle_ms: float | None) -> str:
+    """How many LED cycles an exposure holds, and what is wrong with a part of one.
+
+    >>> cycles_text(50.0, 1000 / 60)
+    '3 LED cycles'
+    """
+    if not cycle_ms:
+        return ""
+    cycles = exposure_ms / cycle_ms
+    whole = round(cycles)
+    # The box rounds to a hundredth of a millisecond.
+    if whole and abs(exposure_ms - whole * cycle_ms) < 0.006:
+        return f"{whole} LED cycle{'' if whole == 1 else 's'}"
+    return f"{cycles:.2f} LED cycles: colours vary"
+
+
+@dataclass(frozen=True)
+class PanelView:
+    """What the projector panel lets one do, and the note below it."""
+
+    can_show: bool
+    can_choose_screen: bool
+    note: str
+
+
+def panel_view(info: ProjectorInfo | None, user: str) -> PanelView:
+    """The panel for a projector (None: not connected) that a job of this title uses (empty: none)."""
+    if user:
+        note = f"{user} is using the projector. Pictures can be shown when it has ended."
+    elif info is None:
+        note = "No projector is connected. Connect a rig to show pictures."
+    else:
+        note = f"{info.model}, {info.width_px} × {info.height_px} logical pixels"
+    return PanelView(info is not None and not user, not user, note)

@@ -1,0 +1,179 @@
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from dsl_app.connection.controller import RIG, RigController
+from dsl_app.connection.state import Link, RigChoice, RigState
+from dsl_app.rig.controller import LOST_AFTER, LiveController
+from dsl_app.rig.state import FrameCounts
+from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from pytestqt.qtbot import QtBot
+
+from dsl_core.errors import DeviceError
+from dsl_core.model.frames import Frame
+from dsl_core.patterns.trial_pictures import PictureKind
+from dsl_core.simulation.sim_devices import SimCamera
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
+
+Start = Callable[[], tuple[LiveController, RecordingNotifier, QtRunner]]
+TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
+
+
+def controller(runner: object = None) -> tuple[LiveController, RecordingNotifier]:
+    notifier = RecordingNotifier()
+    rig = RigController(RigState(TWIN), runner or InlineRunner(), notifier)  # type: ignore[arg-type]
+    return LiveController(rig, notifier), notifier
+
+
+def test_what_is_shown_reaches_the_camera() -> None:
+    live, _ = controller()
+    live.rig.connect(TWIN)
+    devices = live.rig.state.devices.value
+    assert devices is not None
+    means = []
+    kinds: tuple[PictureKind, ...] = ("black", "white")
+    for kind in kinds:
+        live.show(kind)
+        means.append(float(devices.camera.snap().pixels.mean()))
+    assert means[1] > means[0] + 50
+
+
+def test_the_exposure_stays_within_the_camera() -> None:
+    live, _ = controller()
+    live.set_exposure(1e9)
+    assert live.state.exposure_ms.value == 1e9
+    live.rig.connect(TWIN)
+    assert live.state.exposure_ms.value == 30_000.0
+    live.set_exposure(1e9)
+    assert live.state.exposure_ms.value == 30_000.0
+
+
+def test_showing_without_a_rig_says_what_to_do() -> None:
+    live, notifier = controller()
+    live.show("white")
+    live.start()
+    live.expose_automatically(None)
+    assert all("Connect a rig first" in text for _, text in notifier.told)
+    assert len(notifier.told) == 3
+
+
+@pytest.fixture
+def start(qtbot: QtBot) -> Start:
+    def begin() -> tuple[LiveController, RecordingNotifier, QtRunner]:
+        runner = QtRunner()
+        live, notifier = controller(runner)
+        live.rig.connect(TWIN)
+        qtbot.waitUntil(lambda: live.rig.state.link.value is Link.OPEN, timeout=60_000)
+        live.start()
+        return live, notifier, runner
+
+    return begin
+
+
+def test_live_frames_arrive_until_the_view_stops(qtbot: QtBot, start: Start) -> None:
+    live, _, runner = start()
+    frames: list[Frame | None] = []
+    live.state.frame.changed.connect(frames.append)
+
+    def seen() -> bool:
+        live.fetch_frame()
+        return len(frames) >= 3
+
+    qtbot.waitUntil(seen)
+    live.stop()
+    qtbot.waitUntil(lambda: not live.rig.state.live.value)
+    assert isinstance(frames[0], Frame)
+    assert frames[0].pixels.dtype == np.uint16
+    runner.shut_down()
+
+
+def test_a_camera_that_goes_silent_is_lost_and_told(
+    qtbot: QtBot, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def silent(self: SimCamera, timeout_ms: float = 0.0) -> Frame:
+        time.sleep(0.001)
+        raise DeviceError("The camera sent no frame. Check its cable.")
+
+    monkeypatch.setattr(SimCamera, "snap", silent)
+    live, notifier, runner = start()
+    qtbot.waitUntil(lambda: live.rig.state.link.value is Link.LOST)
+    assert live._counts.lost == LOST_AFTER
+    assert "Check its cable" in notifier.told[-1][1]
+    assert not live.rig.state.live.value
+    runner.shut_down()
+
+
+def test_one_click_exposes_for_whole_cycles_of_what_the_camera_sees(qtbot: QtBot, start: Start) -> None:
+    live, notifier, _ = start()
+    live.show("white", 0.3)
+    live.set_exposure(900.0)
+    live.expose_automatically((8, 8, 40, 30))
+    state = live.state
+    assert state.is_exposing.value
+
+    def is_done() -> bool:
+        live.fetch_frame()
+        return not state.is_exposing.value
+
+    qtbot.waitUntil(is_done, timeout=20_000)
+    cycle_ms, frame = live.rig.state.cycle_ms, state.frame.value
+    assert cycle_ms is not None
+    assert frame is not None
+    cycles = state.exposure_ms.value / cycle_ms
+    assert cycles == pytest.approx(round(cycles), abs=1e-6)
+    assert notifier.told[-1][1].startswith("Exposed for")
+    part = frame.pixels[8:38, 8:48]
+    assert np.quantile(part, 0.99) < 4095
+    live.stop()
+
+
+def test_a_search_for_the_exposure_ends_with_the_live_view(qtbot: QtBot, start: Start) -> None:
+    live, _, runner = start()
+    live.expose_automatically(None)
+    assert live.state.is_exposing.value
+    live.stop()
+    qtbot.waitUntil(lambda: not live.state.is_exposing.value)
+    runner.shut_down()
+
+
+def test_frames_that_were_not_fetched_are_counted_as_skipped() -> None:
+    live, _ = controller()
+    for number in range(3):
+        live._post(Frame(np.zeros((4, 4), np.uint16), 10.0, frame_id=number))
+    live.fetch_frame()
+    assert live.state.counts.value == FrameCounts(shown=1, lost=0, skipped=2)
+    frame = live.state.frame.value
+    assert frame is not None
+    assert frame.frame_id == 2
+
+
+def test_no_picture_reaches_the_projector_while_a_job_has_the_rig(qtbot: QtBot) -> None:
+    runner, gate = QtRunner(), threading.Event()
+    live, notifier = controller(runner)
+    rig = live.rig
+    rig.connect(TWIN)
+    qtbot.waitUntil(lambda: rig.state.link.value is Link.OPEN, timeout=60_000)
+    devices = rig.state.devices.value
+    assert devices is not None
+    world = devices.camera.world  # type: ignore[attr-defined]
+    live.show("black")
+    before = world.image
+    rig.run(Job("Scan first", lambda progress: gate.wait(60), exclusive=RIG))
+    assert rig.state.used_by.value == "Scan first"
+    live.show("white")
+    assert world.image is before
+    assert notifier.told[-1] == (
+        "info",
+        "Scan first is using the projector. Wait until it ends, or cancel it.",
+    )
+    gate.set()
+    qtbot.waitUntil(lambda: runner.active == ())
+    assert rig.state.used_by.value == ""
+    live.show("white")
+    assert world.image is not before
+    runner.shut_down()
