@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.geometry.projector_corners import PoseObservation
 from dsl_core.campaign.geometry.board_poses import BoardPose, outline_mm
 from dsl_core.model.board import Checkerboard
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -19,6 +20,16 @@ from dsl_core.simulation.world import World
 
 BOARD = Checkerboard(columns=11, rows=7, square_mm=20.0)
 PROJECTOR_PX = (640, 360)
+#: A pose that is tilted about both axes.
+TILTED = {
+    "x_mm": 12.0,
+    "y_mm": 3.0,
+    "depth_mm": 660.0,
+    "tilt_x_deg": 18.0,
+    "tilt_y_deg": -14.0,
+    "roll_deg": 5.0,
+}
+TILTED_SIZE_PX = (222, 145)
 
 
 def frames_of(
@@ -48,3 +59,11 @@ def true_corners(
     there = rig.pose.matrix @ points + rig.pose.vector_mm[:, None]
     camera = project(rig.camera.resized(*size_px), *points)
     return np.stack(camera, 1), np.stack(project(rig.projector, *there), 1)
+
+
+def tilted_errors(seen: PoseObservation) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of corners of the tilted pose in the camera, and of the code at the places where it was read."""
+    camera, projector = true_corners(TILTED, TILTED_SIZE_PX)
+    nearest = np.linalg.norm(camera[:, None] - seen.camera_px, axis=2).argmin(0)
+    off = seen.camera_px - camera[nearest]
+    return off, seen.projector_px - projector[nearest] - np.einsum("nij,nj->ni", seen.slopes, off)

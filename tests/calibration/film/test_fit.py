@@ -1,0 +1,58 @@
+"""The film follows from columns of its first orders: exact, noisy, or wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.film.fit import COMMON_PX, FIELDS, fit_film, grating_columns
+from dsl_core.errors import CalibrationError
+from dsl_core.model.rig import Film
+from tests.cases.film_samples import (
+    NOISE_PX,
+    mounted,
+    samples_of,
+    small_rig,
+)
+
+
+def test_exact_columns_give_the_exact_film() -> None:
+    rig = small_rig()
+    found = fit_film(mounted(rig), samples_of(rig, 0.0), Film()).film
+    # The mounting's prior pulls by less than a thousandth of a pixel.
+    samples = samples_of(rig, 0.0)
+    again = grating_columns(rig.model_copy(update={"film": found}), samples)
+    assert np.abs(again - samples.column_px).max() < 1e-3
+    assert found.lines_per_mm == pytest.approx(487.0, abs=0.01)
+    assert found.roll_deg == pytest.approx(0.2, abs=0.005)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_stated_deviations_cover_the_film(seed: int) -> None:
+    rig = small_rig()
+    samples = samples_of(rig, NOISE_PX, seed=seed)
+    draw, off = np.random.default_rng(100 + seed), np.zeros(len(samples))
+    for name, order in np.ndindex(samples.filter.max() + 1, 2):
+        mine = (samples.filter == name) & (samples.order == 2 * order - 1)
+        across = samples.pixel % rig.camera.width_px / rig.camera.width_px
+        off += mine * COMMON_PX * (draw.normal() + draw.normal() * np.sqrt(12) * (across - 0.5))
+    fit = fit_film(mounted(rig), replace(samples, column_px=samples.column_px + off), Film())
+    errors = np.array([getattr(fit.film, name) - getattr(rig.film, name) for name in FIELDS])
+    whitened = errors @ np.linalg.inv(fit.covariance) @ errors
+    assert 0.3 < whitened < 20  # chi-square of six numbers
+
+
+def test_a_fifth_of_wrong_samples_does_no_harm() -> None:
+    rig, samples = small_rig(), samples_of(small_rig(), NOISE_PX)
+    samples.column_px[::5] += 15.0
+    found = rig.model_copy(update={"film": fit_film(mounted(rig), samples, Film()).film})
+    off = grating_columns(found, samples) - grating_columns(rig, samples)
+    assert np.sqrt(np.mean(off**2)) < 0.02
+
+
+def test_too_few_samples_are_refused() -> None:
+    samples = samples_of(small_rig(), NOISE_PX)
+    with pytest.raises(CalibrationError, match="found in only 50 tiles"):
+        fit_film(small_rig(), samples.only(np.arange(len(samples)) < 50), Film())

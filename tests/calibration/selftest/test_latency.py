@@ -1,0 +1,54 @@
+"""The shortest safe wait, stale frames and dead projectors from readings with known truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.selftest.latency import check_latency
+from dsl_core.calibration.selftest.readings import Readings
+from dsl_core.errors import DeviceError
+from tests.cases.cycle_readings import table
+
+BLACK_DN = 260.0
+
+
+def latency_readings(late_ms: float, waits: list[float], stale: tuple[int, ...] = ()) -> Readings:
+    """Three trials of black and light at each wait, exposures of 10 ms, ``show`` takes 25 ms."""
+    rows = [(0, 1000.0, k) for k in range(3)] + [(1, 1000.0, k) for k in range(3)]
+    rows += [(lit, wait, k) for wait in waits for _ in range(3) for lit in (0, 1) for k in (0, 1)]
+    drive, gap, since = (np.array(each) for each in zip(*rows, strict=True))
+    asked = np.where((since == 0) & (np.arange(len(rows)) >= 6), gap, 0.0)
+    open_ms = np.where(
+        since == 0, np.clip((late_ms - asked) / 10, 0, 1), np.clip((late_ms - asked) / 10 - 1, 0, 1)
+    )
+    open_ms[:6] = 0
+    open_ms[list(stale)] = 1
+    share = np.where(drive > 0, 1 - open_ms, open_ms)
+    step = 10 + asked + np.where(since == 0, 25.0, 0.0) + 1.0
+    readings = table(
+        np.full(len(rows), 10.0), 260 + 1000 * share[:, None] * np.ones(3), np.cumsum(step) / 1000, asked
+    )
+    return replace(readings, since_show=since.astype(np.int64), drive=np.repeat(drive[:, None] * 200, 3, 1))
+
+
+def test_latency_is_the_shortest_wait_that_never_fails() -> None:
+    found = check_latency(latency_readings(0.0, [400, 100, 25, 0]), 25.0, True, 0.0)
+    assert (found.wait_ms.value, found.stale_frames, found.checked) == (0.0, 0, 26)
+    assert found.blocking_ms.value == pytest.approx(25.0, abs=0.1)
+    found = check_latency(latency_readings(40.0, [400, 100, 50, 45, 25]), 25.0, False, 0.012)
+    assert found.wait_ms.value == 45.0
+    assert found.wait_ms.std == pytest.approx(20 / np.sqrt(12), rel=0.05)
+    assert found.blocking_ms.value == pytest.approx(12.0)
+
+
+def test_a_stale_frame_is_counted_and_a_dead_projector_named() -> None:
+    found = check_latency(latency_readings(0.0, [400, 100, 0], stale=(8,)), 25.0, True, 0.0)
+    assert (found.stale_frames, found.wait_ms.value) == (1, 0.0)
+    with pytest.raises(DeviceError, match="400 ms after"):
+        check_latency(latency_readings(420.0, [400, 100]), 25.0, True, 0.0)
+    dark = latency_readings(0.0, [400])
+    with pytest.raises(DeviceError, match="no difference between black and white"):
+        check_latency(replace(dark, mean_dn=np.full_like(dark.mean_dn, 260.0)), 25.0, True, 0.0)
