@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from dsl_core.devices.replay import replay_rig
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
+from dsl_core.simulation.published_rig import published_rig
 
 PLAN = CapturePlan(
     camera_size_px=(64, 48),
@@ -67,6 +69,19 @@ def test_fading_and_motion_are_found(change: Change, brightness_ratio: float) ->
     assert not report.is_stable
     assert report.brightness_ratio == pytest.approx(brightness_ratio, abs=0.01)
     assert "Start a new scan" in report.message
+
+
+def test_the_black_level_is_no_light() -> None:
+    """A tenth of the light is a tenth of what is above black, however high that is."""
+    black = 260.0
+
+    def above(light: float) -> Change:
+        return lambda scene: light * scene + black
+
+    rig = replace(_rig(above(0.9)), calibration=published_rig())
+    assert published_rig().sensor.black_level_dn == black
+    report = check_drift(rig, _scan(1, above(1.0)), pick_reference_shots(PLAN.shots()), pattern_image)
+    assert report.brightness_ratio == pytest.approx(0.9, abs=0.005)
 
 
 def test_without_shots_there_is_nothing_to_compare() -> None:

@@ -11,8 +11,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import bayer_channels
 
 #: Limits: scatter of blocks in the middle (%), tilt (degrees).
-UNEVEN, TILT_DEG = 1.0, 15.0
-LOOK_UNEVEN = 25.0
+UNEVEN_PERCENT, MAX_TILT_DEG = 1.0, 15.0
+LOOK_UNEVEN_PERCENT = 25.0
 _LEDS = ("red", "green", "blue")
 
 
@@ -29,7 +29,7 @@ def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
         name="unevenness of the middle",
         value=100 * spread,
         unit="%",
-        high=LOOK_UNEVEN,
+        high=LOOK_UNEVEN_PERCENT,
         advice="Let the Spectralon alone fill the middle half of the picture; keep shadows off.",
     )
 
@@ -96,14 +96,14 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             name="tilt of the Spectralon",
             value=record.plane.tilt_deg,
             unit="degrees",
-            high=TILT_DEG,
+            high=MAX_TILT_DEG,
             advice="Turn the Spectralon to face the camera.",
         ),
         Figure(
             name="unevenness about the smooth part",
             value=100 * record.unevenness,
             unit="%",
-            high=UNEVEN,
+            high=UNEVEN_PERCENT,
             advice="Clean the Spectralon and keep shadows and reflections off.",
         ),
         Figure(

@@ -14,6 +14,7 @@ from dsl_core.calibration.orders.efficiency import (
     EfficiencyFit,
     RatioSample,
     fit_efficiency,
+    second_order_curve,
     second_order_share,
 )
 from dsl_core.calibration.orders.filter_check import PlacedFilter, effective_nm, found_wavelengths, verdict
@@ -109,7 +110,7 @@ def fit_bandpass(
     efficiency = {order: fit.curve for order, fit in fits.items()}
     if np.isfinite(share_std):
         for order in FIRST:
-            efficiency[2 * order] = _scaled(fits[order].curve, share, share_std)
+            efficiency[2 * order] = second_order_curve(fits[order].curve, share, share_std)
     return BandpassCalibration(
         filters=tuple(
             _sample(each, place, where) for each, place, where in zip(filters, placed, found, strict=True)
@@ -198,12 +199,6 @@ def _second(
         for c in range(3)
         if np.isfinite(seen.std[c]) and light[c].sum() > 0
     ]
-
-
-def _scaled(curve: SpectralCurve, share: float, share_std: float) -> SpectralCurve:
-    values = np.array(curve.values)
-    std = np.hypot(share * np.array(curve.std), share_std * values)
-    return SpectralCurve.of(curve.wavelengths_nm, share * values, std=std)
 
 
 def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Floats]:

@@ -110,3 +110,10 @@ def second_order_share(
     mean = float((weight * share).sum() / weight.sum())
     chi = float((weight * (share - mean) ** 2).sum()) / max(len(used) - 1, 1)
     return max(mean, 0.0), float(np.sqrt(max(chi, 1.0) / weight.sum()))
+
+
+def second_order_curve(first: SpectralCurve, share: float, share_std: float) -> SpectralCurve:
+    """Efficiency of a second order that is a share of the first, with the deviations of both."""
+    values = np.array(first.values)
+    std = np.hypot(share * np.array(first.std), share_std * values)
+    return SpectralCurve.of(first.wavelengths_nm, share * values, std=std)

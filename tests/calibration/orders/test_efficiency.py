@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.orders.efficiency import RatioSample, fit_efficiency, second_order_share
+from dsl_core.calibration.orders.efficiency import (
+    RatioSample,
+    fit_efficiency,
+    second_order_curve,
+    second_order_share,
+)
 from dsl_core.errors import CalibrationError
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.simulation.published_rig import published_rig
 
@@ -62,3 +68,37 @@ def test_second_orders_are_a_share_of_the_first_and_may_be_unknown() -> None:
     assert share == pytest.approx(0.0416, abs=3e-3)
     assert 5e-4 < std < 4e-3
     assert second_order_share([(np.nan, np.inf, 0.1)]) == (0.0, np.inf)
+
+
+def test_the_deviation_of_the_second_order_is_that_of_a_weighted_mean() -> None:
+    shares = np.array([0.04, 0.05, 0.042])
+    first, std = np.array([0.1, 0.2, 0.15]), np.array([2e-4, 3e-4, 5e-4])
+    weight = (first / std) ** 2
+    mean = (weight * shares).sum() / weight.sum()
+    share, share_std = second_order_share(list(zip(shares * first, std, first, strict=True)))
+    assert share == pytest.approx(mean)
+    # These scatter far beyond their noise, which widens the deviation by as much.
+    chi = (weight * (shares - mean) ** 2).sum() / 2
+    assert chi > 5
+    assert share_std == pytest.approx(np.sqrt(chi / weight.sum()))
+    alike, alike_std = second_order_share([(0.004, 2e-4, 0.1)] * 4)
+    assert (alike, alike_std) == (pytest.approx(0.04), pytest.approx(1e-3))
+
+
+def test_deviations_of_the_second_order_cover_the_share() -> None:
+    rng, sigmas = np.random.default_rng(0), []
+    for _ in range(200):
+        first = rng.uniform(0.08, 0.12, 12)
+        noisy = [(0.05 * f + 3e-4 * rng.normal(), 3e-4, f) for f in first]
+        share, std = second_order_share(noisy)
+        sigmas.append((share - 0.05) / std)
+    assert 0.75 < np.std(sigmas) < 1.05
+
+
+def test_a_second_order_has_the_deviations_of_the_first_and_of_its_share() -> None:
+    first = SpectralCurve.of([450.0, 550.0, 650.0], [0.1, 0.2, 0.05], std=[0.003, 0.001, 0.0])
+    second = second_order_curve(first, 0.04, 0.005)
+    assert second.values == pytest.approx([0.004, 0.008, 0.002])
+    assert second.std is not None
+    expected = [np.hypot(0.04 * 0.003, 0.005 * 0.1), np.hypot(0.04 * 0.001, 0.005 * 0.2), 0.005 * 0.05]
+    assert second.std == pytest.approx(expected)

@@ -7,8 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.selftest.camera import Dark, Transfer, check_camera, count_hot_pixels
-from dsl_core.calibration.selftest.readings import RegionSizes
+from dsl_core.calibration.selftest.camera import (
+    Dark,
+    Transfer,
+    check_camera,
+    count_hot_pixels,
+    fit_dark,
+    fit_transfer,
+)
+from dsl_core.calibration.selftest.readings import Readings, RegionSizes
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.selftest import Measured
 from tests.cases.cycle_readings import table
@@ -44,3 +51,72 @@ def test_exposures_that_clip_bend_no_line() -> None:
     assert (found.useful_dn, found.saturation_dn.value) == (BLACK_DN + 3000, 4000.0)
     with pytest.raises(CalibrationError, match="red channel clips at all but 4 exposures"):
         check_camera(dark, transfer, series[np.array([0, 1, 2, 3, 10, 11])], end, (0, 100), sizes)
+
+
+def dark_readings(level_dn: tuple[float, float, float], rate: float, beside: float) -> Readings:
+    """Eight pairs at 1 ms and 101 ms; read noise of 2 DN."""
+    exposure = np.repeat([1.0, 101.0], 8)
+    readings = table(exposure, np.array(level_dn) + rate * exposure[:, None] * np.ones(3))
+    return replace(
+        readings,
+        beside_dn=np.array(level_dn) + beside * exposure[:, None],
+        pair_variance_dn2=np.full((16, 3), 4.0),
+        is_pair=np.arange(16) % 2 == 1,
+    )
+
+
+SIZES = RegionSizes(np.array([1000, 2000, 1000]), np.array([500, 1000, 500]), 12)
+
+
+def test_the_black_level_is_that_of_no_exposure() -> None:
+    found = fit_dark(dark_readings((BLACK_DN,) * 3, 0.3, 0.1), SIZES)
+    assert found.level_dn.value == pytest.approx(BLACK_DN)
+    assert found.rate == pytest.approx([0.3] * 3)
+    assert found.beside_rate == pytest.approx([0.1] * 3)
+    # Noise of 2 DN over 4000 pixels and eight frames; of a rate, over eight frames at either end of 100 ms.
+    assert found.level_dn.std == pytest.approx(2 / np.sqrt(4000 * 8))
+    assert found.rate_std[1] == pytest.approx(2 * np.sqrt(2 / 8 / 2000) / 100)
+    assert found.beside_std[0] == pytest.approx(2 * np.sqrt(2 / 8 / 500) / 100)
+
+
+def test_channels_that_differ_leave_the_black_level_uncertain() -> None:
+    found = fit_dark(dark_readings((BLACK_DN - 1, BLACK_DN, BLACK_DN + 1), 0.0, 0.0), SIZES)
+    assert found.level_dn.value == pytest.approx(BLACK_DN)
+    assert found.level_dn.std == pytest.approx(0.5, abs=0.01)
+
+
+def pairs(electrons_per_dn: float, read_noise_dn: float) -> Readings:
+    """Variances of pairs at twelve signals, with the scatter that so many pixels give."""
+    rng = np.random.default_rng(0)
+    signal = np.linspace(0, 3000, 12)[:, None] * np.ones(3)
+    variance = read_noise_dn**2 + 1 / 12 + signal / electrons_per_dn
+    variance = variance * (1 + np.sqrt(2 / SIZES.pixels) * rng.standard_normal(variance.shape))
+    readings = table(np.ones(12), BLACK_DN + signal)
+    return replace(readings, pair_variance_dn2=variance, is_pair=np.ones(12, bool))
+
+
+def test_gain_and_read_noise_are_the_line_of_photon_transfer() -> None:
+    found = fit_transfer(pairs(10.0, 2.0), BLACK_DN, SIZES)
+    assert found.electrons_per_dn.value == pytest.approx(10.0, abs=4 * found.electrons_per_dn.std)
+    assert found.electrons_per_dn.std < 0.2
+    assert found.read_noise_dn.value == pytest.approx(2.0, abs=4 * found.read_noise_dn.std)
+    assert found.read_noise_dn.std < 0.05
+    mean_std = found.mean_std(np.array([1000.0]), np.array([400]))
+    assert mean_std == pytest.approx(np.sqrt((4 + 1 / 12 + 100) / 400), rel=0.03)
+
+
+def test_frames_that_are_no_pairs_or_clip_do_not_count() -> None:
+    readings = pairs(10.0, 2.0)
+    wrong = readings.pair_variance_dn2.copy()
+    wrong[3], wrong[5, 1] = 0.0, 1e4
+    clipped = readings.clipped.copy()
+    clipped[5, 1] = 0.01
+    spoilt = replace(readings, pair_variance_dn2=wrong, clipped=clipped, is_pair=np.arange(12) != 3)
+    found = fit_transfer(spoilt, BLACK_DN, SIZES)
+    assert found.electrons_per_dn.value == pytest.approx(10.0, abs=0.5)
+
+
+def test_noise_that_does_not_grow_with_light_is_refused() -> None:
+    readings = replace(pairs(10.0, 2.0), pair_variance_dn2=np.full((12, 3), 4.0))
+    with pytest.raises(CalibrationError, match="no raw photon counts"):
+        fit_transfer(readings, BLACK_DN, SIZES)

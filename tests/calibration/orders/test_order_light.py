@@ -1,0 +1,89 @@
+"""The light of each order comes out of scan lines through a filter, relative to the zero order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.calibration.orders.order_light import FilterLight, filter_light
+from dsl_core.calibration.orders.order_place import PlanePixels
+from dsl_core.model.plan import ScanLines
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.light_path import zero_order_profile
+
+FRAME_PX, LINES = 640, ScanLines(width_px=5, step_px=5)
+RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=20.0)
+#: Light of each order over the zero order's, and its distance from it.
+RATIO = {1: 0.11, -1: 0.07, 2: 0.006, -2: 0.004}
+AT_PX = {1: 180.0, -1: -180.0, 2: 372.0, -2: -372.0}
+DARK, NOISE = 0.05, 0.01
+
+
+def seen(moved_px: float = 0.0, saturated: int = 0, uneven: float = 0.0) -> FilterLight:
+    """White pixels all over the image, a Gaussian of 3 px for each order; amplitudes differ by colour.
+
+    ``uneven`` is by which share orders are brighter or darker in every other cell of the image.
+    """
+    rng = np.random.default_rng(0)
+    down, across = np.meshgrid(np.linspace(0.01, 0.99, 40), np.linspace(0.01, 0.99, 100), indexing="ij")
+    place = np.stack([down.ravel(), across.ravel()])
+    column = 10 + 620 * place[1]
+    colour = np.arange(len(column)) % 3
+    amplitude = np.array([8.0, 10.0, 6.0])[colour]
+    centres = 2.0 + 5.0 * np.arange(128)[:, None]
+    distance = centres - column
+    light = zero_order_profile(torch.as_tensor(moved_px - distance), -2.5, 2.5, RESPONSE).numpy()
+    for order, ratio in RATIO.items():
+        bell = np.exp(-0.5 * ((distance - AT_PX[order] - 6 * (place[1] - 0.5)) / 3.0) ** 2)
+        cell = (4 * place[0]).astype(int) + (6 * place[1]).astype(int)
+        light = light + ratio * (1 + uneven * (-1) ** cell) * LINES.step_px * bell / (
+            3.0 * np.sqrt(2 * np.pi)
+        )
+    radiance = amplitude * light + DARK + NOISE * rng.standard_normal(light.shape)
+    std = np.full(light.shape, NOISE)
+    std[60, :saturated] = np.inf
+    whole = {order: np.ones(len(column), bool) for order in RATIO}
+    pixels = PlanePixels(column, np.full(len(column), 2.0), colour, place, whole)
+    return filter_light(LINES, pixels, radiance, std, RESPONSE, (120.0, 320.0), (60.0, 110.0), FRAME_PX)
+
+
+@pytest.fixture(scope="module")
+def found() -> FilterLight:
+    return seen()
+
+
+@pytest.mark.parametrize("order", RATIO)
+def test_every_order_is_measured_within_its_deviation(found: FilterLight, order: int) -> None:
+    light = found.orders[order]
+    # The lines tile the frame, so that the sum over lines is that of all light: five columns a line.
+    assert light.ratio == pytest.approx(RATIO[order], abs=1e-3)
+    assert np.all(np.abs(light.ratio - RATIO[order]) < 5 * light.std + 2e-4)
+    assert np.all(light.std < 1e-3)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_first_orders_are_found_where_they_are(found: FilterLight, order: int) -> None:
+    light = found.orders[order]
+    assert abs(light.offset_px - AT_PX[order]) < 3 * light.offset_std_px
+    assert light.width_px == pytest.approx(3.0, abs=0.7)
+    assert light.share > 0.9
+
+
+def test_the_zero_order_is_that_at_unit_shading(found: FilterLight) -> None:
+    assert found.zero == pytest.approx([4.0, 5.0, 3.0], rel=2e-3)
+    assert np.all(found.zero_std < 0.02)
+    assert abs(found.shift_px[0]) < 3 * found.shift_px[1]
+    assert found.saturated == 0
+
+
+def test_a_zero_order_that_moved_and_saturated_pixels_are_told() -> None:
+    moved = seen(moved_px=0.3, saturated=400)
+    assert moved.shift_px[0] == pytest.approx(0.3, abs=0.05)
+    assert moved.saturated == pytest.approx(0.1, abs=0.01)
+
+
+def test_cells_that_differ_widen_the_deviation() -> None:
+    light = seen(uneven=0.1).orders[1]
+    # Every cell is a tenth off; those whose light comes from beside the frame are missing.
+    assert light.std == pytest.approx(0.1 * RATIO[1] / np.sqrt(15), rel=0.25)
