@@ -36,14 +36,17 @@ def passband(rig: Rig, filter_nm: float, order: int) -> Passband:
 
 
 def line_frames(
-    rig: Rig, plane: Plane, filter_nm: float, seed: int = 0, really_nm: float | None = None
+    rig: Rig, plane: Plane, filter_nm: float, seed: int = 0, really_nm: float | None = None, skip: int = 1
 ) -> LineFrames:
     """What a camera sees of the first orders, with noise and a dark signal; no zero order.
 
-    ``really_nm`` is where the filter in the beam passes, if it is another one.
+    ``really_nm`` is where the filter in the beam passes, if it is another one; of ``skip`` pairs of rows one
+    is seen.
     """
     rng = np.random.default_rng(seed)
     pixels = np.arange(SIZE[0] * SIZE[1])
+    # Whole cells of the mosaic.
+    pixels = pixels[pixels // SIZE[0] // 2 % skip == 0]
     centres = (LINES.width_px - 1) / 2 + LINES.step_px * np.arange(128)[:, None]
     light = np.full((128, len(pixels)), 0.02)
     half = LINES.width_px / 2

@@ -40,7 +40,7 @@ def stage_data(wrong: dict[tuple[int, int], float | None] | None = None) -> Stag
 @cache
 def captured(position: int, number: int, really_nm: float) -> LineFrames:
     """The lines of one capture, made once for all tests."""
-    return line_frames(TRUTH, PLANES[position], FILTERS_NM[number], 10 * position + number, really_nm)
+    return line_frames(TRUTH, PLANES[position], FILTERS_NM[number], 10 * position + number, really_nm, skip=2)
 
 
 def test_the_film_is_found_from_its_data_sheet() -> None:

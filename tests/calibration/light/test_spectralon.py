@@ -8,6 +8,7 @@ import pytest
 from dsl_core.calibration.light.spectralon import UniformPictures, fit_evenness, measure_white
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Sensor
+from dsl_core.optics.flat_field import gain_at_pixels
 from dsl_core.optics.sensor import bayer_channels
 
 SHAPE = (96, 144)
@@ -28,23 +29,23 @@ def pictures(gain: np.ndarray, noise: float = 2e-3, white: float = 1.0) -> Unifo
     return UniformPictures(radiance, np.zeros(SHAPE, bool), shading, EVERY, Sensor(bayer="RGGB"))
 
 
-def test_vignetting_is_found_within_its_deviation() -> None:
-    noise = 0.01 * np.random.default_rng(1).standard_normal(SHAPE)
-    found = fit_evenness(VIGNETTE / VIGNETTE.mean() + noise, EVERY)
-    rows, columns = (np.array(at) for at in (found.flat_field.rows_px, found.flat_field.columns_px))
-    truth = (VIGNETTE / VIGNETTE.mean())[np.ix_(rows.astype(int), columns.astype(int))]
-    error = np.array(found.flat_field.gain) - truth
-    assert np.sqrt(np.mean(error**2)) < 3.5e-3
-    assert 0.5 < np.sqrt(np.mean((error / np.array(found.std)) ** 2)) < 1.6
-    assert found.residual == pytest.approx(0.01 / np.sqrt(SHAPE[0] * SHAPE[1] / (27 * 39)), rel=0.15)
+def test_vignetting_is_found() -> None:
+    truth = VIGNETTE / VIGNETTE.mean()
+    found = fit_evenness(truth + 0.01 * np.random.default_rng(1).standard_normal(SHAPE), EVERY)
+    error = gain_at_pixels(found.flat_field, *SHAPE) - truth
+    assert np.sqrt(np.mean(error**2)) < 1e-3
+    assert np.abs(error).max() < 6e-3
+    assert found.residual == pytest.approx(0.01 / np.sqrt(VIGNETTE.size / (27 * 39)), rel=0.15)
     assert found.chi_square > 50
 
 
-def test_an_even_camera_is_found_even() -> None:
-    noise = 0.01 * np.random.default_rng(2).standard_normal(SHAPE)
-    found = fit_evenness(1 + noise, EVERY)
-    assert np.abs(np.array(found.flat_field.gain) - 1).max() < 6e-3
-    assert found.chi_square == pytest.approx(1.0, abs=0.15)
+def test_an_even_camera_is_found_even_within_its_deviation() -> None:
+    sigmas = []
+    for seed in range(3):
+        found = fit_evenness(1 + 0.01 * np.random.default_rng(seed).standard_normal(SHAPE), EVERY)
+        sigmas.append((np.array(found.flat_field.gain) - 1) / np.array(found.std))
+        assert found.chi_square == pytest.approx(1.0, abs=0.2)
+    assert 0.5 < np.sqrt(np.mean(np.square(sigmas))) < 1.3
 
 
 def test_white_signals_are_those_at_unit_shading_without_vignetting() -> None:
