@@ -8,13 +8,11 @@ from datetime import UTC, datetime
 
 from pydantic import ValidationError
 
-from dsl_core.campaign.common.recipe import Recipe
-from dsl_core.campaign.recipes import load_recipe, recipe_names
+from dsl_core.campaign.common.recipe import AnyRecipe, Recipe, RecordT
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.conditions import differences
 from dsl_core.model.rig import Provenance, Rig
@@ -22,27 +20,22 @@ from dsl_core.model.rig import Provenance, Rig
 Accepted = Mapping[str, AcceptedCalibration]
 
 
-def campaign_recipes(campaign: CampaignFolder) -> tuple[Recipe, ...]:
-    """Every calibration of this installation with the campaign's settings, in order."""
-    return tuple(load_recipe(name, campaign.info.settings.get(name)) for name in recipe_names())
-
-
-def accepted_calibrations(campaign: CampaignFolder, recipes: Sequence[Recipe]) -> Accepted:
+def accepted_calibrations(campaign: CampaignFolder, recipes: Sequence[AnyRecipe]) -> Accepted:
     """What a campaign has accepted, by name and in order; raises `StoreError` for a damaged file."""
     found = {recipe.name: campaign.accepted(recipe.name) for recipe in recipes}
     return {name: each for name, each in found.items() if each is not None}
 
 
 def nominal_rig(devices: DeviceRig) -> Rig:
-    """What is known of a rig before anything was measured; raises `CalibrationError` when nothing is.
+    """What is known of a rig before anything is measured; raises `CalibrationError` when nothing is.
 
     The size, mosaic and frame period that the devices state replace those of the data sheet.
     """
     start = devices.nominal or devices.calibration
     if start is None:
         raise CalibrationError(
-            f"The rig {devices.name!r} says nothing of its lenses, film and colours to start from."
-            " Its package has to set DeviceRig.nominal to the values of the data sheets."
+            f"The rig {devices.name!r} does not describe its lenses, film and colours, so calibration has"
+            " nothing to start from. Its package must set DeviceRig.nominal to the values of the data sheets."
         )
     camera, projector = devices.camera.info, devices.projector.info
     sensor = start.sensor.model_copy(update={"bayer": camera.bayer, "bit_depth": camera.bit_depth})
@@ -58,7 +51,7 @@ def nominal_rig(devices: DeviceRig) -> Rig:
     )
 
 
-def apply_records(accepted: Accepted, nominal: Rig, recipes: Sequence[Recipe]) -> Rig:
+def apply_records(accepted: Accepted, nominal: Rig, recipes: Sequence[AnyRecipe]) -> Rig:
     """The rig after all accepted calibrations, in the order of the recipes.
 
     Raises `CalibrationError` when one lacks what it needs, is of another version, or when two were captured
@@ -74,18 +67,15 @@ def apply_records(accepted: Accepted, nominal: Rig, recipes: Sequence[Recipe]) -
     return rig
 
 
-def assemble(
-    accepted: Accepted,
-    nominal: Rig,
-    recipes: Sequence[Recipe],
-    name: str = "",
-) -> Rig:
+def assemble(accepted: Accepted, nominal: Rig, recipes: Sequence[AnyRecipe], name: str = "") -> Rig:
     """The calibrated rig: what was found, under which conditions, when, and how well.
 
     Raises `CalibrationError` as `apply_records` does, and when nothing was accepted at all.
     """
     if not accepted:
-        raise CalibrationError("No calibration was accepted yet, so there is no rig to assemble. Calibrate.")
+        raise CalibrationError(
+            "No calibration has been accepted yet, so there is no rig to assemble. Calibrate first."
+        )
     rig = apply_records(accepted, nominal, recipes)
     ordered = [accepted[recipe.name] for recipe in recipes if recipe.name in accepted]
     conditions = next((each.conditions for each in reversed(ordered) if each.conditions), None)
@@ -107,12 +97,12 @@ def assemble(
     )
 
 
-def require_needs(recipe: Recipe, accepted: Accepted) -> None:
+def require_needs(recipe: AnyRecipe, accepted: Accepted) -> None:
     """Raise `CalibrationError` when a calibration that this one needs was not accepted."""
     lacking = [name for name in recipe.needs if name not in accepted]
     if lacking:
         raise CalibrationError(
-            f"The calibration {recipe.name} needs {' and '.join(lacking)}, which no one accepted yet."
+            f"The calibration {recipe.name} needs {' and '.join(lacking)}, not accepted yet."
             f" Calibrate {lacking[0]} first."
         )
 
@@ -125,11 +115,11 @@ def require_same_devices(accepted: Accepted, devices: DeviceRig) -> None:
         if found:
             raise CalibrationError(
                 f"The calibration {name} was captured with other devices or settings: {'; '.join(found)}."
-                f" Set them back, calibrate {name} again, or begin a new campaign."
+                f" Set them back, calibrate {name} again, or start a new campaign."
             )
 
 
-def record_of(recipe: Recipe, accepted: AcceptedCalibration) -> Record:
+def record_of(recipe: Recipe[RecordT], accepted: AcceptedCalibration) -> RecordT:
     """The recipe's own record; raises `CalibrationError` when it is of another version."""
     try:
         return recipe.record_type.model_validate_json(json.dumps(accepted.record))

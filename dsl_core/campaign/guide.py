@@ -1,4 +1,4 @@
-"""Running whole calibrations, with someone beside who places targets and judges."""
+"""Running whole calibrations, with a guide that has targets placed and judges figures."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
-from dsl_core.campaign.assembly import accepted_calibrations, assemble, campaign_recipes, nominal_rig
-from dsl_core.campaign.common.recipe import Recipe, Step
+from dsl_core.campaign.assembly import accepted_calibrations, assemble, nominal_rig
+from dsl_core.campaign.common.recipe import AnyRecipe, Step
+from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
@@ -29,7 +30,7 @@ class Guide(Protocol):
         """Return when a person has placed the target of a step; called where the rig cannot itself."""
 
     def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
-        """Whether to go on after a look; False for another look."""
+        """Whether to continue after a look; False for another look."""
 
     def judge(self, fitted: AcceptedCalibration) -> bool:
         """Whether to accept a fit; False ends with its figures named."""
@@ -52,7 +53,7 @@ def run_calibration(
 ) -> AcceptedCalibration:
     """Capture every missing or refused step, fit, and accept what the guide accepts.
 
-    ``redo`` names steps that are captured anew. What is captured already is kept, and a calibration that is
+    ``redo`` names steps that are captured again. What is captured already is kept, and a calibration that is
     complete and up to date is returned as it is. Raises `CalibrationError` when a look, a capture or a
     figure is not good enough; everything captured so far stays.
     """
@@ -80,10 +81,10 @@ def calibrate_all(
     guide: Guide,
     progress: Progress,
     name: str = "",
-    recipes: Sequence[Recipe] | None = None,
+    recipes: Sequence[AnyRecipe] | None = None,
     stage: Callable[[str], AbstractContextManager[None]] | None = None,
 ) -> Rig:
-    """Run every calibration in order and assemble the rig; goes on where it was interrupted.
+    """Run every calibration in order and assemble the rig; resumes where it was interrupted.
 
     ``recipes`` are all calibrations, those of this installation if not given; ``stage`` surrounds each one
     under its title, to measure it.
@@ -96,7 +97,7 @@ def calibrate_all(
 
 
 def calibrated_rig(
-    campaign: CampaignFolder, devices: DeviceRig, name: str = "", recipes: Sequence[Recipe] | None = None
+    campaign: CampaignFolder, devices: DeviceRig, name: str = "", recipes: Sequence[AnyRecipe] | None = None
 ) -> Rig:
     """The rig as far as a campaign has calibrated it; raises `CalibrationError` when nothing is accepted."""
     recipes = campaign_recipes(campaign) if recipes is None else recipes
@@ -104,12 +105,12 @@ def calibrated_rig(
     return assemble(accepted, nominal_rig(devices), recipes, name or campaign.path.name)
 
 
-def _take(session: CalibrationSession, step: Step, guide: Guide, progress: Progress, anew: bool) -> None:
+def _take(session: CalibrationSession, step: Step, guide: Guide, progress: Progress, again: bool) -> None:
     if not session.place(step):
         guide.place(step)
     while not guide.looked(step, session.look(step)):
         continue
-    if anew:
+    if again:
         session.redo(step, progress)
     else:
         session.capture(step, progress)
@@ -118,6 +119,6 @@ def _take(session: CalibrationSession, step: Step, guide: Guide, progress: Progr
 def _verdict(fitted: AcceptedCalibration) -> str:
     clauses = "; ".join(f"{figure}. {figure.advice}".rstrip(". ") for figure in failures(fitted.figures))
     return (
-        f"{fitted.title} was not accepted: {clauses or 'you decided so'}."
-        " The captures are kept; capture a step anew with --redo STEP, or accept with --accept-failed."
+        f"{fitted.title} was not accepted: {clauses or 'you rejected it'}."
+        " The captures are kept; capture a step again with --redo STEP, or accept with --accept-failed."
     )

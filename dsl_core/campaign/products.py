@@ -1,17 +1,19 @@
-"""What a finished campaign leaves: the rig's file, its report, an entry of the library."""
+"""What a finished campaign produces: the rig's file, its report, a library entry, and entries as files."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, get_args
 
-from dsl_core.campaign.assembly import accepted_calibrations, campaign_recipes
-from dsl_core.campaign.common.recipe import Recipe
-from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.campaign.assembly import accepted_calibrations
+from dsl_core.campaign.common.recipe import AnyRecipe
+from dsl_core.campaign.recipes import campaign_recipes
+from dsl_core.errors import StoreError
+from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, read_entry
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.io.rig_file import save_rig
+from dsl_core.io.rig_file import load_rig, save_rig
 from dsl_core.io.staging import staged
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.rig import Rig
@@ -21,10 +23,12 @@ if TYPE_CHECKING:
 
 RIG_NAME, REPORT_NAME = "rig.json", "report.html"
 
+Form = Literal["entry", "rig", "published"]
+
 
 @dataclass(frozen=True)
 class Products:
-    """Where they lie; ``entry`` is the name in the library, None where none was wanted."""
+    """Where they are saved; ``entry`` is the name in the library, None where none was requested."""
 
     rig: Path
     report: Path
@@ -36,10 +40,10 @@ def write_products(
     rig: Rig,
     library_name: str | None,
     costs: Sequence[StageCost] = (),
-    recipes: Sequence[Recipe] | None = None,
+    recipes: Sequence[AnyRecipe] | None = None,
     library: CalibrationLibrary | None = None,
 ) -> Products:
-    """Write ``rig.json`` and ``report.html`` anew and store the rig in the library; raises `StoreError`.
+    """Write ``rig.json`` and ``report.html`` again and store the rig in the library; raises `StoreError`.
 
     ``library`` is that of this computer if not given. A rig that equals its current one but for the date
     is not stored a second time.
@@ -61,7 +65,7 @@ def write_calibration_report(
     history: tuple[AcceptedCalibration, ...],
     costs: Sequence[StageCost] = (),
 ) -> Path:
-    """Write the page, over what is there, whole or not at all; raises `StoreError`."""
+    """Write the page, replacing an existing one, whole or not at all; raises `StoreError`."""
     from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
 
     page = render_calibration_report(CalibrationContent(rig, accepted, history, costs))
@@ -81,3 +85,34 @@ def _store(
     if name in library.names() and library.find(name).rig.model_copy(update=same) == rig:
         return
     library.store(name, rig, accepted, history)
+
+
+def export_entry(entry: LibraryEntry, target: Path, form: str, overwrite: bool = False) -> list[Path]:
+    """Write an entry whole (``entry``), its rig alone, or the published files; returns what was written.
+
+    Raises `StoreError` for another form, and when a target exists or cannot be written.
+    """
+    match form:
+        case "entry":
+            with staged([target], overwrite=overwrite) as (draft,):
+                draft.write_text(entry.model_dump_json(indent=1) + "\n", encoding="utf-8")
+            return [target]
+        case "rig":
+            return [save_rig(entry.rig, target, overwrite=overwrite)]
+        case "published":
+            from dsl_core.io.published import export_calibration
+
+            return export_calibration(entry.rig, target, overwrite=overwrite)
+    raise StoreError(f"--form must be {', '.join(get_args(Form))}, not {form!r}.")
+
+
+def import_entry(source: Path, library: CalibrationLibrary, name: str = "") -> LibraryEntry:
+    """Import an exported entry, or a rig's file, into a library as the current version of its name.
+
+    Raises `StoreError` or `CalibrationError` when the file holds neither.
+    """
+    found = read_entry(source)
+    if found is None:
+        rig = load_rig(source)
+        return library.store(name or rig.name, rig)
+    return library.store(name or found.name, found.rig, found.accepted, found.history)

@@ -7,10 +7,13 @@ import importlib.util
 import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, get_origin, get_type_hints
 
-from dsl_core.campaign.common.recipe import Recipe
+from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.errors import CalibrationError
+
+if TYPE_CHECKING:
+    from dsl_core.io.campaign_folder import CampaignFolder
 
 #: Film off first, so that the film is mounted once.
 _CLASSES = {
@@ -28,13 +31,18 @@ def recipe_names() -> tuple[str, ...]:
     return tuple(name for name in _CLASSES if importlib.util.find_spec(_module(name)) is not None)
 
 
-def load_recipe(name: str, settings: Mapping[str, str] | None = None) -> Recipe:
+def load_recipe(name: str, settings: Mapping[str, str] | None = None) -> AnyRecipe:
     """The calibration of a name with its settings; raises `CalibrationError` for either that is unknown."""
     if name not in recipe_names():
         raise CalibrationError(f"There is no calibration {name!r}; choose {', '.join(recipe_names())}.")
     kind = getattr(importlib.import_module(_module(name)), _CLASSES[name])
-    recipe: Recipe = _build(kind, name, settings or {})
+    recipe: AnyRecipe = _build(kind, name, settings or {})
     return recipe
+
+
+def campaign_recipes(campaign: CampaignFolder) -> tuple[AnyRecipe, ...]:
+    """Every calibration of this installation with the campaign's settings, in order."""
+    return tuple(load_recipe(name, campaign.info.settings.get(name)) for name in recipe_names())
 
 
 def _module(name: str) -> str:
@@ -42,7 +50,7 @@ def _module(name: str) -> str:
 
 
 def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
-    """A recipe from texts, each read as `_value` does; a lone value serves where several are wanted."""
+    """A recipe from texts, each read as `_value` does; a single value stands for a list of one."""
     from pydantic import TypeAdapter, ValidationError
 
     known = {field.name for field in fields(kind)} if is_dataclass(kind) else set()

@@ -1,8 +1,8 @@
 """One calibration, step by step: what a wizard and the command line both drive.
 
-The object holds nothing that is not on disk: captures lie in the folders of their steps, a fit waits as a
+The object holds nothing that is not on disk: captures are in the folders of their steps, a fit waits as a
 candidate, accepted calibrations are files of the campaign. So a session can be dropped at any moment, and a
-new one goes on where it stood.
+new one resumes where it stopped.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from typing import Literal
 from dsl_core.campaign.assembly import (
     accepted_calibrations,
     apply_records,
-    campaign_recipes,
     nominal_rig,
     record_of,
     require_needs,
@@ -31,7 +30,8 @@ from dsl_core.campaign.common.captures import (
     scan_settings,
     write_note,
 )
-from dsl_core.campaign.common.recipe import Bench, Recipe, Step
+from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Step
+from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, StoreError
@@ -42,7 +42,7 @@ from dsl_core.model.figure import Figure
 from dsl_core.progress import NoProgress, Progress
 
 State = Literal["missing", "captured", "refused"]
-#: What an accepted calibration says beside the settings of its recipe.
+#: What an accepted calibration states as well as the settings of its recipe.
 ADDED_SETTINGS = ("rig", "exposures")
 
 
@@ -60,10 +60,10 @@ class CalibrationSession:
 
     def __init__(
         self,
-        recipe: Recipe,
+        recipe: AnyRecipe,
         devices: DeviceRig,
         campaign: CampaignFolder,
-        recipes: Sequence[Recipe] | None = None,
+        recipes: Sequence[AnyRecipe] | None = None,
     ) -> None:
         """``recipes`` are all calibrations in order, those of this installation if not given.
 
@@ -108,7 +108,7 @@ class CalibrationSession:
             return StepStatus(step, "refused", str(error))
 
     def next_step(self) -> Step | None:
-        """The first step without accepted captures, None when all are there."""
+        """The first step without accepted captures, None when all are captured."""
         return next((each.step for each in self.statuses() if each.state != "captured"), None)
 
     def place(self, step: Step) -> bool:
@@ -123,7 +123,7 @@ class CalibrationSession:
         return self.recipe.look(self.bench, step)
 
     def capture(self, step: Step, progress: Progress | None = None) -> None:
-        """Capture a step, or go on with it; refused captures are replaced.
+        """Capture a step, or resume it; refused captures are replaced.
 
         Raises `CalibrationError` when the captures show that something is wrong: then the step is refused and
         says why, and all other steps are as they were. A fit that waits is forgotten.
@@ -134,7 +134,7 @@ class CalibrationSession:
         self._capture(step, progress or NoProgress())
 
     def redo(self, step: Step, progress: Progress | None = None) -> None:
-        """Capture a step anew; the old captures go only when the new ones are complete."""
+        """Capture a step again; the old captures go only when the new ones are complete."""
         with replacing(self._folder(step)):
             self._capture(step, progress or NoProgress())
 
@@ -149,7 +149,9 @@ class CalibrationSession:
             write_note(folder, note.model_copy(update={"refused": str(error)}))
             raise
         if not self.recipe.is_captured(self.bench, step):
-            raise CalibrationError(f"The step {step.title!r} is not complete yet. Capture it again to go on.")
+            raise CalibrationError(
+                f"The step {step.title!r} is not complete yet. Capture it again to continue."
+            )
         write_note(folder, note.model_copy(update={"finished": now(), "refused": ""}))
 
     def fit(self, progress: Progress | None = None) -> AcceptedCalibration:
@@ -178,10 +180,11 @@ class CalibrationSession:
 
     def record(self, of: AcceptedCalibration) -> Record:
         """The recipe's own record of a fit."""
-        return record_of(self.recipe, of)
+        record: Record = record_of(self.recipe, of)
+        return record
 
     def accept(self) -> AcceptedCalibration:
-        """Let the fit that waits be the campaign's calibration; raises `StoreError` without one."""
+        """Make the fit that waits the campaign's calibration; raises `StoreError` without one."""
         return self.campaign.accept(self.recipe.name)
 
     def discard(self) -> None:
@@ -204,7 +207,7 @@ class CalibrationSession:
         return self.bench.step_folder(step)
 
     def _captured(self) -> str:
-        """When the newest captures were finished; empty where there are none, or nobody can say."""
+        """When the newest captures were finished; empty where there are none, or it is not known."""
         try:
             notes = [read_note(self._folder(step)) for step in self.steps]
         except StoreError:

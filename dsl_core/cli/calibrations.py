@@ -80,7 +80,7 @@ def check(
     """Check by one quick shot of a flat target whether the rig still is as it was calibrated."""
     import tempfile
 
-    from dsl_core.campaign.drift import PLACEMENT, measure_drift
+    from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
     from dsl_core.devices.conditions import with_calibration
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.calibration_library import load_calibration
@@ -134,7 +134,7 @@ def export(
     json: Json = False,
 ) -> None:
     """Write a calibration for another computer or program."""
-    from dsl_core.campaign.entry_files import export_entry
+    from dsl_core.campaign.products import export_entry
     from dsl_core.io.calibration_library import CalibrationLibrary
 
     output, entry = Output(json), CalibrationLibrary().find(name)
@@ -153,7 +153,7 @@ def import_(
     json: Json = False,
 ) -> None:
     """Take a calibration into the library, as the current version of its name."""
-    from dsl_core.campaign.entry_files import import_entry
+    from dsl_core.campaign.products import import_entry
     from dsl_core.io.calibration_library import CalibrationLibrary
 
     output, entry = Output(json), import_entry(source, CalibrationLibrary(), name or "")

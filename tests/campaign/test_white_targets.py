@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from dsl_core.campaign.color_checker.recipe import ColorCheckerRecipe
-from dsl_core.campaign.common.recipe import Bench, Recipe
+from dsl_core.campaign.common.recipe import Bench, Recipe, RecordT
 from dsl_core.campaign.spectralon.emission_readings import DRIVE
 from dsl_core.campaign.spectralon.recipe import SpectralonRecipe
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
-from dsl_core.model.base import Record
 from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 from dsl_core.model.figure import failures
@@ -52,7 +51,7 @@ def known(truth: int, devices: DeviceRig) -> Rig:
     return devices.nominal.model_copy(update={part: getattr(true, part) for part in parts})
 
 
-def calibrate(recipe: Recipe, devices: DeviceRig, rig: Rig, folder: Path) -> Record:
+def calibrate(recipe: Recipe[RecordT], devices: DeviceRig, rig: Rig, folder: Path) -> RecordT:
     bench = Bench(devices, folder, rig)
     for step in recipe.steps(bench):
         assert devices.place is not None
@@ -162,7 +161,7 @@ def test_a_saturated_spectralon_is_told(folder: Path) -> None:
     too_small = start.sensor.model_copy(update={"bit_depth": 10, "black_level_dn": 100.0})
     bright = start.model_copy(update={"sensor": too_small})
     recipe = SpectralonRecipe()
-    with pytest.raises(CalibrationError, match=r"Step White, red, green and blue: Only \d+ pixels"):
+    with pytest.raises(CalibrationError, match=r"White, red, green and blue: Only \d+ pixels"):
         recipe.fit(Bench(twin(1), folder / "spectralon-1", bright), NONE)
 
 
@@ -177,7 +176,7 @@ def test_a_missing_chart_is_told(folder: Path) -> None:
     with pytest.raises(CalibrationError, match="No Color Checker was found in the test shot"):
         recipe.look(bench, step)
     recipe.capture(bench, step, NONE)
-    with pytest.raises(CalibrationError, match="Step Color Checker: No Color Checker was found"):
+    with pytest.raises(CalibrationError, match="Color Checker: No Color Checker was found"):
         recipe.fit(bench, NONE)
 
 

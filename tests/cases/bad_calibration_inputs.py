@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dsl_core.campaign.assembly import campaign_recipes
+from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.campaign_folder import CampaignFolder

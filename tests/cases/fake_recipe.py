@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
-from dsl_core import pipeline
-from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step
 from dsl_core.errors import CalibrationError
-from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
@@ -24,8 +21,11 @@ class Brightness(Record):
 
 
 @dataclass
-class FakeRecipe:
-    """Satisfies `Recipe`; the fields make it fail or differ where a test wants that."""
+class FakeRecipe(Recipe[Brightness]):
+    """A recipe without targets; the fields make it fail or differ where a test wants that."""
+
+    title = "Brightness"
+    record_type = Brightness
 
     name: str = "fake"
     needs: tuple[str, ...] = ()
@@ -36,8 +36,6 @@ class FakeRecipe:
     bad_steps: set[str] = field(default_factory=set)
     looks: list[str] = field(default_factory=list)
     captured: list[str] = field(default_factory=list)
-    title: ClassVar[str] = "Brightness"
-    record_type: ClassVar[type[Record]] = Brightness
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One a key."""
@@ -52,11 +50,6 @@ class FakeRecipe:
         advice = "Move the target closer."
         return (Figure(name="looks", value=len(self.looks), unit="", low=self.good_look, advice=advice),)
 
-    def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the scan is there and whole."""
-        folder = bench.step_folder(step) / "scan.dsl"
-        return folder.exists() and not SessionReader(folder).missing()
-
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Scan one colour, brighter from step to step."""
         level = (self.keys.index(step.key) + 1) / len(self.keys)
@@ -68,12 +61,7 @@ class FakeRecipe:
             settings=(Setting(exposure_ms=5.0, level=1.0),),
             code_settings=(0,),
         )
-        pipeline.scan(
-            bench.devices,
-            pipeline.fit_plan(plan, bench.devices),
-            bench.step_folder(step) / "scan.dsl",
-            progress,
-        )
+        bench.scan(step, lambda: plan, progress)
         self.captured.append(step.key)
         if step.key in self.bad_steps:
             raise CalibrationError(f"The {step.key} picture shows the wrong target. Place the right one.")
@@ -82,15 +70,14 @@ class FakeRecipe:
         """Read the frames of all steps."""
         means = []
         for step in self.steps(bench):
-            reader = SessionReader(bench.step_folder(step) / "scan.dsl")
+            reader = bench.scan_of(step)
             shot = next(shot for shot in reader.plan.shots() if shot.role == "spectral")
             means.append(float(reader.read(shot).mean()))
         progress.report("fit", 1, 1)
         return Brightness(means_dn=tuple(means))
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: Brightness) -> tuple[Figure, ...]:
         """The brightest mean against its limit."""
-        assert isinstance(record, Brightness)
         advice = "Open the aperture."
         return (
             Figure(
@@ -103,7 +90,7 @@ class FakeRecipe:
             ),
         )
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: Brightness, rig: Rig) -> Rig:
         """Change the white scale by a known factor."""
         return rig.model_copy(update={"white_scale": rig.white_scale * self.scale})
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from dsl_core.campaign.common.recipe import Bench, Recipe, Step
+from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
@@ -33,13 +33,13 @@ def place(bench: Bench, placement: Placement) -> None:
     bench.devices.place(placement)
 
 
-def take(recipe: Recipe, bench: Bench, step: Step, **changed: object) -> None:
+def take(recipe: AnyRecipe, bench: Bench, step: Step, **changed: object) -> None:
     """Place what a step asks for, changed where a test wants it, and capture it."""
     place(bench, step.placement.model_copy(update=changed))
     recipe.capture(bench, step, NoProgress())
 
 
-def take_all(recipe: Recipe, bench: Bench) -> Bench:
+def take_all(recipe: AnyRecipe, bench: Bench) -> Bench:
     """Capture every step; returns the bench."""
     for step in recipe.steps(bench):
         assert not recipe.is_captured(bench, step)

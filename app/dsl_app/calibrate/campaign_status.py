@@ -8,10 +8,9 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from dsl_app.calibrate.state import ABOUT, About, Row, RowState
-from dsl_core.campaign.assembly import campaign_recipes
 from dsl_core.campaign.common.captures import read_note
-from dsl_core.campaign.common.recipe import Recipe
-from dsl_core.campaign.recipes import recipe_names
+from dsl_core.campaign.common.recipe import AnyRecipe
+from dsl_core.campaign.recipes import campaign_recipes, recipe_names
 from dsl_core.errors import DslError
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -21,7 +20,7 @@ from dsl_core.model.figure import Figure, failures
 #: Calibrations older than this are ageing, days.
 AGEING_DAYS = 90
 #: Makes all recipes of a campaign, in order.
-Recipes = Callable[[CampaignFolder], Sequence[Recipe]]
+Recipes = Callable[[CampaignFolder], Sequence[AnyRecipe]]
 
 
 def _utc_now() -> datetime:

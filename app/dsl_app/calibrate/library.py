@@ -66,7 +66,7 @@ class LibraryController:
         """Export a calibration for another computer or program; ``form`` is entry, rig or published."""
 
         def work(progress: Progress) -> list[Path]:
-            from dsl_core.campaign.entry_files import export_entry
+            from dsl_core.campaign.products import export_entry
 
             return export_entry(self._library.find(key), target, form, overwrite)
 
@@ -89,7 +89,7 @@ class LibraryController:
         """Import an exported calibration, or a rig's file."""
 
         def work(progress: Progress) -> LibraryEntry:
-            from dsl_core.campaign.entry_files import import_entry
+            from dsl_core.campaign.products import import_entry
 
             return import_entry(path, self._library)
 
@@ -131,7 +131,7 @@ class LibraryController:
             return
 
         def work(progress: Progress) -> DriftVerdict | _Differs:
-            from dsl_core.campaign.drift import PLACEMENT, measure_drift
+            from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
             from dsl_core.devices.conditions import check_conditions, with_calibration
 
             known = self._library.find(key).rig

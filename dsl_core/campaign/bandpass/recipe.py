@@ -1,4 +1,4 @@
-"""Bandpass filters before the camera: efficiency of the orders, response of the camera, blur and halo.
+"""Bandpass filters in front of the camera: efficiency of the orders, response of the camera, blur and halo.
 
 A flat white target stands still while filters change. Without filter, code and dense lines say which column
 each pixel sees; through each filter, lines that tile the frame show how much light each order takes.
@@ -7,46 +7,45 @@ each pixel sees; through each filter, lines that tile the frame show how much li
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dsl_core.calibration.light.chain import LineScan
 from dsl_core.calibration.light.zero_order import ZeroOrderFit
-from dsl_core.calibration.orders.bandpass import (
-    SeenFilter,
-    fit_bandpass,
-    plane_pixels,
-    plane_profile,
-)
+from dsl_core.calibration.orders.bandpass import SeenFilter, fit_bandpass, plane_pixels, plane_profile
 from dsl_core.calibration.orders.order_light import filter_light
-from dsl_core.campaign.bandpass.figures import bandpass_figures
-from dsl_core.campaign.common.diffuser_lines import diffuser_lines
-from dsl_core.campaign.common.exposures import WhiteLevel, bracket, bright_setting, measure_white
-from dsl_core.campaign.common.filter_in_beam import FilterNote, colour_figure, note_of_filter, require_filter
-from dsl_core.campaign.common.light_look import film_light
-from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.common.step_scan import is_complete, naming, scan_of, scan_step
+from dsl_core.campaign.common.flat_target import diffuser_lines, line_frames, scan_lines_of
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.common.white_shot import (
+    LONG_RATIO,
+    FilterNote,
+    WhiteLevel,
+    bracket,
+    bright_setting,
+    colour_figure,
+    film_light,
+    note_of_filter,
+    require_filter,
+    shoot_white,
+)
 from dsl_core.errors import CalibrationError
-from dsl_core.io.atomic import write_atomic
-from dsl_core.io.campaign_folder import read_record
-from dsl_core.model.base import Record
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.unlit import first_order_reach_px, unlit_px
 from dsl_core.progress import Progress
 
 PLANE = "plane"
 CURVE_NAME = "filter.json"
 FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
-#: The longer exposure of the scan without filter, which shows the halo, over the shorter one.
-LONG_RATIO = 6.0
 
 
 @dataclass(frozen=True)
-class BandpassRecipe:
+class BandpassRecipe(Recipe[BandpassCalibration]):
     """The calibration with bandpass filters.
 
     ``filters_nm`` are nominal centres; ``line_px`` is width and step of the lines through a filter, which
@@ -55,32 +54,18 @@ class BandpassRecipe:
     ``reflectance`` is that of the target.
     """
 
+    name = "bandpass"
+    title = "Bandpass filters"
+    #: Geometry for depth and shading, the LEDs' emission.
+    needs = ("geometry", "spectralon")
+    record_type = BandpassCalibration
+
     filters_nm: tuple[float, ...] = FILTERS_NM
     line_px: int = 5
     long_ratio: float = 1.0
     pixels: int = 20_000
     depth_mm: float = 700.0
     reflectance: float = 0.99
-
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        return "bandpass"
-
-    @property
-    def title(self) -> str:
-        """Title of the wizard."""
-        return "Bandpass filters"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Geometry for depth and shading, the LEDs' emission."""
-        return ("geometry", "spectralon")
-
-    @property
-    def record_type(self) -> type[Record]:
-        """The record that `fit` makes."""
-        return BandpassCalibration
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """The target without filter, then through each filter, from blue to red."""
@@ -90,16 +75,17 @@ class BandpassRecipe:
         first = Step(
             PLANE,
             "White target without filter",
-            f"Mount the film before the projector. Place the Spectralon or another even white target about"
-            f" {self.depth_mm / 10:g} cm from the camera, facing it; it must not move until the last filter"
-            " is done. No filter before the camera.",
+            "Mount the film in front of the projector. Place the Spectralon or another even white target"
+            f" about {self.depth_mm / 10:g} cm from the camera, facing it; it must not move until the last"
+            " filter is done. No filter in front of the camera.",
             Placement(target="spectralon", film=True, options=where),
         )
         filtered = [
             Step(
                 f"filter-{nm:g}",
                 f"Filter of {nm:g} nm",
-                f"Put the bandpass filter of {nm:g} nm flat before the camera's lens. Touch nothing else.",
+                f"Put the bandpass filter of {nm:g} nm flat in front of the camera's lens. Touch nothing"
+                " else.",
                 Placement(target="spectralon", film=True, filter_nm=nm, options=where),
             )
             for nm in sorted(set(self.filters_nm))
@@ -108,20 +94,16 @@ class BandpassRecipe:
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Brightness, other light and, through a filter, whether its colours are those of the right one."""
-        white = measure_white(bench.devices, bench.rig)
+        white = shoot_white(bench)
         figures = film_light(white, bench.rig)
         nm = step.placement.filter_nm
         if nm is None:
             return figures
         return (*figures, colour_figure(bench.rig, white, note_of_filter(bench.devices, nm)))
 
-    def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the scan of a step is complete."""
-        return is_complete(bench.step_folder(step))
-
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Choose exposures by a test shot and scan; a scan that was begun goes on with its own exposures."""
-        scan_step(bench.devices, bench.step_folder(step), lambda: self._begin(bench, step), progress)
+        """Choose exposures by a test shot and scan; a scan that was begun keeps its own exposures."""
+        bench.scan(step, lambda: self._begin(bench, step), progress)
 
     def fit(self, bench: Bench, progress: Progress) -> BandpassCalibration:
         """Calibrate from the captures of all steps."""
@@ -135,28 +117,25 @@ class BandpassRecipe:
         progress.report("filters", len(filtered), len(filtered))
         return fit_bandpass(rig, scan, profile, seen, self.reflectance)
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: BandpassCalibration) -> tuple[Figure, ...]:
         """Deviations of efficiency and response, blur and halo, and filters in doubt."""
-        assert isinstance(record, BandpassCalibration)
         return bandpass_figures(record)
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: BandpassCalibration, rig: Rig) -> Rig:
         """The rig with efficiencies, response, white scale, blur and halo."""
-        assert isinstance(record, BandpassCalibration)
         return apply_bandpass(record, rig)
 
     def _begin(self, bench: Bench, step: Step) -> CapturePlan:
         """The plan of a step by a test shot; keeps what is known of its filter."""
-        white = measure_white(bench.devices, bench.rig)
+        white = shoot_white(bench)
         nm = step.placement.filter_nm
         if nm is None:
             return self._plan(bench.rig, step, white)
-        note, folder = note_of_filter(bench.devices, nm), bench.step_folder(step)
+        note = note_of_filter(bench.devices, nm)
         open_white = self._white_of(bench, self.steps(bench)[0])
         require_filter(bench.rig, white, note, step.title, open_white)
         plan = self._plan(bench.rig, step, white)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / CURVE_NAME, note.model_dump_json(indent=1).encode())
+        bench.keep(step, CURVE_NAME, note)
         return plan
 
     def _white_of(self, bench: Bench, step: Step) -> float | None:
@@ -165,7 +144,7 @@ class BandpassRecipe:
             return None
         from dsl_core.reconstruction.merge import MergedScan
 
-        frame = MergedScan(scan_of(bench.step_folder(step)), bench.rig).merge("white", 0)
+        frame = MergedScan(bench.scan_of(step), bench.rig).merge("white", 0)
         return float(np.quantile(frame.radiance, 0.995))
 
     def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
@@ -192,27 +171,15 @@ class BandpassRecipe:
         )
 
     def _plane(self, bench: Bench, step: Step, progress: Progress) -> tuple[LineScan, ZeroOrderFit]:
-        source = scan_of(bench.step_folder(step))
+        source = bench.scan_of(step)
         with naming(step):
             scan = diffuser_lines(source, bench.rig, progress, self.pixels)
             return scan, plane_profile(bench.rig, scan, progress)
 
     def _filter(self, bench: Bench, rig: Rig, step: Step, scan: LineScan) -> SeenFilter:
-        from dsl_core.reconstruction.merge import MergedScan, check_source
-
-        folder = bench.step_folder(step)
-        note = read_record(folder / CURVE_NAME, FilterNote)
-        source = scan_of(folder)
-        plan = check_source(source, rig)
-        lines = plan.spectral
-        assert isinstance(lines, ScanLines)
-        merged = MergedScan(source, rig)
-        radiance = np.empty((plan.spectral_count, len(scan.pixels)), np.float32)
-        std = np.empty_like(radiance)
-        for frame in range(plan.spectral_count):
-            picture = merged.merge("spectral", frame)
-            radiance[frame] = picture.radiance.ravel()[scan.pixels]
-            std[frame] = np.sqrt(picture.variance.ravel()[scan.pixels])
+        note, source = bench.kept(step, CURVE_NAME, FilterNote), bench.scan_of(step)
+        lines = scan_lines_of(source)
+        radiance, std = line_frames(source, rig, scan.pixels)
         light = filter_light(
             lines,
             plane_pixels(rig, scan, note.filter_nm),
@@ -229,3 +196,68 @@ class BandpassRecipe:
                 " the step again with nothing changed since the test shot."
             )
         return SeenFilter(note.filter_nm, note.transmission, note.measured, light)
+
+
+def bandpass_figures(record: BandpassCalibration) -> tuple[Figure, ...]:
+    """Deviations of efficiency and response, second orders, blur and halo, and filters in doubt."""
+    centres = np.array([each.effective_nm for each in record.filters])
+    figures = [
+        Figure(
+            name=f"efficiency of order {order:+d}, deviation",
+            value=100 * float(np.median(_relative_std(record.efficiency[order], centres))),
+            unit="%",
+            high=2.0,
+            advice="Use more filters, or a longer second exposure (long_ratio).",
+        )
+        for order in (1, -1)
+    ]
+    figures += [
+        Figure(
+            name=f"response of {colour}, deviation",
+            value=100 * float(np.median(_relative_std(curve, centres[_bright(curve, centres)]))),
+            unit="%",
+            high=5.0,
+            advice="Measure the filters' transmissions, or calibrate with a Color Checker first.",
+        )
+        for colour, curve in zip(("red", "green", "blue"), record.response, strict=True)
+    ]
+    halo = 200 * record.halo_decay_px
+    figures += [
+        _plain(
+            "second orders",
+            "% of first",
+            100 * record.second_order_share,
+            100 * record.second_order_share_std,
+        ),
+        _plain("halo", "% of zero order", halo * record.halo_peak_per_px, halo * record.halo_peak_std_per_px),
+        Figure(
+            name="blur of the projector",
+            value=record.blur_px,
+            unit="px",
+            std=record.blur_std_px,
+            high=2.0,
+            advice="Focus the projector on the target.",
+        ),
+        Figure(
+            name="filters in doubt",
+            value=float(len(record.warnings)),
+            unit="",
+            high=0.0,
+            advice=". ".join(record.warnings),
+        ),
+    ]
+    return tuple(figures)
+
+
+def _plain(name: str, unit: str, value: float, std: float) -> Figure:
+    return Figure(name=name, value=value, unit=unit, std=std)
+
+
+def _relative_std(curve: SpectralCurve, nm: Any) -> Any:
+    std = curve.std or (0.0,) * len(curve.values)
+    return np.interp(nm, curve.wavelengths_nm, std) / np.maximum(np.abs(curve.at(nm)), 1e-12)
+
+
+def _bright(curve: SpectralCurve, nm: Any) -> Any:
+    """Wavelengths at which a response is not negligible."""
+    return curve.at(nm) > 0.05 * max(curve.values)

@@ -5,28 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.calibration.colour.color_checker import (
+    LIGHTS,
     ChartPictures,
     color_checker_figures,
     expected_colours,
     measure_patches,
+    patch_colours,
     refine_on_chart,
 )
-from dsl_core.calibration.colour.patches import ChartPose, find_chart, orient_chart, patch_samples
-from dsl_core.campaign.common.exposures import measure_white
-from dsl_core.campaign.common.flat_target import (
-    LIGHTS,
-    WHITE,
-    capture_flat_target,
-    read_flat_target,
+from dsl_core.calibration.colour.patches import (
+    ChartPose,
+    chart_picture,
+    find_chart,
+    orient_chart,
+    patch_samples,
 )
-from dsl_core.campaign.common.light_look import other_light
-from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.common.step_scan import is_complete
-from dsl_core.errors import CalibrationError, DecodeError
-from dsl_core.model.base import Record
-from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
+from dsl_core.campaign.common.flat_target import WHITE, capture_uniform, read_uniform
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.common.white_shot import other_light, shoot_white
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.color_checker import TURNS, ColorCheckerCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
@@ -37,12 +38,11 @@ from dsl_core.progress import Progress
 
 #: The long exposure against the short one, for dark patches.
 RATIO = 6.0
-_UPRIGHT = ("upright", "turned clockwise", "upside down", "turned counterclockwise")
 _Corners = tuple[tuple[float, float], tuple[float, float], tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class ColorCheckerRecipe:
+class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
     """The calibration with a classic Color Checker of 24 patches.
 
     ``chart`` names the table of reflectances in colour-science; ``corners_px`` are column and row of the four
@@ -50,29 +50,15 @@ class ColorCheckerRecipe:
     ``depth_mm`` is how far away it stands.
     """
 
+    name = "color-checker"
+    title = "Color Checker"
+    #: Geometry for shading, emission and white from the Spectralon.
+    needs = ("geometry", "spectralon")
+    record_type = ColorCheckerCalibration
+
     chart: str = "BabelColor Average"
     corners_px: _Corners | None = None
     depth_mm: float = 700.0
-
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        return "color-checker"
-
-    @property
-    def title(self) -> str:
-        """Title of the wizard."""
-        return "Color Checker"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Geometry for shading, emission and white from the Spectralon."""
-        return ("geometry", "spectralon")
-
-    @property
-    def record_type(self) -> type[Record]:
-        """The record that `fit` makes."""
-        return ColorCheckerCalibration
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One step: code and uniform pictures of the chart."""
@@ -92,41 +78,33 @@ class ColorCheckerRecipe:
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the chart is found, and how it is turned."""
-        white = measure_white(bench.devices, bench.rig)
+        white = shoot_white(bench)
         pose = self._pose(white.picture.astype(np.float32), bench.rig, f"the test shot of {step.title}")
         patch_samples(pose.corners_px, (white.picture.shape[0], white.picture.shape[1]))
         return (
             Figure(name="patches found", value=24, unit="", low=24, high=24),
             Figure(
-                name=f"chart {_UPRIGHT[pose.quarter_turns]}", value=90.0 * pose.quarter_turns, unit="degrees"
+                name=f"chart {TURNS[pose.quarter_turns]}", value=90.0 * pose.quarter_turns, unit="degrees"
             ),
             other_light(white, "chart"),
         )
 
-    def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the scan is complete."""
-        return is_complete(bench.step_folder(step))
-
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Choose exposures by a test shot and capture."""
-        capture_flat_target(bench, bench.step_folder(step), step.title, RATIO, progress)
+        capture_uniform(bench, step, RATIO, progress)
 
     def fit(self, bench: Bench, progress: Progress) -> ColorCheckerCalibration:
         """Find the chart, measure its patches and refine the curves."""
         (step,) = self.steps(bench)
-        try:
+        with naming(step):
             return self._fit(bench, step, progress)
-        except (CalibrationError, DecodeError) as error:
-            raise CalibrationError(f"Step {step.title}: {error}") from error
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: ColorCheckerCalibration) -> tuple[Figure, ...]:
         """Residuals of the patches, against their limits."""
-        assert isinstance(record, ColorCheckerCalibration)
         return color_checker_figures(record)
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: ColorCheckerCalibration, rig: Rig) -> Rig:
         """The rig with refined response, emission and the white scale that goes with them."""
-        assert isinstance(record, ColorCheckerCalibration)
         return rig.model_copy(
             update={
                 "response": record.response,
@@ -137,7 +115,7 @@ class ColorCheckerRecipe:
 
     def _fit(self, bench: Bench, step: Step, progress: Progress) -> ColorCheckerCalibration:
         rig = bench.rig
-        target = read_flat_target(bench.step_folder(step), rig, progress)
+        target = read_uniform(bench.scan_of(step), rig, progress)
         shape = (target.depth_mm.shape[0], target.depth_mm.shape[1])
         pose = self._pose(target.radiance[WHITE].astype(np.float32), rig, "the white picture")
         samples = patch_samples(pose.corners_px, shape)
@@ -155,3 +133,26 @@ class ColorCheckerRecipe:
         if self.corners_px is None:
             return find_chart(white, rig.sensor.bayer, expected, name)
         return orient_chart(white, rig.sensor.bayer, np.array(self.corners_px), expected, name)
+
+
+@dataclass(frozen=True)
+class ChartView:
+    """The white picture, RGB (rows, columns, 3), and colours of the patches over white, (24, 3) each."""
+
+    picture: NDArray[np.uint8]
+    measured: NDArray[np.float64]
+    expected: NDArray[np.float64]
+
+
+def chart_view(record: ColorCheckerCalibration, bench: Bench, step: Step) -> ChartView:
+    """Read what a fit of the chart is based on; raises `StoreError` when the captures are gone."""
+    return ChartView(white_picture(bench, step), *patch_colours(record, bench.rig))
+
+
+def white_picture(bench: Bench, step: Step) -> NDArray[np.uint8]:
+    """The white picture of the chart's step, RGB (rows, columns, 3); raises `StoreError`."""
+    from dsl_core.reconstruction.merge import MergedScan
+
+    scan = MergedScan(bench.scan_of(step), bench.rig)
+    picture = chart_picture(scan.merge("spectral", WHITE).radiance, bench.rig.sensor.bayer)
+    return np.ascontiguousarray(picture[..., ::-1])

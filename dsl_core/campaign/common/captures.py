@@ -29,7 +29,7 @@ _ASIDE = ".replaced"
 
 
 class CaptureNote(Record):
-    """What a session writes beside the captures of a step; ``refused`` is the reason, empty for none."""
+    """What a session writes next to the captures of a step; ``refused`` is the reason, empty for none."""
 
     conditions: CaptureConditions
     started: str
@@ -38,7 +38,7 @@ class CaptureNote(Record):
 
 
 def read_note(folder: Path) -> CaptureNote | None:
-    """The note of a step, None where nothing was begun; raises `StoreError` when it is damaged."""
+    """The note of a step, None where nothing has been started; raises `StoreError` when it is damaged."""
     path = folder / NOTE_NAME
     return read_record(path, CaptureNote) if path.exists() else None
 

@@ -1,31 +1,40 @@
-"""Uniform pictures of a flat target with a code: the plane it lies in, and linear pictures of each light."""
+"""Scans of a flat target: how they are captured, and what calibrations read from them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.colour.color_checker import LIGHTS
 from dsl_core.calibration.common.plane import TargetPlane, fit_plane
-from dsl_core.campaign.common.exposures import bracket, measure_white
-from dsl_core.campaign.common.recipe import Bench
-from dsl_core.campaign.common.step_scan import scan_of, scan_step
+from dsl_core.calibration.light.chain import LineScan
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.common.white_shot import bracket, shoot_white
+from dsl_core.errors import CalibrationError
 from dsl_core.model.frames import FrameSource
-from dsl_core.model.plan import CapturePlan, Columns, GrayCode
+from dsl_core.model.plan import CapturePlan, Columns, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
+from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.shading import plane_shading
 from dsl_core.progress import Progress
 
-#: Drive of red, green and blue in each uniform picture.
-LIGHTS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0))
+if TYPE_CHECKING:
+    from dsl_core.reconstruction.geometry import Geometry
+    from dsl_core.reconstruction.merge import LineStack
+
+#: Which of the lights is white.
 WHITE = 3
-#: A pixel is lit when white stands this many deviations above black.
-LIT_SIGMAS = 8.0
+#: Pixels that are used of each scan of lines: with more, noise no longer limits the correction.
+PIXELS = 6000
+#: A flat target that fills the picture has at least this share of the lit pixels on one plane.
+FLAT_SHARE = 0.8
 
 
 @dataclass(frozen=True)
-class FlatTarget:
+class TargetPictures:
     """Mosaics (lights, rows, columns), DN per ms at full drive, their variance, and where any is saturated.
 
     ``depth_mm`` (rows, columns) comes from whole projector columns; ``lit`` marks where it means something.
@@ -40,15 +49,15 @@ class FlatTarget:
     def plane(
         self, rig: Rig, start: NDArray[np.bool_], within: NDArray[np.bool_] | None = None
     ) -> TargetPlane:
-        """The plane of the target, which ``start`` surely belongs to and which lies ``within`` a region.
+        """The plane of the target, which ``start`` certainly belongs to and which is ``within`` a region.
 
         Raises `CalibrationError` when there is none.
         """
         return fit_plane(rig, self.depth_mm, self.lit if within is None else self.lit & within, start)
 
 
-def capture_flat_target(bench: Bench, folder: Path, name: str, ratio: float, progress: Progress) -> None:
-    """Code and uniform pictures into the step's folder; a scan that was begun goes on as it was planned.
+def capture_uniform(bench: Bench, step: Step, ratio: float, progress: Progress) -> None:
+    """Code and uniform pictures of a step; a scan that was begun continues as it was planned.
 
     Exposures follow a test shot; ``ratio`` above one adds an exposure that much longer, for dark patches.
     """
@@ -56,26 +65,22 @@ def capture_flat_target(bench: Bench, folder: Path, name: str, ratio: float, pro
 
     def plan() -> CapturePlan:
         return CapturePlan(
-            name=name,
+            name=step.title,
             code=GrayCode(rows=False),
-            spectral=Columns(levels=tuple((light,) * width for light in LIGHTS)),
-            settings=bracket(bench.rig, measure_white(bench.devices, bench.rig), name, ratio),
+            spectral=Columns(levels=tuple((tuple(light),) * width for light in LIGHTS.tolist())),
+            settings=bracket(bench.rig, shoot_white(bench), step.title, ratio),
             code_settings=(0,),
         )
 
-    scan_step(bench.devices, folder, plan, progress)
+    bench.scan(step, plan, progress)
 
 
-def read_flat_target(folder: Path, rig: Rig, progress: Progress) -> FlatTarget:
-    """The captures of a step; raises `DecodeError` and `StoreError`."""
-    return flat_target(scan_of(folder), rig, progress)
-
-
-def flat_target(source: FrameSource, rig: Rig, progress: Progress) -> FlatTarget:
-    """Merge the uniform pictures of a scan and triangulate its code."""
+def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPictures:
+    """Merge the uniform pictures of a scan and triangulate its code; raises `DecodeError`, `StoreError`."""
     import torch
 
     from dsl_core.reconstruction.depth import triangulate
+    from dsl_core.reconstruction.geometry import LIT_SIGMAS
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns
     from dsl_core.solve.threads import one_kernel_thread
 
@@ -90,7 +95,7 @@ def flat_target(source: FrameSource, rig: Rig, progress: Progress) -> FlatTarget
     lit = white.saturated | (white.radiance > LIT_SIGMAS * np.sqrt(white.variance))
     low, high = rig.depth_range_mm
     depth_mm = depth.numpy().reshape(shape)
-    return FlatTarget(
+    return TargetPictures(
         np.stack([picture.radiance for picture in pictures]).astype(float),
         np.stack([picture.variance for picture in pictures]).astype(float),
         np.any([picture.saturated for picture in pictures], axis=0),
@@ -105,3 +110,86 @@ def middle(shape: tuple[int, ...], share: float = 0.5) -> NDArray[np.bool_]:
     rows, columns = (slice(round(n * (1 - share) / 2), round(n * (1 + share) / 2)) for n in shape)
     inside[rows, columns] = True
     return inside
+
+
+def scanned_geometry(
+    source: FrameSource, rig: Rig, progress: Progress | None = None
+) -> tuple[LineStack, Geometry]:
+    """The lines of a scan with code and lines, and its geometry; raises what a reconstruction raises."""
+    from dsl_core.reconstruction.geometry import reconstruct_geometry
+    from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
+    from dsl_core.reconstruction.sanity import require_light, require_pixels
+
+    plan = check_source(source, rig)
+    merged = MergedScan(source, rig)
+    code, white = decode_columns(merged, progress)
+    require_light(white.radiance, white.saturated)
+    stack = stack_lines(merged, progress)
+    geometry = reconstruct_geometry(rig, plan, code, white, stack, progress=progress)
+    require_pixels(geometry.flags)
+    return stack, geometry
+
+
+def diffuser_lines(
+    source: FrameSource, rig: Rig, progress: Progress | None = None, pixels: int = PIXELS
+) -> LineScan:
+    """Reconstruct a scan with code and lines of a flat target, and choose pixels evenly.
+
+    Depth and shading are those of the plane through them. Raises `CalibrationError` when the scan has no
+    scan lines or the target is not flat, and what a reconstruction raises.
+    """
+    from dsl_core.reconstruction.scan_result import known_pixels
+
+    lines = scan_lines_of(source)
+    stack, geometry = scanned_geometry(source, rig, progress)
+    known = known_pixels(geometry)
+    # One plane for all pixels: its shading has none of the noise of normals of single pixels.
+    flat = fit_plane(rig, geometry.depth_mm, known.valid)
+    share = flat.on_plane.sum() / max(known.valid.sum(), 1)
+    if share < FLAT_SHARE:
+        raise CalibrationError(
+            f"Only {share:.0%} of the lit pixels are on one plane. Let the flat white target fill the"
+            " picture, and capture the step again."
+        )
+    depth_mm, shading = flat.plane.depth_mm(rig), plane_shading(rig, flat.plane) * relative_gain(rig)
+    valid = np.flatnonzero(flat.on_plane)
+    # At random, since any regular step would meet the colours of the mosaic unevenly.
+    chosen = np.sort(np.random.default_rng(0).permutation(valid)[:pixels])
+    return LineScan(
+        lines=lines,
+        pixels=chosen.astype(np.int64),
+        depth_mm=depth_mm.ravel()[chosen],
+        shading=shading.ravel()[chosen],
+        column_px=known.column_px.ravel()[chosen].astype(float),
+        amplitude=known.amplitude.ravel()[chosen].astype(float),
+        offset=known.offset.ravel()[chosen].astype(float),
+        radiance=stack.radiance.reshape(len(stack.radiance), -1)[:, chosen],
+        std=stack.std.reshape(len(stack.std), -1)[:, chosen].astype(np.float32),
+    )
+
+
+def line_frames(
+    source: FrameSource, rig: Rig, pixels: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The line frames of a scan at some pixels: radiance and its deviation, each (frames, pixels)."""
+    from dsl_core.reconstruction.merge import MergedScan, check_source
+
+    plan = check_source(source, rig)
+    merged = MergedScan(source, rig)
+    radiance = np.empty((plan.spectral_count, len(pixels)), np.float32)
+    std = np.empty_like(radiance)
+    for frame in range(plan.spectral_count):
+        picture = merged.merge("spectral", frame)
+        radiance[frame] = picture.radiance.ravel()[pixels]
+        std[frame] = np.sqrt(picture.variance.ravel()[pixels])
+    return radiance, std
+
+
+def scan_lines_of(source: FrameSource) -> ScanLines:
+    """The lines of a scan; raises `CalibrationError` when it was made with other patterns."""
+    if not isinstance(source.plan.spectral, ScanLines):
+        raise CalibrationError(
+            f"The plan {source.plan.name!r} has no scan lines, which this calibration measures. Capture the"
+            " step again with a plan of scan lines."
+        )
+    return source.plan.spectral

@@ -1,21 +1,34 @@
 """What a calibration is made of: steps with a target each, a look, a capture, a fit.
 
-A recipe knows the order and the judgement of one calibration; it holds no state. What was captured lies in
-the folder of its step, so that a calibration that was interrupted goes on where it stood.
+A recipe knows the order and the judgement of one calibration; it holds no state. The captures of a step are
+in its folder, so that an interrupted calibration can continue where it stopped.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Generic, TypeVar
 
 from dsl_core.devices.base import DeviceRig
+from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
+from dsl_core.io.atomic import store_error, write_atomic
+from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.file_names import MANIFEST_NAME
+from dsl_core.io.scan.reader import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
+
+SCAN_NAME = "scan.dsl"
+
+RecordT = TypeVar("RecordT", bound=Record)
 
 
 @dataclass(frozen=True)
@@ -36,8 +49,8 @@ class Step:
 class Bench:
     """What a recipe works with.
 
-    ``rig`` is what is known so far, nominal where nothing was measured yet. ``folder`` is the recipe's own;
-    each step has a folder in it.
+    ``rig`` is what is known so far, nominal where nothing has been measured yet. ``folder`` is the recipe's
+    own; each step has a folder in it, with at most one scan and records next to it.
     """
 
     devices: DeviceRig
@@ -45,32 +58,66 @@ class Bench:
     rig: Rig
 
     def step_folder(self, step: Step) -> Path:
-        """Where the captures of a step lie; it need not exist."""
+        """The folder of a step's captures; it need not exist."""
         return self.folder / step.key
 
+    def is_scanned(self, step: Step) -> bool:
+        """Whether the scan of a step is complete."""
+        return self._is_begun(step) and not self.scan_of(step).missing()
 
-class Recipe(Protocol):
-    """One kind of calibration. All that raises, raises `CalibrationError` that names the step concerned."""
+    def scan_of(self, step: Step) -> SessionReader:
+        """The scan of a step; raises `StoreError`."""
+        return SessionReader(self.step_folder(step) / SCAN_NAME)
 
-    @property
-    def name(self) -> str:
-        """Name on the command line and of the folder, such as ``bandpass``."""
+    def scan(self, step: Step, make_plan: Callable[[], CapturePlan], progress: Progress) -> CapturePlan:
+        """Scan a step and return the plan; a scan that was begun continues with its own plan."""
+        from dsl_core import pipeline
 
-    @property
-    def title(self) -> str:
-        """Title of the wizard, such as ``Bandpass filters``."""
+        folder = self.step_folder(step)
+        if self._is_begun(step):
+            plan = self.scan_of(step).plan
+        else:
+            plan = pipeline.fit_plan(make_plan(), self.devices)
+            folder.mkdir(parents=True, exist_ok=True)
+        pipeline.scan(self.devices, plan, folder / SCAN_NAME, progress)
+        return plan
 
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Names of the calibrations that must be accepted before."""
+    def keep(self, step: Step, name: str, record: Record) -> None:
+        """Write a record into a step's folder; raises `StoreError`."""
+        folder = self.step_folder(step)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise store_error(folder, error) from error
+        write_atomic(folder / name, record.model_dump_json(indent=1).encode())
 
-    @property
-    def record_type(self) -> type[Record]:
-        """The record that `fit` makes, which is kept as JSON."""
+    def kept(self, step: Step, name: str, kind: type[RecordT]) -> RecordT:
+        """A record that `keep` wrote; raises `StoreError`."""
+        return read_record(self.step_folder(step) / name, kind)
 
+    def _is_begun(self, step: Step) -> bool:
+        return (self.step_folder(step) / SCAN_NAME / MANIFEST_NAME).exists()
+
+
+class Recipe(ABC, Generic[RecordT]):
+    """One kind of calibration; its settings are the fields of the dataclass that implements it.
+
+    ``name`` is its name on the command line and that of its folder, such as ``bandpass``; ``title`` is the
+    wizard's, such as ``Bandpass filters``; ``needs`` are the names of the calibrations that must be accepted
+    before; ``record_type`` is what `fit` returns, which is stored as JSON. Every `CalibrationError` names the
+    step concerned.
+    """
+
+    name: str
+    title: str
+    needs: tuple[str, ...] = ()
+    record_type: type[RecordT]
+
+    @abstractmethod
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """The steps in their order."""
 
+    @abstractmethod
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Check with a few frames, which are not kept, that the target is right: found, even, unsaturated.
 
@@ -78,16 +125,36 @@ class Recipe(Protocol):
         """
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the captures of a step are complete."""
+        """Whether the captures of a step, a scan unless a recipe says otherwise, are complete."""
+        return bench.is_scanned(step)
 
+    @abstractmethod
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Capture a step into its folder; goes on with captures that an earlier call left unfinished."""
+        """Capture a step into its folder; continues captures that an earlier call left unfinished."""
 
-    def fit(self, bench: Bench, progress: Progress) -> Record:
+    @abstractmethod
+    def fit(self, bench: Bench, progress: Progress) -> RecordT:
         """Calibrate from the captures of all steps; the devices are not used."""
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    @abstractmethod
+    def figures(self, record: RecordT) -> tuple[Figure, ...]:
         """The key figures of a fit against their limits."""
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    @abstractmethod
+    def apply(self, record: RecordT, rig: Rig) -> Rig:
         """What is known of the rig once this calibration is accepted."""
+
+
+#: A recipe whose record nobody asks for by its type.
+AnyRecipe = Recipe[Any]
+
+
+@contextmanager
+def naming(step: Step) -> Iterator[None]:
+    """Make errors of the block name the step; one of a file names the file already."""
+    try:
+        yield
+    except (Cancelled, StoreError):
+        raise
+    except DslError as error:
+        raise CalibrationError(f"{step.title}: {error}") from error

@@ -4,35 +4,45 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dsl_core.calibration.common.tiles import ColumnSamples
+import numpy as np
+
+from dsl_core.calibration.common.tiles import ColumnSamples, tile_columns
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibrate_depth_stage
-from dsl_core.calibration.film.order_paths import LineFrames
-from dsl_core.campaign.common.exposures import LONGEST_MS, WhiteLevel, bracket, bright_setting, measure_white
-from dsl_core.campaign.common.filter_in_beam import note_of_filter
-from dsl_core.campaign.common.light_look import film_light
-from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.common.step_scan import is_complete, naming, scan_of, scan_step
+from dsl_core.calibration.film.order_paths import LineFrames, thinned
+from dsl_core.campaign.common.flat_target import (
+    diffuser_lines,
+    line_frames,
+    scan_lines_of,
+    scanned_geometry,
+)
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.common.white_shot import (
+    LONG_RATIO,
+    LONGEST_MS,
+    WhiteLevel,
+    bracket,
+    bright_setting,
+    film_light,
+    note_of_filter,
+    shoot_white,
+)
 from dsl_core.campaign.depth_stage.figures import depth_stage_figures
-from dsl_core.campaign.depth_stage.stage_scans import lines_on_plane, zero_order_columns
 from dsl_core.errors import CalibrationError
-from dsl_core.io.atomic import write_atomic
-from dsl_core.io.campaign_folder import read_record
-from dsl_core.io.scan.reader import SessionReader
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, apply_depth_stage
 from dsl_core.model.figure import Figure
+from dsl_core.model.frames import FrameSource
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
+from dsl_core.model.result import DEPTH_INVALID
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
 
-NOTE_NAME = "stage.json"
+STAGE_NOTE = "stage.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
 LONGER = 3.0
-#: The longer exposure of the scan without filter, which shows the first orders, over the shorter one.
-LONG_RATIO = 6.0
 
 
 class StageNote(Record):
@@ -45,7 +55,7 @@ class StageNote(Record):
 
 
 @dataclass(frozen=True)
-class DepthStageRecipe:
+class DepthStageRecipe(Recipe[DepthStageCalibration]):
     """The calibration with a plane on a stage.
 
     ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the deviation with which it keeps
@@ -56,6 +66,12 @@ class DepthStageRecipe:
     three positions.
     """
 
+    name = "depth-stage"
+    title = "Depth stage"
+    #: Geometry to refine, and the chain that weighs the wavelengths of a filter.
+    needs = ("geometry", "spectralon", "bandpass")
+    record_type = DepthStageCalibration
+
     positions_mm: tuple[float, ...] = (600.0, 750.0, 900.0)
     filters_nm: tuple[float, ...] = (450.0, 540.0, 640.0)
     code_step_px: int = 4
@@ -64,26 +80,6 @@ class DepthStageRecipe:
     reflectance: float = 0.99
     chain: bool = True
     grid: bool = False
-
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        return "depth-stage"
-
-    @property
-    def title(self) -> str:
-        """Title of the wizard."""
-        return "Depth stage"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Geometry to refine, and the chain that weighs the wavelengths of a filter."""
-        return ("geometry", "spectralon", "bandpass")
-
-    @property
-    def record_type(self) -> type[Record]:
-        """The record that `fit` makes."""
-        return DepthStageCalibration
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """At each position the plane without filter, then through each filter."""
@@ -100,44 +96,41 @@ class DepthStageRecipe:
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Brightness and other light."""
         self._move(bench, step)
-        return film_light(measure_white(bench.devices, bench.rig), bench.rig)
-
-    def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the scan of a step is complete."""
-        return is_complete(bench.step_folder(step))
+        return film_light(shoot_white(bench), bench.rig)
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Move the stage, choose exposures by a test shot, and scan; goes on with a scan that was begun."""
+        """Move the stage, choose exposures by a test shot, and scan; a scan that was begun continues."""
         note = self._move(bench, step)
-        scan_step(bench.devices, bench.step_folder(step), lambda: self._begin(bench, step, note), progress)
+        bench.scan(step, lambda: self._begin(bench, step, note), progress)
 
     def fit(self, bench: Bench, progress: Progress) -> DepthStageCalibration:
         """Calibrate from the captures of all steps."""
         steps = self.steps(bench)
         plain = [step for step in steps if step.placement.filter_nm is None]
         filtered = [step for step in steps if step.placement.filter_nm is not None]
-        notes, count = [_note_of(bench, step) for step in plain], len(filtered) // len(plain)
+        notes, count = (
+            [bench.kept(step, STAGE_NOTE, StageNote) for step in plain],
+            len(filtered) // len(plain),
+        )
         data = StageData(
             positions_mm=tuple(note.position_mm for note in notes),
             stage_std_mm=self.stage_std_mm,
             columns=tuple(self._columns(bench, step, progress) for step in plain),
-            filters=tuple(_filter_of(_note_of(bench, step)) for step in filtered[:count]),
+            filters=tuple(_filter_of(bench.kept(step, STAGE_NOTE, StageNote)) for step in filtered[:count]),
             frames=lambda position, name: self._lines(bench, filtered[position * count + name]),
-            exposures=sum(_scan(bench, step).plan.shot_count for step in steps),
+            exposures=sum(bench.scan_of(step).plan.shot_count for step in steps),
         )
         found = calibrate_depth_stage(bench.rig, data, progress, self.grid)
         if not self.chain:
             return found
         return found.model_copy(update={"chain": self._chain(bench, plain, found, progress)})
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: DepthStageCalibration) -> tuple[Figure, ...]:
         """Flatness, steps, held-out error and doubts."""
-        assert isinstance(record, DepthStageCalibration)
         return depth_stage_figures(record)
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: DepthStageCalibration, rig: Rig) -> Rig:
         """The rig with refined geometry, film, residual and chain."""
-        assert isinstance(record, DepthStageCalibration)
         return apply_depth_stage(record, rig)
 
     def _move(self, bench: Bench, step: Step) -> StageNote:
@@ -157,10 +150,8 @@ class DepthStageRecipe:
 
     def _begin(self, bench: Bench, step: Step, note: StageNote) -> CapturePlan:
         """The plan of a step by a test shot; keeps where the stage is and which filter this is."""
-        plan = self._plan(bench.rig, step, measure_white(bench.devices, bench.rig))
-        folder = bench.step_folder(step)
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / NOTE_NAME, note.model_dump_json(indent=1).encode())
+        plan = self._plan(bench.rig, step, shoot_white(bench))
+        bench.keep(step, STAGE_NOTE, note)
         return plan
 
     def _plan(self, rig: Rig, step: Step, white: WhiteLevel) -> CapturePlan:
@@ -184,24 +175,23 @@ class DepthStageRecipe:
 
     def _columns(self, bench: Bench, step: Step, progress: Progress) -> ColumnSamples:
         with naming(step):
-            return zero_order_columns(_scan(bench, step), bench.rig, progress)
+            return zero_order_columns(bench.scan_of(step), bench.rig, progress)
 
     def _lines(self, bench: Bench, step: Step) -> LineFrames:
         with naming(step):
-            return lines_on_plane(_scan(bench, step), bench.rig)
+            return lines_on_plane(bench.scan_of(step), bench.rig)
 
     def _chain(
         self, bench: Bench, plain: list[Step], found: DepthStageCalibration, progress: Progress
     ) -> ChainCorrection:
         """What the lines without filter say of the chain, once it is known where the light goes."""
         from dsl_core.calibration.light.chain import chain_correction
-        from dsl_core.campaign.common.diffuser_lines import diffuser_lines
 
         rig = apply_depth_stage(found, bench.rig)
         scans = []
         for step in plain:
             with naming(step):
-                scans.append(diffuser_lines(_scan(bench, step), rig, progress))
+                scans.append(diffuser_lines(bench.scan_of(step), rig, progress))
         progress.report("chain", 0, 1)
         return chain_correction(rig, scans, reflectance=self.reflectance)
 
@@ -210,8 +200,8 @@ def _plain_step(position_mm: float) -> Step:
     return Step(
         f"position-{position_mm:g}",
         f"Plane at {position_mm:g} mm",
-        f"Mount the film before the projector and put the flat white target on the stage at {position_mm:g}"
-        " mm, facing the camera and filling its view. No filter before the camera.",
+        "Mount the film in front of the projector and put the flat white target on the stage at"
+        f" {position_mm:g} mm, facing the camera and filling its view. No filter in front of the camera.",
         Placement(target="spectralon", film=True, options={"depth_mm": position_mm}),
     )
 
@@ -221,22 +211,29 @@ def _filtered(position_mm: float, filters_nm: list[float]) -> list[Step]:
         Step(
             f"position-{position_mm:g}-filter-{nm:g}",
             f"Plane at {position_mm:g} mm, filter of {nm:g} nm",
-            f"Put the bandpass filter of {nm:g} nm flat before the camera's lens. Move nothing else.",
+            f"Put the bandpass filter of {nm:g} nm flat in front of the camera's lens. Move nothing else.",
             Placement(target="spectralon", film=True, filter_nm=nm, options={"depth_mm": position_mm}),
         )
         for nm in filters_nm
     ]
 
 
-def _scan(bench: Bench, step: Step) -> SessionReader:
-    return scan_of(bench.step_folder(step))
-
-
-def _note_of(bench: Bench, step: Step) -> StageNote:
-    return read_record(bench.step_folder(step) / NOTE_NAME, StageNote)
-
-
 def _filter_of(note: StageNote) -> StageFilter:
     assert note.filter_nm is not None
     assert note.transmission is not None
     return StageFilter(note.filter_nm, note.transmission, note.measured)
+
+
+def zero_order_columns(source: FrameSource, rig: Rig, progress: Progress | None = None) -> ColumnSamples:
+    """Tile means of the columns of a scan with code and lines; raises what a reconstruction raises."""
+    # What the geometry leaves open is common to neighbouring pixels, and is about to be found.
+    certain = rig.model_copy(update={"column_std_px": 0.0})
+    _, geometry = scanned_geometry(source, certain, progress)
+    invalid = (geometry.flags & int(DEPTH_INVALID)) != 0
+    return tile_columns(np.where(invalid, np.nan, geometry.column_px), geometry.column_std_px)
+
+
+def lines_on_plane(source: FrameSource, rig: Rig) -> LineFrames:
+    """The line frames of a scan at pixels evenly over the image; raises `CalibrationError` without lines."""
+    lines, pixels = scan_lines_of(source), thinned(source.plan.camera_size_px)
+    return LineFrames(lines, pixels, *line_frames(source, rig, pixels))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 
@@ -12,13 +11,11 @@ from dsl_core.calibration.geometry.bundle import SHARED
 from dsl_core.calibration.geometry.pose_series import MIN_POSES, exposure_warning, observe_series
 from dsl_core.calibration.geometry.projector_corners import observe_pose
 from dsl_core.calibration.geometry.solve import calibrate_geometry
-from dsl_core.campaign.common.exposures import bracket, measure_white
-from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.common.step_scan import is_complete, scan_of, scan_step
-from dsl_core.campaign.geometry.board_look import look_at_board
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step
+from dsl_core.campaign.common.white_shot import bracket, shoot_white
 from dsl_core.campaign.geometry.board_poses import default_poses
+from dsl_core.campaign.geometry.figures import geometry_figures, look_at_board
 from dsl_core.errors import CalibrationError
-from dsl_core.model.base import Record
 from dsl_core.model.board import Board, Checkerboard
 from dsl_core.model.calibration.geometry import GeometryCalibration, LeftOut
 from dsl_core.model.calibration.pose_frames import PoseFrames
@@ -27,12 +24,9 @@ from dsl_core.model.plan import CapturePlan, GrayCode, NoSpectral
 from dsl_core.model.rig import Rig
 from dsl_core.progress import Progress
 
-#: Limits of a good calibration, camera pixels of the unbinned sensor and projector pixels.
-RMS_PX, PLANE_SHARE, SQUARE_SHARE, COVERAGE = 0.5, 5e-4, 0.005, 0.35
-
 
 @dataclass(frozen=True)
-class GeometryRecipe:
+class GeometryRecipe(Recipe[GeometryCalibration]):
     """The calibration of both lenses and their pose.
 
     ``board`` is the printed board, its squares measured; ``poses`` how many of the proposed poses are taken.
@@ -41,30 +35,14 @@ class GeometryRecipe:
     without; their captures are kept.
     """
 
+    name = "geometry"
+    title = "Geometry"
+    record_type = GeometryCalibration
+
     board: Board = field(default_factory=lambda: Checkerboard(columns=11, rows=7, square_mm=20.0))
     poses: int = 10
     ratio: float = 1.0
     left_out: tuple[str, ...] = ()
-
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        return "geometry"
-
-    @property
-    def title(self) -> str:
-        """Title of the wizard."""
-        return "Geometry"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Nothing; the self-test only gives better exposures."""
-        return ()
-
-    @property
-    def record_type(self) -> type[Record]:
-        """The record that `fit` makes."""
-        return GeometryCalibration
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """A step for each pose."""
@@ -76,22 +54,17 @@ class GeometryRecipe:
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the board is whole, sharp and not over-exposed, how it stands, and the room's light."""
-        white = measure_white(bench.devices, bench.rig)
+        white = shoot_white(bench)
         return look_at_board(white, self.board, bench.rig, step.title)
 
-    def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the scan of the pose is complete."""
-        return is_complete(bench.step_folder(step))
-
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Choose an exposure by a test shot and capture the code; a scan that was begun goes on.
+        """Choose an exposure by a test shot and capture the code; a scan that was begun continues.
 
         Raises `CalibrationError` naming the pose when the board or the code on it cannot be read, or white is
         saturated.
         """
-        folder = bench.step_folder(step)
-        plan = scan_step(bench.devices, folder, lambda: self._plan(bench, step), progress)
-        frames = read_pose(folder, step.title, bench.rig)
+        plan = bench.scan(step, lambda: self._plan(bench, step), progress)
+        frames = read_pose(bench, step)
         doubt = exposure_warning(frames, observe_pose(frames, self.board, plan.projector_size_px))
         if doubt:
             raise CalibrationError(doubt)
@@ -117,9 +90,9 @@ class GeometryRecipe:
         def pictures() -> Iterator[PoseFrames]:
             for index, step in enumerate(steps):
                 progress.report("find the board", index, len(steps))
-                yield read_pose(bench.step_folder(step), step.title, bench.rig)
+                yield read_pose(bench, step)
 
-        plan = scan_of(bench.step_folder(steps[0])).plan
+        plan = bench.scan_of(steps[0]).plan
         series = observe_series(pictures(), self.board, plan.projector_size_px)
         progress.report("adjust lenses and pose", 0, 1)
         record = calibrate_geometry(
@@ -134,14 +107,12 @@ class GeometryRecipe:
         progress.report("adjust lenses and pose", 1, 1)
         return record
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: GeometryCalibration) -> tuple[Figure, ...]:
         """Reprojection, planes, squares and coverage against their limits."""
-        assert isinstance(record, GeometryCalibration)
         return geometry_figures(record)
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: GeometryCalibration, rig: Rig) -> Rig:
         """The rig with both lenses, their pose, and how well they and zero-order columns are known."""
-        assert isinstance(record, GeometryCalibration)
         known = rig.model_copy(
             update={
                 "camera": record.camera,
@@ -154,7 +125,7 @@ class GeometryRecipe:
 
     def _plan(self, bench: Bench, step: Step) -> CapturePlan:
         """The plan of a pose by a test shot."""
-        white = measure_white(bench.devices, bench.rig)
+        white = shoot_white(bench)
         settings = bracket(bench.rig, white, f"The board of {step.title}", self.ratio)
         return CapturePlan(
             name=step.title,
@@ -176,72 +147,20 @@ def open_columns_px(rig: Rig) -> float:
     return systematic_std(rig, shared_parameters(rig), root, np.eye(SHARED))[0]
 
 
-def read_pose(folder: Path, name: str, rig: Rig) -> PoseFrames:
+def read_pose(bench: Bench, step: Step) -> PoseFrames:
     """Pictures of a captured pose in linear light, all settings merged, black subtracted."""
     from dsl_core.reconstruction.merge import MergedScan
 
-    reader = scan_of(folder)
-    scan = MergedScan(reader, rig)
+    reader = bench.scan_of(step)
+    scan = MergedScan(reader, bench.rig)
     pairs = [scan.merge("code", index).radiance for index in range(reader.plan.code_count)]
     white = scan.merge("white", 0)
     return PoseFrames(
-        name,
+        step.title,
         pairs,
         white.radiance,
         np.zeros_like(white.radiance),
-        rig.sensor.bayer,
+        bench.rig.sensor.bayer,
         white.variance,
         white.saturated,
-    )
-
-
-def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
-    """Key figures of a geometric calibration."""
-    squares, board = record.squares, record.board
-    left_out = [pose.left_out.square_mm for pose in record.poses if pose.left_out]
-    unseen = max((abs(side / board.square_mm - 1) for side in left_out), default=0.0)
-    used = sum(pose.used for pose in record.poses)
-    more = "Add poses that fill the picture, tilted in all directions, sharp and evenly lit."
-    return (
-        Figure(name="poses used", value=used, unit="", low=3, high=len(record.poses), advice=more),
-        Figure(name="camera error", value=record.camera_rms_px, unit="px", high=RMS_PX, advice=more),
-        Figure(name="projector error", value=record.projector_rms_px, unit="px", high=RMS_PX, advice=more),
-        Figure(
-            name="side of a square",
-            value=squares.square_mm,
-            std=squares.square_std_mm,
-            unit="mm",
-            low=board.square_mm * (1 - SQUARE_SHARE),
-            high=board.square_mm * (1 + SQUARE_SHARE),
-            advice="Measure the printed squares again.",
-        ),
-        Figure(
-            name="squares of a pose left out, worst",
-            value=100 * unseen,
-            unit="%",
-            high=100 * SQUARE_SHARE,
-            advice=more,
-        ),
-        Figure(
-            name="distance from a plane, of the distance",
-            value=1e4 * record.plane_rms_share,
-            unit="10⁻⁴",
-            high=1e4 * PLANE_SHARE,
-            advice="Use a flat, stiff board, and keep it still.",
-        ),
-        Figure(
-            name="picture covered, camera",
-            value=100 * record.camera_coverage,
-            unit="%",
-            low=100 * COVERAGE,
-            advice=more,
-        ),
-        Figure(name="picture covered, projector", value=100 * record.projector_coverage, unit="%"),
-        Figure(
-            name="doubts about poses and print",
-            value=float(len(record.warnings)),
-            unit="",
-            high=0.0,
-            advice=" ".join(record.warnings),
-        ),
     )

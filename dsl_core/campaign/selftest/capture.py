@@ -1,39 +1,51 @@
-"""The captures of a self-test in their order: each part needs what the parts before found.
+"""The captures of a self-test: taken in an order in which each part needs what earlier ones found, and kept.
 
 First the colour cycle, from short exposures; then the latency, from exposures of whole cycles; everything
-else uses whole cycles and waits long enough.
+else uses whole cycles and waits long enough. All of it is kept in one compressed NumPy archive.
 """
 
 from __future__ import annotations
 
+import io
+import json
+import zipfile
 from collections.abc import Callable
+from dataclasses import fields
 from math import ceil
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from dsl_core.calibration.selftest.cycle import Cycle, advised_exposures, find_cycle, has_trusted_times
 from dsl_core.calibration.selftest.focus import BarFrames
 from dsl_core.calibration.selftest.latency import check_latency
-from dsl_core.calibration.selftest.readings import Readings
+from dsl_core.calibration.selftest.readings import Readings, RegionSizes
 from dsl_core.calibration.selftest.record import PUBLISHED_MS, SelfTestCapture, cycle_of, needs_spread
-from dsl_core.campaign.selftest.eye import BLACK, Eye
-from dsl_core.campaign.selftest.light import (
+from dsl_core.campaign.selftest.parts import (
     Frames,
     capture_bars,
     capture_beat,
+    capture_cycle,
     capture_dark,
+    capture_latency,
     capture_ramps,
     capture_series,
+    capture_spread,
     find_level,
+    white_rate,
 )
+from dsl_core.campaign.selftest.recorder import BLACK, Recorder
 from dsl_core.campaign.selftest.survey import Survey, survey
-from dsl_core.campaign.selftest.timing import capture_cycle, capture_latency, capture_spread, white_rate
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import CalibrationError, DeviceError
+from dsl_core.errors import CalibrationError, DeviceError, StoreError
+from dsl_core.io.atomic import store_error, write_atomic
 from dsl_core.progress import Progress
 
 SEED = 20240617
+ARCHIVE_NAME = "selftest.npz"
+_VERSION = 1
+_NUMBERS = ("wanted_ms", "shortest_ms", "claimed_latency_ms", "show_s", "frames", "duration_s")
 _PARTS = ("light", "colour cycle", "latency", "dark frames", "ramps", "linearity", "colour beat", "focus")
 #: Exposures are whole multiples of the shortest whole number of cycles that is at least this long.
 _UNIT_MS = 8.0
@@ -47,7 +59,7 @@ class SelfTestRun:
     """One run of all parts; `capture` does it."""
 
     def __init__(self, devices: DeviceRig, progress: Progress, wanted_ms: tuple[float, ...]) -> None:
-        self._eye = Eye(devices)
+        self._recorder = Recorder(devices)
         self._progress = progress
         self._wanted_ms = wanted_ms
         self._rng = np.random.default_rng(SEED)
@@ -56,23 +68,23 @@ class SelfTestRun:
 
     def capture(self) -> SelfTestCapture:
         """Take all frames; raises `CalibrationError` or `DeviceError` that names the part."""
-        eye, parts = self._eye, self._parts
-        seen = self._part(lambda: survey(eye, self._rng))
-        eye.region = seen.region
+        recorder, parts = self._recorder, self._parts
+        seen = self._part(lambda: survey(recorder, self._rng))
+        recorder.region = seen.region
         cycle = self._part(lambda: self._cycle(seen))
         rate = white_rate(parts["cycle"], seen.black_dn)
         unit_ms = _unit(cycle)
         self._part(lambda: self._latency(seen, unit_ms, rate))
-        parts["dark"], dark_frames = self._part(lambda: capture_dark(eye, unit_ms))
-        parts["ramps"] = self._part(lambda: capture_ramps(eye, unit_ms, seen.black_dn))
+        parts["dark"], dark_frames = self._part(lambda: capture_dark(recorder, unit_ms))
+        parts["ramps"] = self._part(lambda: capture_ramps(recorder, unit_ms, seen.black_dn))
         parts["series"], parts["saturated"] = self._part(
-            lambda: capture_series(eye, unit_ms, seen.black_dn, rate)
+            lambda: capture_series(recorder, unit_ms, seen.black_dn, rate)
         )
         parts["beat"] = self._part(
-            lambda: capture_beat(eye, self._exposures(cycle), seen.black_dn, rate, self._rng)
+            lambda: capture_beat(recorder, self._exposures(cycle), seen.black_dn, rate, self._rng)
         )
-        bars = self._part(lambda: capture_bars(eye, unit_ms, seen.black_dn, rate))
-        eye.show(BLACK)
+        bars = self._part(lambda: capture_bars(recorder, unit_ms, seen.black_dn, rate))
+        recorder.show(BLACK)
         return self._packed(seen, bars, dark_frames)
 
     def _part(self, work: Callable[[], T]) -> T:
@@ -85,19 +97,19 @@ class SelfTestRun:
         return found
 
     def _cycle(self, seen: Survey) -> Cycle:
-        readings = self._parts["cycle"] = capture_cycle(self._eye, seen, self._rng)
+        readings = self._parts["cycle"] = capture_cycle(self._recorder, seen, self._rng)
         spread = None
         if needs_spread(readings, find_cycle(readings, seen.black_dn)):
             rate = white_rate(readings, seen.black_dn)
-            spread = self._parts["spread"] = capture_spread(self._eye, seen, rate, self._rng)
+            spread = self._parts["spread"] = capture_spread(self._recorder, seen, rate, self._rng)
         return cycle_of(readings, spread, seen.black_dn)[0]
 
     def _latency(self, seen: Survey, unit_ms: float, rate: float) -> None:
-        eye = self._eye
-        readings = capture_latency(eye, unit_ms, find_level(eye, seen.black_dn, rate, unit_ms))
+        recorder = self._recorder
+        readings = capture_latency(recorder, unit_ms, find_level(recorder, seen.black_dn, rate, unit_ms))
         self._parts["latency"] = readings
         found = check_latency(readings, 0.0, has_trusted_times(self._parts["cycle"]), 0.0)
-        eye.settle_ms = found.wait_ms.value + _MARGIN_MS
+        recorder.settle_ms = found.wait_ms.value + _MARGIN_MS
 
     def _exposures(self, cycle: Cycle) -> tuple[float, ...]:
         """Exposures whose beat is measured: the published and the advised ones."""
@@ -106,18 +118,18 @@ class SelfTestRun:
         return tuple(dict.fromkeys((*PUBLISHED_MS, *advised)))
 
     def _packed(self, seen: Survey, bars: BarFrames, dark_frames: Frames) -> SelfTestCapture:
-        eye = self._eye
+        recorder = self._recorder
         return SelfTestCapture(
             parts=self._parts,
             sizes=seen.sizes,
             bars=bars,
             dark_frames=dark_frames,
             wanted_ms=self._wanted_ms,
-            shortest_ms=eye.devices.camera.info.exposure_range_ms[0],
-            claimed_latency_ms=eye.devices.projector.info.latency_ms,
-            show_s=float(np.median(eye.show_s)),
-            frames=eye.frames,
-            duration_s=eye.duration_s,
+            shortest_ms=recorder.devices.camera.info.exposure_range_ms[0],
+            claimed_latency_ms=recorder.devices.projector.info.latency_ms,
+            show_s=float(np.median(recorder.show_s)),
+            frames=recorder.frames,
+            duration_s=recorder.duration_s,
         )
 
 
@@ -126,3 +138,56 @@ def _unit(cycle: Cycle) -> float:
     if cycle.period_ms is None:
         return _UNIT_MS
     return ceil(_UNIT_MS / cycle.period_ms.value) * cycle.period_ms.value
+
+
+def save_capture(capture: SelfTestCapture, folder: Path) -> Path:
+    """Write the archive into a folder, which is made if need be; raises `StoreError`."""
+    arrays: dict[str, Any] = {
+        f"{part}/{each.name}": getattr(readings, each.name)
+        for part, readings in capture.parts.items()
+        for each in fields(Readings)
+    }
+    arrays |= {"pixels": capture.sizes.pixels, "beside": capture.sizes.beside}
+    arrays |= {"bars": np.stack(capture.bars.bars), "inverse": np.stack(capture.bars.inverse)}
+    arrays |= {"dark_frames": np.stack(capture.dark_frames)}
+    about = {name: getattr(capture, name) for name in _NUMBERS}
+    about |= {"version": _VERSION, "bit_depth": capture.sizes.bit_depth, "parts": list(capture.parts)}
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, about=np.array(json.dumps(about)), **arrays)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise store_error(folder, error) from error
+    write_atomic(folder / ARCHIVE_NAME, buffer.getbuffer())
+    return folder / ARCHIVE_NAME
+
+
+def load_capture(folder: Path) -> SelfTestCapture:
+    """Read the archive of a folder; raises `StoreError` when it is missing, damaged or of another version."""
+    path = folder / ARCHIVE_NAME
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            about = json.loads(str(stored["about"]))
+            if about["version"] != _VERSION:
+                raise ValueError(f"version {about['version']} instead of {_VERSION}")
+            return _unpacked({name: stored[name] for name in stored.files}, about)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise StoreError(
+            f"{path} is missing, damaged or of another version ({error}). Capture the self-test again."
+        ) from error
+
+
+def _unpacked(arrays: dict[str, Any], about: dict[str, Any]) -> SelfTestCapture:
+    parts = {
+        part: Readings(**{each.name: arrays[f"{part}/{each.name}"] for each in fields(Readings)})
+        for part in about["parts"]
+    }
+    bars, inverse, dark = arrays["bars"], arrays["inverse"], arrays["dark_frames"]
+    return SelfTestCapture(
+        parts=parts,
+        sizes=RegionSizes(arrays["pixels"], arrays["beside"], about["bit_depth"]),
+        bars=BarFrames((bars[0], bars[1]), (inverse[0], inverse[1])),
+        dark_frames=(dark[0], dark[1]),
+        **{name: about[name] for name in _NUMBERS if name != "wanted_ms"},
+        wanted_ms=tuple(about["wanted_ms"]),
+    )

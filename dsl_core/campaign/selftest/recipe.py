@@ -8,14 +8,12 @@ import numpy as np
 
 from dsl_core.calibration.selftest.figures import AMBIENT, selftest_figures
 from dsl_core.calibration.selftest.record import WANTED_MS, analyse
-from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.selftest.capture import SEED, SelfTestRun
-from dsl_core.campaign.selftest.eye import Eye
-from dsl_core.campaign.selftest.store import ARCHIVE_NAME, load_capture, save_capture
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SEED, SelfTestRun, load_capture, save_capture
+from dsl_core.campaign.selftest.recorder import Recorder
 from dsl_core.campaign.selftest.survey import survey
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError
-from dsl_core.model.base import Record
 from dsl_core.model.calibration.selftest import SelfTest
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
@@ -27,37 +25,21 @@ _LIT_SHARE = 0.2
 _STEP = Step(
     "light",
     "Self-test",
-    "Take the film off, and put a white, matt, flat target (Spectralon, paper) before the camera so that it"
-    " fills the view. Darken the room as for a scan.",
+    "Take the film off, and put a white, matt, flat target (Spectralon, paper) in front of the camera so that"
+    " it fills the view. Darken the room as for a scan.",
     Placement(target="spectralon", film=False),
 )
 
 
 @dataclass(frozen=True)
-class SelfTestRecipe:
+class SelfTestRecipe(Recipe[SelfTest]):
     """The self-test as a calibration; ``wanted_ms`` are the exposures that scans would like."""
 
+    name = "selftest"
+    title = "Self-test"
+    record_type = SelfTest
+
     wanted_ms: tuple[float, ...] = WANTED_MS
-
-    @property
-    def name(self) -> str:
-        """Name on the command line and of the folder."""
-        return "selftest"
-
-    @property
-    def title(self) -> str:
-        """Title of the wizard."""
-        return "Self-test"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Nothing has to be calibrated before."""
-        return ()
-
-    @property
-    def record_type(self) -> type[Record]:
-        """What `fit` makes."""
-        return SelfTest
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One step, film off, on a white target."""
@@ -66,11 +48,11 @@ class SelfTestRecipe:
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Share of the picture that is well lit, and ambient light; raises what the survey raises."""
         # The next attempt number keeps the noise of a simulated camera apart from that of the captures.
-        eye = Eye(bench.devices, attempt=1)
+        recorder = Recorder(bench.devices, attempt=1)
         try:
-            seen = survey(eye, np.random.default_rng(SEED))
+            seen = survey(recorder, np.random.default_rng(SEED))
         except (CalibrationError, DeviceError) as error:
-            raise type(error)(f"Step {step.title}: {error}") from error
+            raise type(error)(f"{step.title}: {error}") from error
         return (
             Figure(
                 name="well lit share of the picture",
@@ -90,31 +72,27 @@ class SelfTestRecipe:
         )
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
-        """Whether the archive of readings is there; it is written whole."""
+        """Whether the archive of readings exists; it is written whole."""
         return (bench.step_folder(step) / ARCHIVE_NAME).exists()
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Take all frames and keep their readings; an interrupted self-test begins anew."""
+        """Take all frames and keep their readings; an interrupted self-test starts again."""
         save_capture(SelfTestRun(bench.devices, progress, self.wanted_ms).capture(), bench.step_folder(step))
 
     def fit(self, bench: Bench, progress: Progress) -> SelfTest:
         """Analyse the readings on disk; raises `CalibrationError` that names what is wrong."""
         progress.report("self-test", 0, 1)
-        try:
+        with naming(_STEP):
             found = analyse(load_capture(bench.step_folder(_STEP)))
-        except (CalibrationError, DeviceError) as error:
-            raise CalibrationError(f"Step {_STEP.title}: {error}") from error
         progress.report("self-test", 1, 1)
         return found
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: SelfTest) -> tuple[Figure, ...]:
         """Everything measured, against its limits."""
-        assert isinstance(record, SelfTest)
         return selftest_figures(record)
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: SelfTest, rig: Rig) -> Rig:
         """Sensor, gamma and black of the projector, and the period of its colour cycle."""
-        assert isinstance(record, SelfTest)
         camera, projector = record.camera, record.projector
         sensor = {
             "bit_depth": camera.bit_depth,
@@ -135,7 +113,7 @@ class SelfTestRecipe:
 def run_selftest(
     devices: DeviceRig, progress: Progress | None = None, recipe: SelfTestRecipe | None = None
 ) -> tuple[SelfTest, tuple[Figure, ...]]:
-    """The self-test alone, with what stands before the camera or what the rig can place; nothing is kept.
+    """The self-test alone, on the target that is in place or that the rig can place; nothing is kept.
 
     Returns what was found and its figures; raises `CalibrationError` and `DeviceError`.
     """

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.selftest.readings import RegionSizes
-from dsl_core.campaign.selftest.eye import BLACK, Eye, Region, grey
+from dsl_core.campaign.selftest.recorder import BLACK, Recorder, Region, grey
 from dsl_core.errors import CalibrationError, DeviceError
 from dsl_core.optics.sensor import bayer_channels
 
@@ -22,7 +22,7 @@ _GLANCES, _MAP_FRAMES, _MAX_GAP_MS = 6, 16, 40.0
 _NO_LIGHT_DN = 10.0
 #: The region: pixels brighter than this share of the brightest ones of their channel.
 _LIT = 0.6
-#: Pixels beside the picture get less than this share, and keep this distance from brighter ones, px.
+#: Pixels next to the picture get less than this share, and keep this distance from brighter ones, px.
 _BESIDE, _DISTANCE_PX = 0.01, 6
 _FEWEST_PIXELS, _FEWEST_BESIDE = 200, 60
 
@@ -44,7 +44,7 @@ class Survey:
     ambient_std: float
 
 
-def survey(eye: Eye, rng: np.random.Generator) -> Survey:
+def survey(recorder: Recorder, rng: np.random.Generator) -> Survey:
     """Find exposure and region under white.
 
     Raises `CalibrationError` when there is no light, too much of it, or too little of the picture in view,
@@ -52,24 +52,24 @@ def survey(eye: Eye, rng: np.random.Generator) -> Survey:
     """
     from scipy.ndimage import uniform_filter
 
-    info = eye.devices.camera.info
+    info = recorder.devices.camera.info
     shortest = info.exposure_range_ms[0]
-    eye.show(BLACK)
-    black_dn = float(np.median(eye.snap(shortest).pixels))
-    if black_dn > 0.9 * eye.full_scale_dn:
+    recorder.show(BLACK)
+    black_dn = float(np.median(recorder.snap(shortest).pixels))
+    if black_dn > 0.9 * recorder.full_scale_dn:
         raise CalibrationError(
             f"The picture is saturated at the shortest exposure ({shortest:g} ms) although the projector"
             " shows black. Darken the room, and check the camera's black level and gain."
         )
-    eye.show(grey(1.0))
-    white_ms = _expose(eye, black_dn, rng)
-    _require_obedience(eye, white_ms, black_dn, rng)
-    eye.ceiling_dn = _ceiling(eye, white_ms)
-    _require_fresh_frames(eye, white_ms)
-    eye.show(grey(1.0))
-    white = _mean(eye, white_ms, rng)
-    eye.show(BLACK)
-    dark = _mean(eye, white_ms, rng)
+    recorder.show(grey(1.0))
+    white_ms = _expose(recorder, black_dn, rng)
+    _require_obedience(recorder, white_ms, black_dn, rng)
+    recorder.ceiling_dn = _ceiling(recorder, white_ms)
+    _require_fresh_frames(recorder, white_ms)
+    recorder.show(grey(1.0))
+    white = _mean(recorder, white_ms, rng)
+    recorder.show(BLACK)
+    dark = _mean(recorder, white_ms, rng)
     # Means over neighbours, so that the noise of bright ambient light is no light of the projector.
     if float(np.percentile(uniform_filter(white - dark, 9), 99)) < _NO_LIGHT_DN:
         raise _no_light(float(np.percentile(dark, 99)) - black_dn, white_ms)
@@ -93,29 +93,31 @@ def survey(eye: Eye, rng: np.random.Generator) -> Survey:
     )
 
 
-def _expose(eye: Eye, black_dn: float, rng: np.random.Generator) -> float:
+def _expose(recorder: Recorder, black_dn: float, rng: np.random.Generator) -> float:
     """The exposure at which the brightest moment of white reaches the aim, ms."""
-    shortest, longest = eye.devices.camera.info.exposure_range_ms
+    shortest, longest = recorder.devices.camera.info.exposure_range_ms
     exposure = shortest
     while True:
-        bright = float(np.percentile(_glance(eye, exposure, rng), 99))
-        if exposure == shortest and bright > 0.9 * eye.full_scale_dn:
+        bright = float(np.percentile(_glance(recorder, exposure, rng), 99))
+        if exposure == shortest and bright > 0.9 * recorder.full_scale_dn:
             raise CalibrationError(
                 f"White is saturated at the shortest exposure ({shortest:g} ms). Close the camera's aperture,"
                 " use a grey filter or lower the gain; if the camera keeps an exposure of its own, switch its"
                 " automatic exposure off."
             )
-        if bright - black_dn > _AIM * eye.full_scale_dn or 2 * exposure > min(longest, _LONGEST_MS):
+        if bright - black_dn > _AIM * recorder.full_scale_dn or 2 * exposure > min(longest, _LONGEST_MS):
             return exposure
         exposure *= 2
 
 
-def _require_obedience(eye: Eye, white_ms: float, black_dn: float, rng: np.random.Generator) -> None:
+def _require_obedience(
+    recorder: Recorder, white_ms: float, black_dn: float, rng: np.random.Generator
+) -> None:
     """Raise `DeviceError` when a quarter or four times the exposure gives the same light."""
-    low, high = eye.devices.camera.info.exposure_range_ms
+    low, high = recorder.devices.camera.info.exposure_range_ms
     other_ms = white_ms / 4 if white_ms / 4 >= low else min(4 * white_ms, high)
     pairs = sorted((white_ms, other_ms))
-    faint, bright = (float(_mean(eye, ms, rng).mean()) - black_dn for ms in pairs)
+    faint, bright = (float(_mean(recorder, ms, rng).mean()) - black_dn for ms in pairs)
     if bright > _NO_LIGHT_DN and bright < 1.5 * faint:
         raise DeviceError(
             f"The camera gives {faint:.0f} DN at {pairs[0]:.3g} ms and {bright:.0f} DN at {pairs[1]:.3g} ms"
@@ -123,21 +125,21 @@ def _require_obedience(eye: Eye, white_ms: float, black_dn: float, rng: np.rando
         )
 
 
-def _ceiling(eye: Eye, white_ms: float) -> float:
+def _ceiling(recorder: Recorder, white_ms: float) -> float:
     """Where signals end, DN: twice the light gives no more; infinite where the scale ends first."""
-    longest = min(eye.devices.camera.info.exposure_range_ms[1], _LONG_MS)
+    longest = min(recorder.devices.camera.info.exposure_range_ms[1], _LONG_MS)
     exposure_ms = min(_BRIGHTER * white_ms, longest / 2)
-    once, twice = (float(np.median(eye.snap(k * exposure_ms).pixels)) for k in (1, 2))
+    once, twice = (float(np.median(recorder.snap(k * exposure_ms).pixels)) for k in (1, 2))
     return twice if twice < 1.1 * once and exposure_ms > 2 * white_ms else float("inf")
 
 
-def _require_fresh_frames(eye: Eye, white_ms: float) -> None:
+def _require_fresh_frames(recorder: Recorder, white_ms: float) -> None:
     """Raise `DeviceError` when the frame after a change of the picture still shows the picture before."""
     for _ in range(2):
-        eye.show(grey(1.0))
-        bright = max(float(eye.snap(white_ms).pixels.mean()) for _ in range(_GLANCES))
-        eye.show(BLACK)
-        first, second = (float(eye.snap(white_ms).pixels.mean()) for _ in range(2))
+        recorder.show(grey(1.0))
+        bright = max(float(recorder.snap(white_ms).pixels.mean()) for _ in range(_GLANCES))
+        recorder.show(BLACK)
+        first, second = (float(recorder.snap(white_ms).pixels.mean()) for _ in range(2))
         if first - second < 0.2 * (bright - second) or bright - second < 0.1 * _NO_LIGHT_DN:
             return
     raise DeviceError(
@@ -146,21 +148,21 @@ def _require_fresh_frames(eye: Eye, white_ms: float) -> None:
     )
 
 
-def _glance(eye: Eye, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
+def _glance(recorder: Recorder, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
     """The brightest value of each pixel over a few frames at random times."""
-    brightest = eye.snap(exposure_ms).pixels
+    brightest = recorder.snap(exposure_ms).pixels
     for _ in range(_GLANCES - 1):
-        eye.wait(rng.uniform(0, _MAX_GAP_MS))
-        brightest = np.maximum(brightest, eye.snap(exposure_ms).pixels)
+        recorder.wait(rng.uniform(0, _MAX_GAP_MS))
+        brightest = np.maximum(brightest, recorder.snap(exposure_ms).pixels)
     return np.asarray(brightest, float)
 
 
-def _mean(eye: Eye, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
+def _mean(recorder: Recorder, exposure_ms: float, rng: np.random.Generator) -> NDArray[np.float64]:
     """The mean of frames at random times."""
     total = np.zeros(())
     for _ in range(_MAP_FRAMES):
-        eye.wait(rng.uniform(0, _MAX_GAP_MS))
-        total = total + eye.snap(exposure_ms).pixels
+        recorder.wait(rng.uniform(0, _MAX_GAP_MS))
+        total = total + recorder.snap(exposure_ms).pixels
     return np.asarray(total / _MAP_FRAMES)
 
 
@@ -179,7 +181,7 @@ def _no_light(ambient_dn: float, exposure_ms: float) -> CalibrationError | Devic
 def _find_region(
     bright: NDArray[np.float64], black: NDArray[np.float64], channels: NDArray[np.int64]
 ) -> tuple[Region, float]:
-    """Lit pixels and pixels beside the picture of each channel, without hot ones; the share of lit ones."""
+    """Lit pixels and pixels next to the picture of each channel, without hot ones; the share of lit ones."""
     from scipy.ndimage import maximum_filter
 
     white = bright - black

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
-from dsl_core.io.atomic import store_error, write_atomic
-from dsl_core.io.campaign_folder import read_record
 from dsl_core.io.spectra.spectrum_file import read_spectrum
 from dsl_core.model.calibration.spectralon import COLOURS, EmissionReadings, LightColour
 from dsl_core.model.spectral import SpectralCurve
@@ -27,41 +26,45 @@ DRIVE: dict[LightColour, tuple[int, int, int]] = {
 _ENDINGS = {".csv", ".txt", ".tsv", ".dat"}
 
 
-def is_read(folder: Path) -> bool:
-    """Whether the spectra of all pictures are kept."""
-    path = folder / READINGS_NAME
-    return path.exists() and set(load_readings(folder).readings) == set(COLOURS)
+def is_read(bench: Bench, step: Step) -> bool:
+    """Whether the spectra of all pictures are stored."""
+    return _is_begun(bench, step) and set(load_readings(bench, step).readings) == set(COLOURS)
 
 
-def load_readings(folder: Path) -> EmissionReadings:
+def load_readings(bench: Bench, step: Step) -> EmissionReadings:
     """The spectra of a step; raises `StoreError`."""
-    return read_record(folder / READINGS_NAME, EmissionReadings)
+    return bench.kept(step, READINGS_NAME, EmissionReadings)
 
 
-def read_emission(
-    devices: DeviceRig, folder: Path, count: int, files: Path | None, progress: Progress
-) -> None:
-    """Read all spectra and keep them: ``count`` of each picture, or those of a folder of ``files``.
+def read_emission(bench: Bench, step: Step, count: int, files: Path | None, progress: Progress) -> None:
+    """Read all spectra and store them: ``count`` of each picture, or those of a folder of ``files``.
 
     What an earlier call has read stays. Raises `CalibrationError` without an instrument and files, or for a
     file that is missing or wrong.
     """
     if files is not None:
-        _keep(folder, EmissionReadings(source=str(files.name), readings=_from_files(files)))
+        read = EmissionReadings(source=str(files.name), readings=_from_files(files))
+        bench.keep(step, READINGS_NAME, read)
         return
+    devices = bench.devices
     if devices.spectroradiometer is None:
         raise CalibrationError(
             f"The rig {devices.name!r} has no spectroradiometer. Measure the Spectralon under red, green,"
             " blue, white and black pictures with your own, save each spectrum as text (red.csv, green.csv,"
             " ...), and name their folder in the setting emission_folder."
         )
-    readings = load_readings(folder).readings if (folder / READINGS_NAME).exists() else {}
+    readings = load_readings(bench, step).readings if _is_begun(bench, step) else {}
     for done, colour in enumerate(COLOURS):
         progress.report("spectra", done, len(COLOURS))
         if colour not in readings:
             readings = {**readings, colour: _measure(devices, colour, count)}
-            _keep(folder, EmissionReadings(source="spectroradiometer", readings=readings))
+            read = EmissionReadings(source="spectroradiometer", readings=readings)
+            bench.keep(step, READINGS_NAME, read)
     progress.report("spectra", len(COLOURS), len(COLOURS))
+
+
+def _is_begun(bench: Bench, step: Step) -> bool:
+    return (bench.step_folder(step) / READINGS_NAME).exists()
 
 
 def _measure(devices: DeviceRig, colour: LightColour, count: int) -> tuple[SpectralCurve, ...]:
@@ -80,15 +83,7 @@ def _from_files(folder: Path) -> dict[LightColour, tuple[SpectralCurve, ...]]:
     missing = [colour for colour, found in named.items() if not found]
     if missing:
         raise CalibrationError(
-            f"{folder} holds no spectrum of {', '.join(missing)}. Name the files red*, green*, blue*, white*"
+            f"{folder} has no spectrum of {', '.join(missing)}. Name the files red*, green*, blue*, white*"
             f" and black*, with {', '.join(sorted(_ENDINGS))} at the end."
         )
     return {colour: tuple(read_spectrum(path) for path in found) for colour, found in named.items()}
-
-
-def _keep(folder: Path, readings: EmissionReadings) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise store_error(folder, error) from error
-    write_atomic(folder / READINGS_NAME, (readings.model_dump_json() + "\n").encode())

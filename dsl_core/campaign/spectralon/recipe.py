@@ -13,15 +13,12 @@ from dsl_core.calibration.light.spectralon import (
     spectralon_calibration,
 )
 from dsl_core.calibration.light.spectralon_figures import spectralon_figures, unevenness_of_middle
-from dsl_core.campaign.common import exposures
-from dsl_core.campaign.common.flat_target import capture_flat_target, middle, read_flat_target
-from dsl_core.campaign.common.light_look import brightness, other_light
-from dsl_core.campaign.common.recipe import Bench, Step
-from dsl_core.campaign.common.step_scan import is_complete
+from dsl_core.campaign.common.flat_target import capture_uniform, middle, read_uniform
+from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
+from dsl_core.campaign.common.white_shot import brightness, other_light, shoot_white
 from dsl_core.campaign.spectralon.emission_readings import is_read, load_readings, read_emission
-from dsl_core.errors import CalibrationError, DecodeError
+from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.spectrum_file import read_spectrum
-from dsl_core.model.base import Record
 from dsl_core.model.calibration.spectralon import MeasuredEmission, SpectralonCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
@@ -34,7 +31,7 @@ EMISSION, PICTURES = "emission", "pictures"
 
 
 @dataclass(frozen=True)
-class SpectralonRecipe:
+class SpectralonRecipe(Recipe[SpectralonCalibration]):
     """The calibration with a Spectralon.
 
     ``reflectance`` is its certified reflectance, or ``reflectance_file`` a text file of it over wavelength.
@@ -43,31 +40,17 @@ class SpectralonRecipe:
     ``depth_mm`` is how far away the target stands.
     """
 
+    name = "spectralon"
+    title = "Spectralon"
+    #: For the shading of the target.
+    needs = ("geometry",)
+    record_type = SpectralonCalibration
+
     reflectance: float = 0.99
     reflectance_file: str = ""
     readings: int = 16
     emission_folder: str = ""
     depth_mm: float = 700.0
-
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        return "spectralon"
-
-    @property
-    def title(self) -> str:
-        """Title of the wizard."""
-        return "Spectralon"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """Geometry, for the shading of the target."""
-        return ("geometry",)
-
-    @property
-    def record_type(self) -> type[Record]:
-        """The record that `fit` makes."""
-        return SpectralonCalibration
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """Spectra of the LEDs, then pictures."""
@@ -84,7 +67,7 @@ class SpectralonRecipe:
 
     def look(self, bench: Bench, step: Step) -> tuple[Figure, ...]:
         """Whether the middle is bright, even and free of other light."""
-        white = exposures.measure_white(bench.devices, bench.rig)
+        white = shoot_white(bench)
         return (
             brightness(white, bench.rig, "lens cap, aperture and projector"),
             unevenness_of_middle(white.picture, bench.rig),
@@ -93,39 +76,31 @@ class SpectralonRecipe:
 
     def is_captured(self, bench: Bench, step: Step) -> bool:
         """Whether all spectra are read, or the scan is complete."""
-        folder = bench.step_folder(step)
-        return is_read(folder) if step.key == EMISSION else is_complete(folder)
+        return is_read(bench, step) if step.key == EMISSION else bench.is_scanned(step)
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
         """Read spectra, or choose exposures by a test shot and capture."""
-        folder = bench.step_folder(step)
         if step.key == EMISSION:
             source = Path(self.emission_folder) if self.emission_folder else None
-            read_emission(bench.devices, folder, self.readings, source, progress)
+            read_emission(bench, step, self.readings, source, progress)
         else:
-            capture_flat_target(bench, folder, step.title, 1.0, progress)
+            capture_uniform(bench, step, 1.0, progress)
 
     def fit(self, bench: Bench, progress: Progress) -> SpectralonCalibration:
         """Emission, white signals and flat field from the captures."""
         spectra, pictures = self.steps(bench)
         reflectance = self._reflectance()
-        try:
-            emission = measured_emission(load_readings(bench.step_folder(spectra)), reflectance)
-        except CalibrationError as error:
-            raise CalibrationError(f"Step {spectra.title}: {error}") from error
-        try:
+        with naming(spectra):
+            emission = measured_emission(load_readings(bench, spectra), reflectance)
+        with naming(pictures):
             return self._pictures(bench, pictures, emission, reflectance, progress)
-        except (CalibrationError, DecodeError) as error:
-            raise CalibrationError(f"Step {pictures.title}: {error}") from error
 
-    def figures(self, record: Record) -> tuple[Figure, ...]:
+    def figures(self, record: SpectralonCalibration) -> tuple[Figure, ...]:
         """What was measured, against its limits."""
-        assert isinstance(record, SpectralonCalibration)
         return spectralon_figures(record)
 
-    def apply(self, record: Record, rig: Rig) -> Rig:
+    def apply(self, record: SpectralonCalibration, rig: Rig) -> Rig:
         """Emission, flat field, and responses and white scale that reproduce the white signals."""
-        assert isinstance(record, SpectralonCalibration)
         known = rig.model_copy(update={"emission": record.emission.curves, "flat_field": record.flat_field})
         return match_whites(known, record.white, record.reflectance)
 
@@ -137,7 +112,7 @@ class SpectralonRecipe:
         reflectance: SpectralCurve,
         progress: Progress,
     ) -> SpectralonCalibration:
-        target = read_flat_target(bench.step_folder(step), bench.rig, progress)
+        target = read_uniform(bench.scan_of(step), bench.rig, progress)
         found = target.plane(bench.rig, middle(target.lit.shape))
         uniform = UniformPictures(
             radiance=target.radiance,
@@ -156,7 +131,7 @@ class SpectralonRecipe:
             return read_spectrum(Path(self.reflectance_file), radiance=False)
         if not 0.05 < self.reflectance <= 1.05:
             raise CalibrationError(
-                f"The reflectance of the Spectralon cannot be {self.reflectance:g}; a share such as 0.99 is"
-                " wanted, from its certificate."
+                f"The reflectance of the Spectralon cannot be {self.reflectance:g}; give a share such as"
+                " 0.99, from its certificate."
             )
         return SpectralCurve.of([400.0, 700.0], [self.reflectance] * 2)

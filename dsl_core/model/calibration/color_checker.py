@@ -12,6 +12,9 @@ from dsl_core.model.rig import Rgb
 Point = tuple[float, float]
 Row3 = tuple[float, float, float]
 
+#: How a chart is turned, in words, by its quarter turns clockwise.
+TURNS = ("upright", "turned clockwise", "upside down", "turned anticlockwise")
+
 
 class PatchResult(Record):
     """One patch: its signals at unit shading and how far the model is from them.

@@ -17,7 +17,7 @@ from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import RigChoice, RigState
 from dsl_app.shared.jobs.base import JobRunner
 
-from dsl_core.campaign.common.recipe import Recipe
+from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.campaign.recipes import _build
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
@@ -63,7 +63,7 @@ class CalibrateBench:
     def row(self, name: str) -> Row:
         return next(row for row in self.state.rows.value if row.name == name)
 
-    def recipes(self, campaign: CampaignFolder) -> tuple[Recipe, ...]:
+    def recipes(self, campaign: CampaignFolder) -> tuple[AnyRecipe, ...]:
         made = []
         for name, kind in KINDS.items():
             recipe = _build(kind, name, campaign.info.settings.get(name, {}))

@@ -13,7 +13,6 @@ from dsl_app.shared.theme import Theme
 from pytestqt.qtbot import QtBot
 
 from dsl_core.calibration.film.depth_stage import stage_curves
-from dsl_core.campaign.depth_stage import figures as depth_stage_figures
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.model.calibration.depth_stage import (
     DepthStageCalibration,
@@ -149,12 +148,3 @@ def test_without_a_grid_the_film_alone_is_drawn(qtbot: QtBot) -> None:
     assert items(widget.difference, pg.PlotCurveItem) == []
     assert "no&nbsp;data-driven&nbsp;curve" in widget.difference.legend.text()
     assert not widget.warnings.isVisible()
-
-
-def test_limits_are_those_of_the_figures() -> None:
-    ours = depth_stage_evidence
-    assert (ours.PLANE_MM, ours.STEP_MM, ours.HELD_OUT_PX) == (
-        depth_stage_figures.MAX_PLANE_MM,
-        depth_stage_figures.MAX_STEP_MM,
-        depth_stage_figures.MAX_HELD_OUT_PX,
-    )

@@ -12,7 +12,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QStyle, QStyleOptionViewItem
 from pytestqt.qtbot import QtBot
 
-from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
 from dsl_core.campaign.geometry.recipe import GeometryRecipe
 from dsl_core.campaign.recipes import load_recipe
 from dsl_core.model.board import Checkerboard
@@ -144,13 +143,3 @@ def test_a_record_of_before_corners_were_kept_says_so(qtbot: QtBot) -> None:
     widget = shown(qtbot, "geometry", old, session_of(STEPS))
     assert widget.coverage.sentence.isVisible()
     assert "before corners were kept" in widget.coverage.sentence.text()
-
-
-def test_limits_are_those_of_the_calibration() -> None:
-    from dsl_app.calibrate.evidence import geometry as geometry_evidence
-
-    assert (geometry_evidence.CELLS, geometry_evidence.LIMIT_PX, geometry_evidence.MIN_POSES) == (
-        CELLS,
-        GOOD_RMS_PX,
-        MIN_POSES,
-    )

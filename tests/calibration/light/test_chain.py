@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.light.chain import LineScan, chain_correction
-from dsl_core.campaign.common.diffuser_lines import diffuser_lines
+from dsl_core.campaign.common.flat_target import diffuser_lines
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
@@ -125,5 +125,5 @@ def test_saturated_values_do_not_count(scanned: tuple[Rig, MemoryScan], lines: L
 def test_scan_without_lines_is_refused(scanned: tuple[Rig, MemoryScan]) -> None:
     rig, scan = scanned
     comb = MemoryScan(scan.plan.model_copy(update={"spectral": LineComb()}), scan.frames)
-    with pytest.raises(CalibrationError, match="holds no scan lines"):
+    with pytest.raises(CalibrationError, match="has no scan lines"):
         diffuser_lines(comb, rig)

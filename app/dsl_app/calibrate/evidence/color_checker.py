@@ -20,11 +20,12 @@ from dsl_app.calibrate.evidence.swatches import Swatches
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_app.shared.widgets.plots import RGB_COLOURS
-from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
+from dsl_core.calibration.colour.color_checker import WORST_PERCENT
+from dsl_core.model.calibration.color_checker import TURNS, ColorCheckerCalibration
 from dsl_core.model.rig import Rgb
 
 if TYPE_CHECKING:
-    from dsl_core.campaign.color_checker.chart_view import ChartView
+    from dsl_core.campaign.color_checker.recipe import ChartView
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -36,9 +37,6 @@ HELP = (
     " round the chart, until all outlines lie inside patches; then fit."
 )
 NO_FIT = "There is no fit yet."
-TURNS = ("upright", "turned clockwise", "upside down", "turned anticlockwise")
-#: What a patch that was held out should stay below, % of its white.
-WORST_PERCENT = 4.0
 HEADS = (
     ("Patch", "Name of the patch"),
     *(
@@ -145,7 +143,7 @@ class ColorCheckerEvidence(Evidence):
         self._draw()
 
         def read() -> ChartView:
-            from dsl_core.campaign.color_checker.chart_view import chart_view
+            from dsl_core.campaign.color_checker.recipe import chart_view
 
             return chart_view(record, bench, step)
 
@@ -164,7 +162,7 @@ class ColorCheckerEvidence(Evidence):
         self._say("Reading the picture…")
 
         def read() -> NDArray[np.uint8]:
-            from dsl_core.campaign.color_checker.chart_view import white_picture
+            from dsl_core.campaign.color_checker.recipe import white_picture
 
             return white_picture(bench, step)
 

@@ -15,6 +15,7 @@ from dsl_app.calibrate.evidence.curves import COVER, draw_points, level_line
 from dsl_app.calibrate.evidence.parts import BAR, DOT, LINE, Aside, Cell, ChartBox, Floats, Key, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_PLANE_MM, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
 
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-#: What a good calibration stays below: scatter about a plane and error of a step, mm; held-out error, px.
-PLANE_MM, STEP_MM, HELD_OUT_PX = 0.15, 0.1, 0.3
 FILM = (
     ("Lines", "lines_per_mm", "1/mm", 2),
     ("Distance from the projector", "distance_mm", "mm", 3),
@@ -159,7 +158,7 @@ class DepthStageEvidence(Evidence):
         box, theme = self.planes, self._theme
         heights = np.array([position.plane_rms_mm for position in record.positions])
         _draw_bars(box, [("", theme.pins[0], heights)], [f"{p.position_mm:g}" for p in record.positions])
-        _limit(box, float(heights.max()), PLANE_MM, theme)
+        _limit(box, float(heights.max()), MAX_PLANE_MM, theme)
         box.name_curves([(f"depth left open by the geometry {record.depth_std_mm:.3f} mm", theme.text, "")])
 
     def _draw_steps(self, record: DepthStageCalibration) -> None:
@@ -171,10 +170,10 @@ class DepthStageEvidence(Evidence):
         draw_points(box, at, error, std, theme.pins[0])
         level_line(box, 0.0, theme.muted)
         span = 1.2 * float((np.abs(error) + COVER * std).max())
-        if span > STEP_MM / 2:
-            span = max(span, 1.2 * STEP_MM)
-            level_line(box, STEP_MM, theme.bad, "limit")
-            level_line(box, -STEP_MM, theme.bad)
+        if span > MAX_STEP_MM / 2:
+            span = max(span, 1.2 * MAX_STEP_MM)
+            level_line(box, MAX_STEP_MM, theme.bad, "limit")
+            level_line(box, -MAX_STEP_MM, theme.bad)
         box.item.setXRange(at.min(), at.max(), padding=0.1)
         box.item.setYRange(-span, span, padding=0)
         box.name_curves(
@@ -195,7 +194,7 @@ class DepthStageEvidence(Evidence):
         )
         names = [_short(each.kept_out) for each in record.held_out]
         _draw_bars(box, kinds, names)
-        _limit(box, max(float(heights.max()) for _, _, heights in kinds), HELD_OUT_PX, theme)
+        _limit(box, max(float(heights.max()) for _, _, heights in kinds), MAX_HELD_OUT_PX, theme)
         box.plot.setLabel("bottom", "Left out: positions (mm), filters (nm), tiles")
         keys: list[Key] = [(name, colour, BAR) for name, colour, _ in kinds]
         if not record.residual.degrees:

@@ -23,6 +23,7 @@ from dsl_app.calibrate.evidence.curves import level_line
 from dsl_app.calibrate.evidence.parts import BAR, DOT, Cell, ChartBox, NumberTable, like_a_picture
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
+from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
 from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
 
 if TYPE_CHECKING:
@@ -30,10 +31,6 @@ if TYPE_CHECKING:
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-#: Cells a side of the grid that coverage counts.
-CELLS = 8
-#: What a good calibration stays below, px; fewer poses than this say too little.
-LIMIT_PX, MIN_POSES = 0.5, 3
 HEADS = (
     ("Pose", "Untick a pose to solve again without it"),
     ("Corners", "Corners of the board that were found, and how many of them are outliers"),
@@ -64,7 +61,8 @@ class GeometryEvidence(Evidence):
         )
         self.errors = ChartBox(
             "Error of each pose",
-            f"Rms distance of corners from where the calibration expects them; below {LIMIT_PX} px is good.",
+            "Rms distance of corners from where the calibration expects them; below"
+            f" {GOOD_RMS_PX} px is good.",
             "Rms error (px)",
             "Pose",
             left_width=60,
@@ -227,9 +225,9 @@ class GeometryEvidence(Evidence):
             )
             self.errors.item.addItem(bars)
         top = float(values.max())
-        if top > LIMIT_PX / 2:
-            level_line(self.errors, LIMIT_PX, theme.bad, "limit")
-            top = max(top, 1.1 * LIMIT_PX)
+        if top > GOOD_RMS_PX / 2:
+            level_line(self.errors, GOOD_RMS_PX, theme.bad, "limit")
+            top = max(top, 1.1 * GOOD_RMS_PX)
         self.errors.item.setRange(xRange=(-0.6, len(at) - 0.4), yRange=(0, 1.1 * top), padding=0)
         ticks = [(i, pose.name.removeprefix("Pose ")) for i, pose in enumerate(record.poses)]
         self.errors.item.getAxis("bottom").setTicks([ticks])

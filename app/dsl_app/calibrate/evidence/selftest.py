@@ -82,7 +82,7 @@ class SelfTestEvidence(Evidence):
 
         def read() -> SelfTestCurves:
             from dsl_core.calibration.selftest.record import selftest_curves
-            from dsl_core.campaign.selftest.store import load_capture
+            from dsl_core.campaign.selftest.capture import load_capture
 
             return selftest_curves(load_capture(folder))
 

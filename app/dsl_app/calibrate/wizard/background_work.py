@@ -13,7 +13,7 @@ import numpy as np
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.settings import changed_settings, setting_rows
 from dsl_app.calibrate.wizard.state import Fit, Look, SettingRow
-from dsl_core.campaign.common.recipe import Recipe, Step
+from dsl_core.campaign.common.recipe import AnyRecipe, Step
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.campaign.session import CalibrationSession, StepStatus
@@ -60,7 +60,7 @@ class BackgroundWork:
         # A copy, so that the rig of the window keeps its own camera.
         self._devices = replace(devices, camera=self.camera)
         self._session: CalibrationSession | None = None
-        self._all: Sequence[Recipe] = ()
+        self._all: Sequence[AnyRecipe] = ()
         self._placed = ""
 
     @property
@@ -96,7 +96,7 @@ class BackgroundWork:
         places = self._devices.place is not None
         return Opened(recipe.title, statuses, settings, self._found(), places)
 
-    def _recipe(self, recipes: Sequence[Recipe]) -> Recipe:
+    def _recipe(self, recipes: Sequence[AnyRecipe]) -> AnyRecipe:
         return next(recipe for recipe in recipes if recipe.name == self._name)
 
     def _found(self) -> Fit | None:

@@ -12,10 +12,10 @@ from typing import Any
 from pydantic import BaseModel
 
 from dsl_app.calibrate.wizard.state import SettingRow
-from dsl_core.campaign.common.recipe import Recipe
+from dsl_core.campaign.common.recipe import AnyRecipe
 
 
-def setting_rows(recipe: Recipe, settings: Mapping[str, str]) -> tuple[SettingRow, ...]:
+def setting_rows(recipe: AnyRecipe, settings: Mapping[str, str]) -> tuple[SettingRow, ...]:
     """A row for each field of a recipe, with the value in the campaign or its default."""
     kind: type[Any] = type(recipe)
     if not is_dataclass(kind):

@@ -10,7 +10,6 @@ import pytest
 
 from dsl_core.campaign.bandpass.recipe import BandpassRecipe
 from dsl_core.campaign.common.recipe import Bench
-from dsl_core.campaign.common.step_scan import scan_of
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration
 from dsl_core.model.figure import failures
@@ -87,9 +86,9 @@ def test_figures_pass_and_record_goes_through_json(record: BandpassCalibration) 
 
 def test_finished_scan_is_not_taken_again(bench: Bench) -> None:
     step = RECIPE.steps(bench)[1]
-    before = scan_of(bench.step_folder(step)).entries
+    before = bench.scan_of(step).entries
     take(RECIPE, bench, step)
-    assert scan_of(bench.step_folder(step)).entries == before
+    assert bench.scan_of(step).entries == before
 
 
 def test_wrong_filter_is_refused_before_anything_is_stored(bench: Bench, tmp_path: Path) -> None:

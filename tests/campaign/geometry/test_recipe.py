@@ -67,7 +67,7 @@ def record(bench: Bench) -> GeometryCalibration:
 
 @pytest.fixture(scope="module")
 def poses(bench: Bench) -> list[PoseFrames]:
-    return [read_pose(bench.step_folder(step), step.title, bench.rig) for step in RECIPE.steps(bench)]
+    return [read_pose(bench, step) for step in RECIPE.steps(bench)]
 
 
 def columns(rig: Rig, depth_mm: float) -> NDArray[np.float64]:
@@ -196,7 +196,7 @@ def test_two_settings_are_merged(tmp_path: Path) -> None:
     take(recipe, bench, step)
     manifest = json.loads((bench.step_folder(step) / "scan.dsl" / "manifest.json").read_text())
     assert len(manifest["plan"]["settings"]) == 2
-    frames = read_pose(bench.step_folder(step), step.title, bench.rig)
+    frames = read_pose(bench, step)
     assert frames.saturated is not None
     assert frames.variance is not None
     assert not frames.saturated.any()

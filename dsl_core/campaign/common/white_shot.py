@@ -1,18 +1,26 @@
-"""A white picture taken to see how bright each colour is, and exposures that suit it."""
+"""A test shot of white: how bright each colour is, exposures that suit it, and what it says of the light.
+
+Recipes look with it, and choose the exposures of their scans by it.
+"""
 
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.orders.filter_check import colour_shift
+from dsl_core.campaign.common.recipe import Bench
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError
+from dsl_core.model.base import Record
+from dsl_core.model.figure import Figure
 from dsl_core.model.plan import Setting
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.filters import nominal_filter
 from dsl_core.optics.sensor import bayer_channels
 
 #: Share of the range above black that white may reach; a line is dimmer by what the orders of others add.
@@ -23,10 +31,18 @@ LEAST_FILL, MOST_FILL = 0.1, 0.9
 BRIGHTEST_SHARE = 0.005
 #: Longest exposure that is chosen, ms; of a picture for judging, at most a third.
 LONGEST_MS = 4000.0
+#: The longer exposure of a scan without filter, which shows first orders and halo, over the shorter one.
+LONG_RATIO = 6.0
 #: Drive levels for a bracket, the brightest first, and the LED cycles that must not saturate.
 LEVELS, CYCLES = (1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2), 6
 #: White dimmer than this share of the range in the longest exposure is too dark to measure.
 TOO_DARK = 0.02
+#: White after the shortest exposure (DN), and light that is not the projector's (% of white).
+LEAST_DN, MOST_OTHER = 0.5, 20.0
+#: A filter whose colours fit another one so many nm away so much better (chi-square) is another one.
+COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
+#: White without a filter is at least this many times brighter than through one.
+OPEN_FACTOR = 3.0
 _ATTEMPTS = 14
 
 
@@ -46,8 +62,9 @@ class WhiteLevel:
     picture: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
 
-def measure_white(devices: DeviceRig, rig: Rig) -> WhiteLevel:
+def shoot_white(bench: Bench) -> WhiteLevel:
     """Show white and black and expose for whole LED cycles until white is neither dark nor saturated."""
+    devices, rig = bench.devices, bench.rig
     range_dn = rig.sensor.full_scale_dn - rig.sensor.black_level_dn
     level, cycles = 1.0, 1
     for attempt in range(_ATTEMPTS):
@@ -122,7 +139,78 @@ def bracket(
 def _snap(devices: DeviceRig, drive: int, attempt: int) -> NDArray[np.uint16]:
     info = devices.projector.info
     devices.projector.show(np.full((info.height_px, info.width_px), drive, np.uint8))
-    (devices.sleep or time.sleep)(info.latency_ms / 1000)
     # Numbers of their own, so that the twin's noise here is not that of a scan.
     devices.camera.prepare(1_000_000 + drive, attempt)
     return devices.camera.snap().pixels
+
+
+def brightness(white: WhiteLevel, rig: Rig, parts: str) -> Figure:
+    """White after the shortest safe exposure; ``parts`` are what to check when it is dark."""
+    return Figure(
+        name="white after one LED cycle",
+        value=white.brightest * rig.frame_period_ms,
+        unit="DN",
+        low=LEAST_DN,
+        advice=f"The picture is dark. Check {parts}.",
+    )
+
+
+def other_light(white: WhiteLevel, shade: str = "") -> Figure:
+    """Light that stays when the projector shows black; ``shade`` is what to darken as well as the room."""
+    return Figure(
+        name="other light",
+        value=100 * white.ambient,
+        unit="% of white",
+        high=MOST_OTHER,
+        advice=f"Darken the room or shade the {shade}." if shade else "Darken the room.",
+    )
+
+
+def film_light(white: WhiteLevel, rig: Rig) -> tuple[Figure, Figure]:
+    """Both figures for a flat target behind the film."""
+    return brightness(white, rig, "lens cap, aperture, projector and filter"), other_light(white, "target")
+
+
+class FilterNote(Record):
+    """The filter of a step: nominal centre, transmission, and whether that was measured."""
+
+    filter_nm: float
+    transmission: SpectralCurve
+    measured: bool
+
+
+def note_of_filter(devices: DeviceRig, filter_nm: float) -> FilterNote:
+    """What is known of a rig's filter: its measured transmission, or a nominal one."""
+    curve = devices.filters.get(filter_nm)
+    return FilterNote(
+        filter_nm=filter_nm, transmission=curve or nominal_filter(filter_nm), measured=curve is not None
+    )
+
+
+def colour_figure(rig: Rig, white: WhiteLevel, note: FilterNote) -> Figure:
+    """How far the colours of a test shot are from those of the filter."""
+    shift, gain = colour_shift(rig, white.mean, note.transmission)
+    return Figure(
+        name="filter by its colours",
+        value=shift if gain > COLOUR_GAIN else 0.0,
+        unit="nm from the one requested",
+        low=-COLOUR_NM,
+        high=COLOUR_NM,
+        advice=f"Put the filter of {note.filter_nm:g} nm in front of the camera.",
+    )
+
+
+def require_filter(
+    rig: Rig, white: WhiteLevel, note: FilterNote, title: str, open_white: float | None
+) -> None:
+    """Raise `CalibrationError` when a test shot of the step ``title`` shows another filter, or none.
+
+    ``open_white`` is the brightness without a filter (DN per ms at full drive), None where it is not known.
+    """
+    again = f"Put the filter of {note.filter_nm:g} nm in front of the camera and capture the step again."
+    if open_white is not None and white.brightest * OPEN_FACTOR > open_white:
+        raise CalibrationError(f"{title}: the picture is about as bright as without a filter. {again}")
+    figure = colour_figure(rig, white, note)
+    if not figure.passed:
+        found = f"the colours are those of a filter of about {note.filter_nm + figure.value:.0f} nm"
+        raise CalibrationError(f"{title}: {found}. {again}")

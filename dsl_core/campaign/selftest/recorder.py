@@ -36,7 +36,7 @@ def grey(level: float) -> Drive:
 
 @dataclass(frozen=True)
 class Region:
-    """Pixels of a raw mosaic, as indices into it: well lit ones and those beside the picture, per channel."""
+    """Pixels of a raw mosaic, as indices: well lit ones and those next to the picture, per channel."""
 
     lit: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
     beside: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
@@ -59,8 +59,8 @@ class _Row:
 
 
 @dataclass
-class Eye:
-    """Camera and projector together.
+class Recorder:
+    """Records readings with camera and projector together.
 
     ``attempt`` tells the frames of a look from those that are kept; ``ceiling_dn`` is where signals end if
     that is below the end of the scale.
@@ -102,14 +102,14 @@ class Eye:
         (self.devices.sleep or time.sleep)(ms / 1000)
 
     def show(self, drive: Drive, settle_ms: float | None = None) -> None:
-        """Fill the picture with one colour and wait until it is there."""
+        """Fill the picture with one colour and wait until it is visible."""
         info = self.devices.projector.info
         image = np.empty((info.height_px, info.width_px, 3), np.uint8)
         image[:] = drive
         self.show_image(image, drive, settle_ms)
 
     def show_image(self, image: NDArray[np.uint8], drive: Drive, settle_ms: float | None = None) -> None:
-        """Show a picture and wait until it is there; ``drive`` is what its bright parts are driven with."""
+        """Show a picture and wait until it is visible; ``drive`` is what its bright parts are driven with."""
         start = time.perf_counter()
         self.devices.projector.show(image)
         self.show_s.append(time.perf_counter() - start)
@@ -117,7 +117,7 @@ class Eye:
         self.wait(self.settle_ms if settle_ms is None else settle_ms)
 
     def snap(self, exposure_ms: float) -> Frame:
-        """One frame; raises `DeviceError` when the camera fails again and again or exposes otherwise."""
+        """One frame; raises `DeviceError` when the camera fails repeatedly or exposes for another time."""
         camera, info = self.devices.camera, self.devices.camera.info
         if exposure_ms != self._exposure_ms:
             actual = camera.configure(exposure_ms)

@@ -10,8 +10,7 @@ import pytest
 import torch
 
 from dsl_core.campaign.common.recipe import Bench
-from dsl_core.campaign.common.step_scan import scan_of
-from dsl_core.campaign.depth_stage.recipe import NOTE_NAME, DepthStageRecipe
+from dsl_core.campaign.depth_stage.recipe import STAGE_NOTE, DepthStageRecipe
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
@@ -105,13 +104,13 @@ def test_a_bulge_is_told_in_mm(record: DepthStageCalibration) -> None:
 
 def test_finished_scan_is_not_taken_again(bench: Bench) -> None:
     step = RECIPE.steps(bench)[FILTERED]
-    before = scan_of(bench.step_folder(step)).entries
+    before = bench.scan_of(step).entries
     take(RECIPE, bench, step)
-    assert scan_of(bench.step_folder(step)).entries == before
+    assert bench.scan_of(step).entries == before
 
 
 def test_stage_notes_where_it_was(bench: Bench) -> None:
-    notes = [(bench.step_folder(step) / NOTE_NAME).read_text() for step in RECIPE.steps(bench)]
+    notes = [(bench.step_folder(step) / STAGE_NOTE).read_text() for step in RECIPE.steps(bench)]
     assert ["850.0" in note for note in notes] == [False] * 4 + [True] * 4
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from dsl_core.campaign.common.recipe import Bench
 from dsl_core.campaign.recipes import load_recipe
+from dsl_core.campaign.selftest.capture import ARCHIVE_NAME
 from dsl_core.campaign.selftest.recipe import SelfTestRecipe, run_selftest
-from dsl_core.campaign.selftest.store import ARCHIVE_NAME
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DeviceError, StoreError
 from dsl_core.model.calibration.selftest import Measured, SelfTest
@@ -212,7 +212,7 @@ def test_a_look_says_whether_the_target_is_right(tmp_path: Path) -> None:
     assert failed(RECIPE.look(here, step)) == []
     bright = bench(light_rig(LightWorld(ambient=20.0)), tmp_path)
     assert failed(RECIPE.look(bright, step)) == ["ambient light"]
-    with pytest.raises(CalibrationError, match=r"Step Self-test: .*lens cap"):
+    with pytest.raises(CalibrationError, match=r"Self-test: .*lens cap"):
         RECIPE.look(bench(light_rig(LightWorld(brightness=0.0)), tmp_path), step)
     assert list(tmp_path.iterdir()) == []
 

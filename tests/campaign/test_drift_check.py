@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.drift.geometry import smooth_part
-from dsl_core.campaign.drift import drift_figures, quick_plan
+from dsl_core.campaign.drift_check import drift_figures, quick_plan
 from dsl_core.errors import CalibrationError, DecodeError
 from dsl_core.model.figure import failures
 from dsl_core.model.geometry import Pose
