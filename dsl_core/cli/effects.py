@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -51,15 +52,14 @@ def effects(
     with open_rig("twin", with_effects(options, None, tolerance)) as rig:
         assert isinstance(rig.camera, SimCamera)
         world = rig.camera.world
-        world.settings = captured.settings
-        made = world.effect_plan()
+        made = world.effect_plan(replace(world.request, settings=captured.settings))
     output.table(
         ("effect", "what it is", "changes at most", "costs a frame", "", "why"),
         [_row(decision) for decision in made.decisions],
     )
     output.say(_left_out(made))
     output.say(_saved(made, captured.shot_count))
-    output.put(**describe(made, world.effects.text), frames=captured.shot_count)
+    output.put(**describe(made, world.request.choice.text), frames=captured.shot_count)
     output.finish()
 
 

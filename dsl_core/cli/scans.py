@@ -37,7 +37,9 @@ if TYPE_CHECKING:
 
 
 def rigs(json: Json = False) -> None:
-    """List the rigs that are installed."""
+    """List the rigs that are installed, and their options."""
+    from dataclasses import asdict
+
     from dsl_core.devices.registry import list_rigs
 
     output, entries = Output(json), list_rigs()
@@ -45,7 +47,11 @@ def rigs(json: Json = False) -> None:
         ("rig", "package", "what it is"),
         [(e.name, f"{e.package} {e.version}", e.error or e.description) for e in entries],
     )
-    output.put(rigs=[vars(entry) for entry in entries])
+    output.table(
+        ("rig", "option", "default", "meaning"),
+        [(e.name, option.name, option.default, option.meaning) for e in entries for option in e.options],
+    )
+    output.put(rigs=[asdict(entry) for entry in entries])
     output.finish()
 
 

@@ -1,7 +1,8 @@
 """Rigs by name: any installed package adds one through the entry-point group ``dsl_scan.rigs``.
 
 The value of an entry point is a function ``open(options: dict[str, str]) -> DeviceRig`` whose
-docstring starts with one line for the list of rigs.
+docstring starts with one line for the list of rigs. Its attribute ``options``, if it has one, is a pydantic
+model whose fields are listed with their defaults and descriptions; see `with_options`.
 """
 
 from __future__ import annotations
@@ -10,6 +11,9 @@ import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
+
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
 
 import dsl_core
 from dsl_core.devices.base import DeviceRig
@@ -25,6 +29,15 @@ OpenRig = Callable[[dict[str, str]], DeviceRig]
 
 
 @dataclass(frozen=True)
+class OptionEntry:
+    """An option of a rig, with its default as text; an empty one means that it is not given."""
+
+    name: str
+    default: str
+    meaning: str
+
+
+@dataclass(frozen=True)
 class RigEntry:
     """A rig that can be opened by name, or ``error``: why it cannot."""
 
@@ -33,6 +46,17 @@ class RigEntry:
     version: str
     description: str = ""
     error: str = ""
+    options: tuple[OptionEntry, ...] = ()
+
+
+def with_options(record: type[BaseModel]) -> Callable[[OpenRig], OpenRig]:
+    """Declares what options an opener reads: the fields of a pydantic model, each with a description."""
+
+    def declare(function: OpenRig) -> OpenRig:
+        function.options = record  # type: ignore[attr-defined]
+        return function
+
+    return declare
 
 
 def list_rigs() -> list[RigEntry]:
@@ -107,4 +131,26 @@ def _describe(point: EntryPoint) -> RigEntry:
     except DeviceError as error:
         return RigEntry(point.name, package, version, error=str(error))
     lines = (inspect.getdoc(function) or "").splitlines()
-    return RigEntry(point.name, package, version, description=lines[0] if lines else "")
+    return RigEntry(
+        point.name, package, version, description=lines[0] if lines else "", options=_options(function)
+    )
+
+
+def _options(function: OpenRig) -> tuple[OptionEntry, ...]:
+    """The options that an opener declares; none if it declares no pydantic model."""
+    record = getattr(function, "options", None)
+    if not (inspect.isclass(record) and issubclass(record, BaseModel)):
+        return ()
+    return tuple(
+        OptionEntry(name, _as_text(field.get_default(call_default_factory=True)), field.description or "")
+        for name, field in record.model_fields.items()
+    )
+
+
+def _as_text(value: object) -> str:
+    """A default as a person types it."""
+    if value is None or value is PydanticUndefined:
+        return ""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:g}" if isinstance(value, float) else str(value)

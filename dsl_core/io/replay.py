@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from pydantic import BaseModel, Field
+
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.registry import with_options
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
 from dsl_core.io.scan.session import SessionReader
 
 
+class ReplayOptions(BaseModel):
+    """What ``replay`` can be asked for."""
+
+    session: str = Field(description="folder of the scan to play back")
+
+
+@with_options(ReplayOptions)
 def open_replay(options: dict[str, str]) -> DeviceRig:
     """Plays a stored scan back; option ``session`` is its folder.
 

@@ -24,10 +24,10 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.references import FINE_NM, References
 from dsl_core.planning.views import View, pixels_view
 from dsl_core.reconstruction.surface import default_window_px
+from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.scenes import materials
 from dsl_core.simulation.scenes.flat import patch_grid
-from dsl_core.simulation.scenes.options import ENDLESS
-from dsl_core.simulation.scenes.surfaces import tilted
+from dsl_core.simulation.scenes.surfaces import ENDLESS, tilted
 from dsl_core.simulation.scenes.truth import Materials, Scene
 from dsl_core.simulation.sim_devices import assemble
 from dsl_core.simulation.world import World
@@ -174,7 +174,7 @@ def scan_piece(
     piece: Rig, plan: CapturePlan, palette: Palette, depth_mm: float, grid: WavelengthGrid, seed: int
 ) -> tuple[MemorySink, Truth]:
     """A finished scan of a piece in memory, and its truth."""
-    world = World(piece, scene_at=lambda position_mm: chart_scene(piece, palette, depth_mm), seed=seed)
+    world = World(Setup(piece), scene_at=lambda position_mm: chart_scene(piece, palette, depth_mm), seed=seed)
     world.insert(True, CLEAR)
     devices = assemble(world)
     sink = MemorySink(pipeline.fit_plan(plan, devices))

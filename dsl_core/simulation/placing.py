@@ -11,31 +11,11 @@ from dsl_core.model.placement import Placement
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.scenes.truth import Scene
+from dsl_core.simulation.twin_options import Mishaps
 from dsl_core.simulation.world import World
 
 #: Where a stage stands when nothing is asked.
 STAGE_MM = 700.0
-
-
-@dataclass(frozen=True)
-class Mishaps:
-    """What a person might do wrong, for trying how calibrations notice.
-
-    ``wrong_filter_nm`` is in the beam whichever was asked for; filters are tilted by ``filter_tilt_deg``;
-    diffusers bulge by ``bow_mm`` over 300 mm; the stage moves ``stage_scale`` times as far from 700 mm as it
-    says; a chart is turned by ``roll_deg`` more than asked; a board stands ``shift_mm`` to the right of where
-    it should and is printed ``print_scale`` times as large; with ``missing`` there is a wall instead of a
-    board or a chart.
-    """
-
-    wrong_filter_nm: float | None = None
-    filter_tilt_deg: float = 0.0
-    bow_mm: float = 0.0
-    stage_scale: float = 1.0
-    roll_deg: float = 0.0
-    shift_mm: float = 0.0
-    print_scale: float = 1.0
-    missing: bool = False
 
 
 @dataclass
@@ -43,8 +23,8 @@ class TwinHand:
     """Does for the twin what instructions ask of a person; ``filter_seed`` draws the set of filters."""
 
     world: World
-    filter_seed: int = 0
-    mishaps: Mishaps = Mishaps()
+    filter_seed: int
+    mishaps: Mishaps
     _standing: tuple[str, dict[str, float | str]] | None = None
 
     def __call__(self, placement: Placement) -> None:
@@ -75,10 +55,10 @@ class TwinHand:
             case "spectralon":
                 position = _position_mm(options)
                 return lambda position_mm: self._diffuser(position_mm, options), position
-            case "color-checker" | "board" if self.mishaps.missing:
+            case "color-checker" | "board" if self.mishaps.target_missing:
                 return lambda position_mm: make_scene("plane", depth_mm=position_mm), STAGE_MM
             case "color-checker":
-                turn = (float(options.pop("roll_deg", 0.0)) + self.mishaps.roll_deg + 180) % 360 - 180
+                turn = (float(options.pop("roll_deg", 0.0)) + self.mishaps.chart_roll_deg + 180) % 360 - 180
                 return lambda position_mm: make_scene("color-checker", roll_deg=turn, **options), STAGE_MM
             case "board":
                 position = _position_mm(options)
@@ -89,8 +69,8 @@ class TwinHand:
     def _mistaken(self, options: dict[str, float | str]) -> dict[str, float]:
         """Options of a board that differ from what was asked."""
         found = {}
-        if self.mishaps.shift_mm:
-            found["x_mm"] = float(options.get("x_mm", 0.0)) + self.mishaps.shift_mm
+        if self.mishaps.board_shift_mm:
+            found["x_mm"] = float(options.get("x_mm", 0.0)) + self.mishaps.board_shift_mm
         if self.mishaps.print_scale != 1:
             sizes = [name for name in ("square_mm", "marker_mm") if name in options]
             found |= {name: float(options[name]) * self.mishaps.print_scale for name in sizes}

@@ -6,6 +6,7 @@ import json
 import time
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import (
@@ -17,20 +18,24 @@ from dsl_core.devices.base import (
     Spectroradiometer,
     Stage,
 )
+from dsl_core.devices.registry import with_options
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
+from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.correspondence import GratingModel, zero_order
 from dsl_core.simulation.bandpass_filters import measured_transmissions
-from dsl_core.simulation.effects.catalogue import USUAL_CHOICE, Choice
+from dsl_core.simulation.effects.catalogue import USUAL_CHOICE
 from dsl_core.simulation.effects.planner import describe
-from dsl_core.simulation.effects.tolerance import Tolerance
-from dsl_core.simulation.placing import Mishaps, TwinHand
+from dsl_core.simulation.placing import TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
+from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
-from dsl_core.simulation.spot import spot_light
-from dsl_core.simulation.world import AMBIENT_DN_PER_MS, Clock, World
+from dsl_core.simulation.twin_options import TwinOptions, number
+from dsl_core.simulation.world import Clock, World
 
+Floats = NDArray[np.float64]
 LATENCY_MS = 50.0
 #: What the projector says of its frames, whatever its LEDs do.
 CLAIMED_PERIOD_MS = 1000.0 / 60.0
@@ -162,93 +167,96 @@ class SimSpectroradiometer(Spectroradiometer):
         return SpectralCurve.of(nm, value, unit="W/(sr m2 nm)")
 
 
+def spot_light(world: World, spot: tuple[int, int], wavelengths_nm: Floats) -> Floats:
+    """Spectral radiance of the light on a camera pixel (row, column), in units of the emission curves.
+
+    The zero order comes from one projector pixel, first orders (with the film) from another column at each
+    wavelength.
+    """
+    rig, depth_mm = world.rig, float(world.truth.depth_mm[spot])
+    if not np.isfinite(depth_mm):
+        return np.zeros(len(wavelengths_nm))
+    pixel = torch.tensor([spot[0] * rig.camera.width_px + spot[1]])
+    depth = torch.tensor([depth_mm], dtype=torch.float64)
+    emission = np.stack([curve.at(wavelengths_nm) for curve in rig.emission])
+    column, row = (float(q[0]) for q in zero_order(rig, pixel, depth))
+    total = (_drive(world, np.array([column]), np.array([row])) * emission).sum(0)
+    nm = wavelengths_nm.copy()  # torch wants to own what it reads
+    for order in (1, -1) if world.setup.film else ():
+        columns, rows = (q[:, 0].numpy() for q in GratingModel(rig).exact(pixel, depth, order, nm))
+        share = rig.efficiency[order].at(wavelengths_nm)
+        total = total + share * (_drive(world, columns, rows) * emission).sum(0)
+    return np.asarray(total)
+
+
+def _drive(world: World, columns: Floats, rows: Floats) -> Floats:
+    """Radiance of each LED at projector pixels, shape (3, n); only the dark projector's outside its frame."""
+    response = world.rig.projector_response
+    height, width = world.rig.projector.height_px, world.rig.projector.width_px
+    shown = np.zeros((height, width, 1), np.uint8) if world.image is None else np.atleast_3d(world.image)
+    x, y = np.round(columns).astype(int), np.round(rows).astype(int)
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    levels = shown[y.clip(0, height - 1), x.clip(0, width - 1)] / 255
+    radiance = np.where(inside[:, None], response.radiance(levels), 0.0)
+    return np.broadcast_to(radiance, (len(columns), 3)).T
+
+
+@with_options(TwinOptions)
 def open_twin(options: dict[str, str]) -> DeviceRig:
     """The twin of the published rig; scenes, noise and image size as options.
 
-    ``scene`` (default ``color-checker``) and its own options, ``size`` (``890x580``), ``seed``, ``noise``
-    (``on``, ``off``), ``sigma`` (extra Gaussian noise as a share of full scale, known to the calibration),
-    ``film`` (``on``, ``off``), ``device`` (``cpu``, ``cuda``), ``realtime`` (``on`` waits as long as real
-    devices would).
-
-    ``effects`` says what is rendered of all that light does: ``usual`` (the default, what the plain renderer
-    has), ``all``, ``none``, names, or ``auto``: what the scene calls for, within a ``tolerance`` (``1DN``,
-    ``0.5sigma``).
-
-    For calibrations: ``truth`` (a number draws a rig around the published one, whose calibration nobody
-    knows), ``led_cycle_hz`` (the LEDs flash in turn instead of shining steadily), ``ambient_dn_per_ms``. For
-    mishaps: ``defocus_px``, ``brightness`` (the light is so many times as bright), ``wrong_filter_nm``,
-    ``filter_tilt_deg``, ``bow_mm``, ``stage_scale``, ``chart_roll_deg``, ``board_shift_mm``, ``print_scale``,
-    ``target_missing`` (``on``, ``off``).
-
-    Raises `DeviceError` for a value that makes no sense.
+    See `TwinOptions`; all other options are those of the scene. Raises `DeviceError` for a value that makes
+    no sense, and `PlanError` for an option that the scene does not have.
     """
-    rest = dict(options)
-    nominal = rig = published_rig()
-    size = rest.pop("size", "")
-    if size:
-        nominal = rig = rig.model_copy(update={"camera": rig.camera.resized(*_size(size))})
-    truth = rest.pop("truth", None)
-    drawn = 0 if truth is None else int(_number("truth", truth))
-    if truth is not None:
-        rig = random_rig(drawn, rig)
-    cycle_hz = _number("led_cycle_hz", rest.pop("led_cycle_hz", "0"))
-    if cycle_hz:
-        rig = rig.model_copy(update={"frame_period_ms": 1000.0 / cycle_hz})
-    sigma = _number("sigma", rest.pop("sigma", "0"))
-    if sigma:
-        noise_dn = np.hypot(rig.sensor.read_noise_dn, sigma * rig.sensor.full_scale_dn)
-        rig = rig.model_copy(
-            update={"sensor": rig.sensor.model_copy(update={"read_noise_dn": float(noise_dn)})}
-        )
-    brightness = _number("brightness", rest.pop("brightness", "1"))
-    if brightness != 1:
-        rig = rig.model_copy(update={"white_scale": rig.white_scale * brightness})
-    # What is true leaves nothing open in its columns.
-    rig = rig.model_copy(update={"column_std_px": 0.0})
-    mishaps = _mishaps(rest)
-    name = rest.pop("scene", "color-checker")
+    chosen, of_scene = TwinOptions.of(options)
+    nominal = published_rig()
+    if chosen.size:
+        nominal = nominal.model_copy(update={"camera": nominal.camera.resized(*chosen.size)})
     world = World(
-        rig,
-        scene_at=lambda position_mm: make_scene(name, **rest),
-        seed=int(_number("seed", rest.pop("seed", "0"))),
-        noise=_switch("noise", rest.pop("noise", "on")),
-        film=_switch("film", rest.pop("film", "on")),
-        device=rest.pop("device", "cpu"),
-        effects=Choice.of(rest.pop("effects", "usual")),
-        tolerance=Tolerance.of(rest.pop("tolerance", "1DN")),
-        ambient_dn_per_ms=_number("ambient_dn_per_ms", rest.pop("ambient_dn_per_ms", str(AMBIENT_DN_PER_MS))),
-        led_cycle_ms=1000.0 / cycle_hz if cycle_hz else None,
-        defocus_px=_number("defocus_px", rest.pop("defocus_px", "0")),
-        clock=Clock(sleep=time.sleep) if _switch("realtime", rest.pop("realtime", "off")) else Clock(),
+        Setup(
+            _true_rig(nominal, chosen),
+            film=chosen.film,
+            ambient_dn_per_ms=chosen.ambient_dn_per_ms,
+            led_cycle_ms=1000.0 / chosen.led_cycle_hz if chosen.led_cycle_hz else None,
+            defocus_px=chosen.defocus_px,
+            device=chosen.device,
+        ),
+        scene_at=lambda position_mm: make_scene(chosen.scene, **of_scene),
+        request=EffectRequest(chosen.choice, chosen.limit),
+        seed=chosen.seed,
+        noise=chosen.noise,
+        clock=Clock(sleep=time.sleep) if chosen.realtime else Clock(),
     )
-    if name in STAGED:
-        world.position_mm = _number("depth_mm", rest.pop("depth_mm", "700"))
-        world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **rest)
+    if chosen.scene in STAGED:
+        world.position_mm = number("depth_mm", of_scene.pop("depth_mm", "700"))
+        world.scene_at = lambda position_mm: make_scene("plane", depth_mm=position_mm, **of_scene)
     # Built once now, so that a wrong name or option is told before anything is captured.
     world.scene_at(world.position_mm)
     devices = assemble(world)
+    drawn = chosen.truth or 0
     devices.nominal, devices.filters = nominal, measured_transmissions(drawn)
-    devices.place = TwinHand(world, drawn, mishaps)
-    if world.effects != USUAL_CHOICE:
-        devices.notes["effects"] = json.dumps(describe(world.effect_plan(), world.effects.text))
-    if truth is not None:
+    devices.place = TwinHand(world, drawn, chosen)
+    if chosen.choice != USUAL_CHOICE:
+        devices.notes["effects"] = json.dumps(describe(world.effect_plan(), chosen.effects))
+    if chosen.truth is not None:
         devices.calibration = None
     return devices
 
 
-def _mishaps(options: dict[str, str]) -> Mishaps:
-    """Take the options of mishaps out of all options."""
-    wrong = options.pop("wrong_filter_nm", None)
-    return Mishaps(
-        None if wrong is None else _number("wrong_filter_nm", wrong),
-        _number("filter_tilt_deg", options.pop("filter_tilt_deg", "0")),
-        _number("bow_mm", options.pop("bow_mm", "0")),
-        _number("stage_scale", options.pop("stage_scale", "1")),
-        _number("chart_roll_deg", options.pop("chart_roll_deg", "0")),
-        _number("board_shift_mm", options.pop("board_shift_mm", "0")),
-        _number("print_scale", options.pop("print_scale", "1")),
-        _switch("target_missing", options.pop("target_missing", "off")),
-    )
+def _true_rig(nominal: Rig, chosen: TwinOptions) -> Rig:
+    """The rig that pictures are rendered with: what a calibration should find."""
+    rig = nominal if chosen.truth is None else random_rig(chosen.truth, nominal)
+    if chosen.led_cycle_hz:
+        rig = rig.model_copy(update={"frame_period_ms": 1000.0 / chosen.led_cycle_hz})
+    if chosen.sigma:
+        noise_dn = np.hypot(rig.sensor.read_noise_dn, chosen.sigma * rig.sensor.full_scale_dn)
+        rig = rig.model_copy(
+            update={"sensor": rig.sensor.model_copy(update={"read_noise_dn": float(noise_dn)})}
+        )
+    if chosen.brightness != 1:
+        rig = rig.model_copy(update={"white_scale": rig.white_scale * chosen.brightness})
+    # What is true leaves nothing open in its columns.
+    return rig.model_copy(update={"column_std_px": 0.0})
 
 
 def assemble(world: World) -> DeviceRig:
@@ -262,29 +270,3 @@ def assemble(world: World) -> DeviceRig:
         calibration=world.rig,
         sleep=world.clock.wait,
     )
-
-
-def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError:
-        width = height = 0
-    if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise DeviceError(f"The twin's size must be like 890x580 (16 to 4096 pixels a side), not {text!r}.")
-    return width, height
-
-
-def _number(name: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value) or value < 0:
-        raise DeviceError(f"The twin's option {name} must be a number of at least 0, not {text!r}.")
-    return value
-
-
-def _switch(name: str, text: str) -> bool:
-    if text not in ("on", "off"):
-        raise DeviceError(f"The twin's option {name} must be 'on' or 'off', not {text!r}.")
-    return text == "on"

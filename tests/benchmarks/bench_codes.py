@@ -25,6 +25,7 @@ from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
 from dsl_core.simulation.effects.catalogue import USUAL, Choice
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
@@ -166,7 +167,7 @@ def main() -> None:
     rig = rig.model_copy(update={"camera": rig.camera.resized(*size)})
     rows: list[Row] = []
     for scene, kind in (("box", effects), ("box, walls dark to each other", replace(effects, names=USUAL))):
-        world = World(rig, lambda z: make_scene("box"), effects=kind)
+        world = World(Setup(rig), lambda z: make_scene("box"), request=EffectRequest(kind))
         found = list(measure(rig, scene, render(world, size), size))
         print(f"{scene}, {size[0]} x {size[1]} px")
         print_table(HEADER, [cells(row) for row in found])

@@ -26,6 +26,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
@@ -56,7 +57,7 @@ class Position:
 def render(rig: Rig, position_mm: float) -> Position:
     """Render all patterns of a plane once; the noise comes later."""
     film, none = (
-        World(rig, lambda z: make_scene("plane", depth_mm=z), position_mm=position_mm, film=film)
+        World(Setup(rig, film=film), lambda z: make_scene("plane", depth_mm=z), position_mm=position_mm)
         for film in (True, False)
     )
     return Position(film.truth.depth_mm, lit(film), render_plan(film, PLAN), render_plan(none, CODE_PLAN))

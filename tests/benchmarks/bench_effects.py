@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
+from dsl_core.simulation.effects.base import LightPath, Limits, PatternView, make_view
 from dsl_core.simulation.effects.catalogue import EFFECTS, NAMES, Choice, with_effects
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.path import LightPath, View
 from dsl_core.simulation.effects.planner import plan_effects
 from dsl_core.simulation.effects.tolerance import Tolerance
-from dsl_core.simulation.effects.view import make_view
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
+from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.world import World
 from tests.benchmarks.common import options, print_table, write_json
 from tests.cases.effect_scenes import CALLS_FOR, frame_dn, troubled_world, world_of
@@ -92,7 +91,7 @@ def random_pictures(rng: np.random.Generator) -> list[NDArray[np.uint8]]:
 
 
 def largest_difference(
-    paths: tuple[LightPath, ...], views: tuple[View, ...], rng: np.random.Generator
+    paths: tuple[LightPath, ...], views: tuple[PatternView, ...], rng: np.random.Generator
 ) -> float:
     """The largest difference of any pixel between two paths, over pictures at the brighter setting, DN."""
     worst, exposure_ms = 0.0, Limits(paths[0]).exposure_ms
@@ -102,7 +101,7 @@ def largest_difference(
     return worst
 
 
-def seconds_of_a_line(view: View) -> float:
+def seconds_of_a_line(view: PatternView) -> float:
     """CPU seconds of a frame with a line, the fastest of three runs."""
     lines = np.zeros((TIMED, 360, 640), np.uint8)
     for i, line in enumerate(lines):
@@ -141,7 +140,7 @@ def compare(scene: str, rig: Rig, tolerance: Tolerance, rng: np.random.Generator
 
 def usual(world: World) -> LightPath:
     """What the plain renderer has."""
-    return World(world.rig, world.scene_at).path
+    return World(Setup(world.rig), world.scene_at).path
 
 
 def random_scenes(count: int, size: tuple[int, int], tolerance: Tolerance) -> list[Compared]:
@@ -196,8 +195,8 @@ def needs(name: str, scene: str, tolerance: Tolerance) -> tuple[str, str, float,
     worlds = [(troubled_world if troubled else world_of)(scene) for _ in range(2)]
     plan = plan_effects(worlds[0].everything(), tolerance)
     bound = next(d.bound.dn for d in plan.decisions if d.effect.name == name)
-    worlds[0].effects = Choice.of("all")
-    worlds[1].effects = Choice(f"all but {name}", frozenset(NAMES) - {name})
+    worlds[0].request = EffectRequest(Choice.of("all"))
+    worlds[1].request = EffectRequest(Choice(f"all but {name}", frozenset(NAMES) - {name}))
     return name, scene, change_of_frames(worlds), bound, name in plan.names
 
 

@@ -30,6 +30,7 @@ from dsl_core.progress import NoProgress
 from dsl_core.simulation.bandpass_filters import measured_transmissions, true_transmission
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
+from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 from tests.benchmarks.common import NoisyScan, options, print_table, render_plan, write_json
@@ -71,7 +72,7 @@ def captures(rig: Rig, positions: Sequence[int], filters: Sequence[int]) -> dict
     )
     found = {}
     for k, f in product(positions, filters):
-        world = World(rig, lambda mm: make_scene("plane", depth_mm=mm), POSITIONS_MM[k])
+        world = World(Setup(rig), lambda mm: make_scene("plane", depth_mm=mm), POSITIONS_MM[k])
         world.insert(True, true_transmission(FILTERS_NM[f]))
         scan = NoisyScan(plan, render_plan(world, plan), rig.sensor, seed=100 * k + f)
         found[k, f] = lines_on_plane(scan, rig)

@@ -15,6 +15,7 @@ from dsl_core.model.plan import GrayCode
 from dsl_core.optics.pinhole import project
 from dsl_core.patterns.gray_code import code_image, frame_count
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 
@@ -38,7 +39,7 @@ def frames_of(
     """All pictures of a pose, film off, with noise."""
     rig = published_rig()
     rig = rig.model_copy(update={"camera": rig.camera.resized(*size_px)})
-    world = World(rig, lambda position_mm: make_scene("board", **pose), film=False, seed=seed)
+    world = World(Setup(rig, film=False), lambda position_mm: make_scene("board", **pose), seed=seed)
     pictures = []
     for index in range(frame_count(GrayCode(), PROJECTOR_PX)):
         world.show(code_image(GrayCode(), PROJECTOR_PX, index))

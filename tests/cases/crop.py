@@ -10,6 +10,7 @@ import torch
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.rig import Rig
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.sim_devices import assemble
 from dsl_core.simulation.world import World
@@ -31,7 +32,8 @@ def cropped_rig(corner_px: tuple[int, int], size_px: tuple[int, int] = (64, 48))
 
 def cropped_twin(scene: str, corner_px: tuple[int, int], size_px: tuple[int, int] = (64, 48)) -> DeviceRig:
     """The twin with all its effects, looking at a window of a scene."""
-    return assemble(World(cropped_rig(corner_px, size_px), scene_at=lambda position_mm: make_scene(scene)))
+    setup = Setup(cropped_rig(corner_px, size_px))
+    return assemble(World(setup, scene_at=lambda position_mm: make_scene(scene)))
 
 
 @contextmanager

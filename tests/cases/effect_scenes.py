@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.flat_field import FlatField
 from dsl_core.model.rig import Rig
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.path import LightPath, View
-from dsl_core.simulation.effects.view import make_view
+from dsl_core.simulation.effects.base import LightPath, Limits, PatternView, make_view
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendered_scene import EffectRequest, Setup
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.world import World
 from dsl_core.solve.threads import one_kernel_thread
@@ -54,14 +55,22 @@ def small_rig(size: tuple[int, int] = SIZE) -> Rig:
     )
 
 
-def world_of(scene: str, rig: Rig | None = None, **fields: object) -> World:
-    """A world with a scene like ``steps step_mm=60``."""
+def world_of(
+    scene: str,
+    rig: Rig | None = None,
+    request: EffectRequest | None = None,
+    noise: bool = True,
+    **setup: float | None,
+) -> World:
+    """A world with a scene like ``steps step_mm=60``; ``setup`` are numbers of its `Setup`."""
     name, *options = scene.split()
     chosen = dict(option.split("=") for option in options)
-    world = World(rig or small_rig(), scene_at=lambda position_mm: make_scene(name, **chosen))
-    for field, value in fields.items():
-        setattr(world, field, value)
-    return world
+    return World(
+        replace(Setup(rig or small_rig()), **setup),  # type: ignore[arg-type]
+        lambda position_mm: make_scene(name, **chosen),
+        request=request or EffectRequest(),
+        noise=noise,
+    )
 
 
 def troubled_world(scene: str) -> World:
@@ -83,7 +92,7 @@ def pictures(rng: np.random.Generator) -> list[NDArray[np.uint8]]:
 
 
 def frame_dn(
-    path: LightPath, view: View, image: NDArray[np.uint8], exposure_ms: float
+    path: LightPath, view: PatternView, image: NDArray[np.uint8], exposure_ms: float
 ) -> NDArray[np.float32]:
     """What a frame shows without noise and rounding: expected counts, ended at full scale."""
     from scipy.ndimage import gaussian_filter

@@ -20,6 +20,7 @@ Install = Callable[..., None]
 DRIVER = '''
 """A rig whose camera reads the mean of the pattern."""
 import numpy as np
+from pydantic import BaseModel, Field
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, ProjectorInfo
 from dsl_core.errors import PlanError
 from dsl_core.model.frames import Frame
@@ -54,6 +55,13 @@ class MeanProjector(Projector):
         self.image = image
 
 
+class MeanOptions(BaseModel):
+    port: str = Field(description="where it is plugged in")
+    gain: float = Field(default=2.0, description="gain of the camera")
+    light: bool = Field(default=True, description="on or off")
+    serial: str | None = None
+
+
 def open_rig(options):
     """Reads the mean of every pattern.
 
@@ -65,6 +73,9 @@ def open_rig(options):
         raise KeyError("no such port")
     projector = MeanProjector()
     return DeviceRig("mean", MeanCamera(projector), projector)
+
+
+open_rig.options = MeanOptions
 
 
 def open_nothing(options):
@@ -100,6 +111,10 @@ def test_the_rigs_of_this_package_are_listed() -> None:
         assert found[name].package == "dsl-scan"
         assert found[name].error == ""
         assert found[name].description
+        assert all(option.meaning for option in found[name].options)
+    twin = {option.name: option for option in found["twin"].options}
+    assert (twin["noise"].default, twin["tolerance"].default, twin["truth"].default) == ("on", "1DN", "")
+    assert [option.name for option in found["replay"].options] == ["session"]
 
 
 def test_a_rig_of_another_package_is_listed_and_scanned(install: Install) -> None:
@@ -107,6 +122,12 @@ def test_a_rig_of_another_package_is_listed_and_scanned(install: Install) -> Non
     entry = next(entry for entry in list_rigs() if entry.name == "mean")
     assert (entry.package, entry.version) == ("mean_rig", "1.2")
     assert (entry.description, entry.error) == ("Reads the mean of every pattern.", "")
+    assert [(option.name, option.default, option.meaning) for option in entry.options] == [
+        ("port", "", "where it is plugged in"),
+        ("gain", "2", "gain of the camera"),
+        ("light", "on", "on or off"),
+        ("serial", "", ""),
+    ]
     plan = CapturePlan(
         camera_size_px=(12, 8),
         projector_size_px=(32, 18),

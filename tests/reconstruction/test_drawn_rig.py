@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from dsl_core import pipeline
@@ -25,7 +27,8 @@ def scan(vignetting: bool) -> tuple[Rig, MemoryScan]:
     assert isinstance(devices.camera, SimCamera)
     world = devices.camera.world
     if not vignetting:
-        world.rig = world.rig.model_copy(update={"flat_field": None})
+        even = world.rig.model_copy(update={"flat_field": None})
+        world.setup = replace(world.setup, rig=even)
     return world.rig, capture(devices, PLAN)
 
 

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.optics.led_cycle import led_weights
+from dsl_core.simulation.effects.base import LightPath, Limits, make_view
 from dsl_core.simulation.effects.catalogue import EFFECTS, Choice
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.path import LightPath
 from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
 from dsl_core.simulation.effects.projector_light import largest_deviation
 from dsl_core.simulation.effects.tolerance import Tolerance
-from dsl_core.simulation.effects.view import make_view
+from dsl_core.simulation.rendered_scene import EffectRequest
 from tests.cases.effect_scenes import (
     CALLS_FOR,
     HEIGHT,
@@ -69,8 +68,8 @@ def test_what_a_scene_calls_for_changes_it_by_more_than_the_tolerance_and_less_t
 
 def test_leds_in_turn_change_a_frame_within_the_bound() -> None:
     worlds = [troubled_world("plane"), troubled_world("plane")]
-    worlds[1].effects = Choice("steady", frozenset(BY_NAME) - {"led-cycle"})
-    worlds[0].effects = Choice.of("all")
+    worlds[1].request = EffectRequest(Choice("steady", frozenset(BY_NAME) - {"led-cycle"}))
+    worlds[0].request = EffectRequest(Choice.of("all"))
     exposure_ms, frames = CapturePlan().settings[0].exposure_ms, []
     for world in worlds:
         world.noise = False
@@ -92,7 +91,7 @@ def test_the_largest_share_of_an_led_is_met_by_some_start(periods: float) -> Non
 def test_noise_lies_within_its_bound_and_shows(name: str) -> None:
     frames = []
     for names in (frozenset(BY_NAME), frozenset(BY_NAME) - {name}):
-        world = world_of("plane", effects=Choice("some", names))
+        world = world_of("plane", request=EffectRequest(Choice("some", names)))
         world.show(np.full((HEIGHT, WIDTH), 51, np.uint8))
         frames.append(world.expose(20.0, 0).astype(float))
     change = np.abs(frames[0] - frames[1]).max()
@@ -101,7 +100,9 @@ def test_noise_lies_within_its_bound_and_shows(name: str) -> None:
 
 
 def test_without_saturation_numbers_go_on_to_the_end_of_the_container() -> None:
-    world = world_of("plane", effects=Choice("some", frozenset(BY_NAME) - {"saturation"}), noise=False)
+    world = world_of(
+        "plane", request=EffectRequest(Choice("some", frozenset(BY_NAME) - {"saturation"})), noise=False
+    )
     world.show(np.full((HEIGHT, WIDTH), 204, np.uint8))
     frame = world.expose(1000 / 6, 0)
     full = world.rig.sensor.full_scale_dn
@@ -113,14 +114,14 @@ def test_without_saturation_numbers_go_on_to_the_end_of_the_container() -> None:
 @pytest.mark.parametrize("scene", ["plane tilt_y_deg=20", "leaves", "sphere gloss=1e-8", "face"])
 def test_auto_differs_from_all_by_less_than_the_tolerance(scene: str) -> None:
     tolerance = Tolerance(2.0)
-    world = world_of(scene, effects=Choice.of("auto"), tolerance=tolerance)
+    world = world_of(scene, request=EffectRequest(Choice.of("auto"), tolerance))
     left_out = {decision.effect.name for decision in world.effect_plan().left_out}
     assert left_out > {"led-cycle", "vignetting", "defocus", "ambient"}
     assert largest_change(world.everything(), world.path, IMAGES) < tolerance.value
 
 
 def test_frames_of_the_camera_are_those_compared_here() -> None:
-    world = world_of("sphere gloss=0.04", effects=Choice.of("all"), noise=False)
+    world = world_of("sphere gloss=0.04", request=EffectRequest(Choice.of("all")), noise=False)
     world.show(IMAGES[0])
     expected = frame_dn(world.path, world.renderer, IMAGES[0], 100.0)
     assert np.array_equal(world.expose(100.0, 0), np.rint(expected).astype(np.uint16))

@@ -9,16 +9,15 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from dsl_core.simulation.effects.base import LightPath, make_view
 from dsl_core.simulation.effects.catalogue import EXTRAS, Choice, with_effects
 from dsl_core.simulation.effects.depth_of_field import DepthOfField, gaussian_distance, layers
-from dsl_core.simulation.effects.glare import Glare
+from dsl_core.simulation.effects.lens import Glare
 from dsl_core.simulation.effects.patches import Patches
-from dsl_core.simulation.effects.path import LightPath
 from dsl_core.simulation.effects.specular import highlight
 from dsl_core.simulation.effects.subsurface import profile, stays, within
-from dsl_core.simulation.effects.view import make_view
 from dsl_core.simulation.rendering.renderer import Renderer
-from dsl_core.simulation.scenes.finish import Finish
+from dsl_core.simulation.scenes.truth import Finish
 from tests.cases.effect_scenes import HEIGHT, SIZE, WIDTH, pictures, world_of
 
 WHITE = np.full((HEIGHT, WIDTH), 255, np.uint8)
@@ -67,14 +66,14 @@ def test_a_profile_keeps_all_light_and_spreads_it_as_far_as_it_should(spread_px:
 
 def test_even_light_on_wax_stays_as_it_is() -> None:
     path = only(world_of("wax").everything(), "subsurface")
-    stage, wax = path.extras[0].stage(path), path.truth.material == 0
+    stage, wax = path.extras[0].step(path), path.truth.material == 0
     even = np.broadcast_to(np.where(wax, 100.0, 7.0).astype(np.float32), (3, *wax.shape))
     assert stage.apply(even, WHITE) == pytest.approx(even, rel=1e-5)
 
 
 def test_light_on_wax_leaves_beside_a_line_and_elsewhere_stays() -> None:
     path = only(world_of("wax").everything(), "subsurface")
-    stage, wax = path.extras[0].stage(path), path.truth.material == 0
+    stage, wax = path.extras[0].step(path), path.truth.material == 0
     columns = np.flatnonzero(wax[SIZE[1] // 2])
     line = np.zeros((3, *wax.shape), np.float32)
     lit = columns[len(columns) // 4]

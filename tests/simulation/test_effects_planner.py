@@ -10,10 +10,11 @@ import pytest
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.plan import Setting
+from dsl_core.simulation.effects.base import Limits
 from dsl_core.simulation.effects.catalogue import EXTRAS, NAMES, NEEDED, USUAL, Choice, with_effects
-from dsl_core.simulation.effects.limits import Limits
 from dsl_core.simulation.effects.planner import EffectPlan, describe, plan_effects
 from dsl_core.simulation.effects.tolerance import Tolerance
+from dsl_core.simulation.rendered_scene import EffectRequest
 from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from dsl_core.simulation.world import World
@@ -141,7 +142,7 @@ def test_leaving_out_everything_ends_in_an_ideal_rig() -> None:
 
 
 def test_a_moved_stage_and_a_brighter_exposure_are_decided_anew() -> None:
-    world = world_of("plane", effects=Choice.of("auto"), noise=False)
+    world = world_of("plane", request=EffectRequest(Choice.of("auto")), noise=False)
     world.scene_at = lambda position_mm: world_of("box" if position_mm > 750 else "plane").scene
     assert world.path.extra("interreflection") is None
     world.move_to(760.0)
@@ -153,4 +154,4 @@ def test_a_moved_stage_and_a_brighter_exposure_are_decided_anew() -> None:
     assert world.path.ambient_dn_per_ms == 0
     world.expose(2000.0, 1)
     assert world.path.ambient_dn_per_ms > 0
-    assert world.settings[-1].exposure_ms == 2000.0
+    assert world.request.settings[-1].exposure_ms == 2000.0

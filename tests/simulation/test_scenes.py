@@ -10,8 +10,7 @@ from dsl_core.errors import PlanError
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scenes.catalogue import Scene, SceneTruth, make_scene, scene_catalogue
-from dsl_core.simulation.scenes.height_field import HeightField
-from dsl_core.simulation.scenes.surfaces import Sphere
+from dsl_core.simulation.scenes.surfaces import HeightField, Sphere
 
 FULL = published_rig().camera
 CAMERA = FULL.resized(223, 145)

@@ -17,12 +17,13 @@ from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.rendering.pattern_table import PatternTable, between
 from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.rendering.spectral_tables import BROAD, NM, Slicing
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.sim_devices import SimCamera, SimSpectroradiometer, open_twin
-from dsl_core.simulation.world import World
+from dsl_core.simulation.world import Kept, World
 
 SIZE = (64, 42)
 
@@ -212,9 +213,42 @@ def test_slices_behind_a_filter_are_as_narrow_as_its_images(chart: Renderer) -> 
     assert sliced.sum() == pytest.approx(lines.sum(), rel=3e-3)
 
 
+def test_a_kept_value_is_made_again_when_what_it_is_made_from_changes() -> None:
+    lower: Kept[list[int]] = Kept()
+    upper: Kept[list[int]] = Kept(lower)
+    base, other = [1], [1]
+    first = upper.of((base,), lambda: [1])
+    under = lower.of((first,), lambda: [2])
+    assert upper.of((base,), lambda: [3]) is first
+    assert lower.of((first,), lambda: [4]) is under
+    # An equal object is another one; what rests on the value is released before it is made again.
+    again = upper.of((other,), lambda: [] if lower._held else [5])
+    assert again == [5]
+    assert lower.of((first,), lambda: [6]) == [6]
+
+
+def test_only_what_changed_is_made_again() -> None:
+    here = world()
+    here.show(bands_of_columns((0, 640)))
+    rate, bare, truth = here.rate(), here.renderer, here.truth
+    assert here.rate() is rate
+    here.show(bands_of_columns((0, 100)))
+    assert here.rate() is not rate
+    assert here.renderer is bare
+    here.insert(True, true_transmission(540.0))
+    assert here.renderer is not bare
+    here.insert(True, None)
+    assert here.renderer is bare
+    here.insert(False, None)
+    assert here.renderer is not bare
+    assert here.truth is truth
+    here.move_to(710.0)
+    assert here.truth is not truth
+
+
 def world(seed: int = 0) -> World:
     rig = small_rig()
-    return World(rig, scene_at=lambda mm: make_scene("plane", depth_mm=mm), seed=seed)
+    return World(Setup(rig), scene_at=lambda mm: make_scene("plane", depth_mm=mm), seed=seed)
 
 
 def test_noise_depends_only_on_seed_shot_and_attempt() -> None:

@@ -1,22 +1,92 @@
-"""What an effect of the twin is: parameters, an upper bound, a cost, and what rendering is without it."""
+"""What effects of the twin are made of: the path of light, what the camera sees of it, and its limits.
+
+`LightPath` is what light goes through from the projector to the camera's numbers; an `Effect` is one thing
+that happens to it, and leaving it out gives another path. `Limits` is the most light that a scene can send to
+the camera, of which the bounds of effects are made: light is linear in the pattern and never negative, so no
+pattern gives a pixel more than a white one gives it through all orders; and no effect that only moves light
+about makes the brightest pixel brighter.
+"""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import replace
-from typing import ClassVar
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, Protocol
 
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.machine import slowness
-from dsl_core.simulation.effects.path import LightPath, Stage
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.sensor import bayer_channels, raw_variance
+from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.effects.cost import slowness
+from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.rendering.renderer import ORDERS, Renderer, surface_shading
+from dsl_core.simulation.rendering.spectral_tables import NM
+from dsl_core.simulation.scenes.truth import Scene, SceneTruth
+
+Image = NDArray[np.uint8]
+Signal = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+
+class PatternView(Protocol):
+    """What the camera sees of any pattern, DN per ms above black, without ambient light."""
+
+    def expected(self, image: Image) -> Signal:
+        """Signal of the mosaic (rows, columns) for drive levels (height, width, 3) or (height, width)."""
+
+    def planes(self, image: Image) -> Signal:
+        """Signal as without a mosaic, (3, rows, columns)."""
+
+    def through(self, transmission: SpectralCurve | None) -> PatternView:
+        """The same view through a filter before the camera."""
+
+
+class ImageStep(Protocol):
+    """What an effect does to a picture of the direct light."""
+
+    def apply(self, signal: Signal, image: Image) -> Signal:
+        """The picture with the effect: the mosaic as (1, rows, columns), or (3, rows, columns) of colours."""
+
+    def through(self, transmission: SpectralCurve | None) -> ImageStep:
+        """The same behind a filter before the camera."""
+
+
+@dataclass(frozen=True)
+class LightPath:
+    """A rig before a scene, with everything that is to be rendered.
+
+    ``extras`` are the effects beyond the plain renderer, in the order in which light meets them. Leaving an
+    effect out gives another path.
+    """
+
+    rig: Rig
+    scene: Scene
+    truth: SceneTruth
+    film: bool = True
+    device: str = "cpu"
+    orders: tuple[int, ...] = ORDERS
+    shaded: bool = True
+    ambient_dn_per_ms: float = 0.0
+    led_cycle_ms: float | None = None
+    defocus_px: float = 0.0
+    extras: tuple[ExtraEffect, ...] = ()
+
+    def extra(self, name: str) -> ExtraEffect | None:
+        """An effect beyond the plain renderer, if the path has it."""
+        return next((effect for effect in self.extras if effect.name == name), None)
 
 
 class Effect(ABC):
     """One thing that light or electronics do, which a scene may or may not call for.
 
-    ``needed`` effects cannot be left out. ``ns_per_pixel`` is the CPU time of a frame on the machine of
-    `machine` that grows with the image, ``ms_per_frame`` what does not.
+    ``needed`` effects cannot be left out. ``ns_per_pixel`` is the CPU time of a frame on the reference
+    machine (see `slowness`) that grows with the image, ``ms_per_frame`` what does not.
     """
 
     name: str
@@ -42,7 +112,7 @@ class Effect(ABC):
         return False
 
     def cost_s(self, limits: Limits) -> float:
-        """CPU seconds of a frame with a line that it takes, beside the rendering of further colours."""
+        """CPU seconds of a frame with a line that it takes, besides the rendering of further colours."""
         seconds = 1e-9 * self.ns_per_pixel * self.pixels_concerned(limits) + 1e-3 * self.ms_per_frame
         return seconds * slowness()
 
@@ -52,14 +122,31 @@ class Effect(ABC):
 
 
 class ExtraEffect(Effect):
-    """An effect beyond the plain renderer, which has a stage of its own."""
+    """An effect beyond the plain renderer, which changes the picture by a step of its own."""
 
     @abstractmethod
-    def stage(self, path: LightPath) -> Stage:
+    def step(self, path: LightPath) -> ImageStep:
         """Its rendering in a path."""
 
+    def direct_light(self, path: LightPath) -> PatternView | None:
+        """The direct light if the effect changes how it is rendered; None for the plain renderer's."""
+        return None
+
+    def most_light(self, limits: Limits) -> Floats:
+        """The most light that it adds to the projector's, DN per ms, (rows * columns,)."""
+        return np.zeros(limits.pixel_count)
+
+    def amplification(self, path: LightPath) -> float:
+        """Light that a place gets from others when all are lit evenly, relative to that light."""
+        return 0.0
+
+    @property
+    def veil(self) -> float:
+        """Share of the mean light that it gives every pixel."""
+        return 0.0
+
     def leave_out(self, path: LightPath) -> LightPath:
-        """The path without this stage."""
+        """The path without this step."""
         return replace(path, extras=tuple(extra for extra in path.extras if extra.name != self.name))
 
 
@@ -73,3 +160,171 @@ def with_sensor(path: LightPath, **update: float) -> LightPath:
     """The path with other values of the sensor."""
     sensor = path.rig.sensor.model_copy(update=update)
     return replace(path, rig=path.rig.model_copy(update={"sensor": sensor}))
+
+
+#: For what the renderer's tables add by rounding and interpolation.
+SLACK = 1.02
+
+
+class Limits:
+    """The most light in a world where everything happens; ``settings`` are those of the plan."""
+
+    def __init__(self, path: LightPath, settings: Sequence[Setting] = CapturePlan().settings) -> None:
+        self.path = path
+        self.settings = tuple(settings)
+
+    @property
+    def pixel_count(self) -> int:
+        """Pixels of the camera."""
+        return self.path.truth.depth_mm.size
+
+    @property
+    def exposure_ms(self) -> float:
+        """The longest exposure."""
+        return max(setting.exposure_ms for setting in self.settings)
+
+    @property
+    def light_ms(self) -> float:
+        """The most light of the projector in an exposure, ms of full drive."""
+        response = self.path.rig.projector_response
+        return max(s.exposure_ms * float(response.radiance(s.level)) for s in self.settings)
+
+    @cached_property
+    def halo(self) -> float:
+        """Light that the halo adds inside a wide white band, as a share of the zero order."""
+        response = self.path.rig.projector_response
+        return 2 * response.halo_peak_per_px * response.halo_decay_px if self.path.film else 0.0
+
+    def white(self, reflectance: Floats, orders: Sequence[int]) -> Floats:
+        """Signal of white through some orders at unit shading, DN per ms, (materials, channels)."""
+        chain = np.zeros((3, len(NM)))
+        for order in orders:
+            chain += chain_response(self.path.rig, order, NM).sum(1)
+        signal: Floats = reflectance @ chain.T
+        return signal
+
+    def from_orders(self, reflectance: Floats, orders: Sequence[int]) -> Floats:
+        """The same with the halo of the zero order, which is always there."""
+        orders = orders if self.path.film else ()
+        direct = (1 + self.halo) * self.white(reflectance, (0,))
+        return np.asarray(direct + self.white(reflectance, orders))
+
+    @cached_property
+    def table(self) -> Floats:
+        """Brightest colour of every material at unit shading, DN per ms, (materials,)."""
+        signal = self.from_orders(self.path.truth.materials.at(NM), self.path.orders)
+        return np.asarray(signal.max(1), np.float64)
+
+    @cached_property
+    def brightest(self) -> float:
+        """Signal of the brightest material, facing the projector at the reference distance, DN per ms."""
+        gain = 1.0 if self.path.rig.flat_field is None else float(np.max(self.path.rig.flat_field.gain))
+        return float(self.table[np.unique(self.path.truth.parts()[1])].max(initial=0.0)) * gain
+
+    def per_pixel(self, shading: Floats) -> Floats:
+        """Direct light for a shading, the brightest colour, DN per ms, (rows * columns,)."""
+        pixel, material, share = self.path.truth.parts()
+        light = shading.ravel()[pixel] * share * self.table[material]
+        return np.asarray(np.bincount(pixel, light, shading.size), np.float64)
+
+    @cached_property
+    def direct(self) -> Floats:
+        """Direct light, DN per ms, (rows * columns,)."""
+        return self.per_pixel(surface_shading(self.path.rig, self.path.truth, self.path.shaded))
+
+    @cached_property
+    def indirect(self) -> Floats:
+        """Light that other surfaces send, DN per ms, (rows * columns,)."""
+        effect = self.path.extra("interreflection")
+        if effect is None:
+            return np.zeros(self.pixel_count)
+        return effect.most_light(self)
+
+    @cached_property
+    def amplification(self) -> float:
+        """Factor by which reflections among surfaces and glare raise the largest change of direct light."""
+        effect = self.path.extra("interreflection")
+        bounced = 0.0 if effect is None else effect.amplification(self.path)
+        return (1 + bounced) * (1 + self.glare)
+
+    @cached_property
+    def specular(self) -> Floats:
+        """Light of highlights, DN per ms, (rows * columns,)."""
+        effect = self.path.extra("specular")
+        return np.zeros(self.pixel_count) if effect is None else effect.most_light(self)
+
+    @property
+    def glare(self) -> float:
+        """Share of the mean light that every pixel gets."""
+        effect = self.path.extra("glare")
+        return 0.0 if effect is None else effect.veil
+
+    @cached_property
+    def total(self) -> Floats:
+        """Light of all kinds without glare, DN per ms, (rows * columns,)."""
+        return self.direct + self.indirect + self.specular
+
+    @cached_property
+    def ceiling(self) -> float:
+        """The brightest pixel with all light, DN per ms; nothing exceeds it in any pixel."""
+        return SLACK * (1 + self.glare) * float(self.total.max(initial=0.0))
+
+    @cached_property
+    def floor_dn(self) -> float:
+        """Noise of a pixel without light, DN."""
+        return float(np.sqrt(raw_variance(self.path.rig.sensor, np.zeros(1))[0]))
+
+    def of_dn(self, dn: float, reason: str) -> EffectBound:
+        """A bound in counts; no picture has more than the sensor's full scale."""
+        dn = min(dn, float(self.path.rig.sensor.full_scale_dn))
+        return EffectBound(dn, dn / self.floor_dn, reason)
+
+    def of_light(self, dn_per_ms: float, reason: str) -> EffectBound:
+        """A bound from the signal of white at full drive."""
+        return self.of_dn(dn_per_ms * self.light_ms, reason)
+
+    def of_share(self, share: float, reason: str) -> EffectBound:
+        """A bound as a share of the brightest pixel."""
+        return self.of_light(min(share, 1.0) * self.ceiling, reason)
+
+
+def make_view(path: LightPath) -> PatternView:
+    """What the camera sees in a path."""
+    direct = next((light for extra in path.extras if (light := extra.direct_light(path))), None) or Renderer(
+        path.rig, path.truth, film=path.film, device=path.device, orders=path.orders, shaded=path.shaded
+    )
+    if not path.extras:
+        return direct
+    mosaic = bayer_channels(path.rig.sensor.bayer, *path.truth.depth_mm.shape)
+    steps = tuple(extra.step(path) for extra in path.extras)
+    return ProcessedView(direct, steps, mosaic, any(extra.needs_colours(path) for extra in path.extras))
+
+
+@dataclass(frozen=True)
+class ProcessedView:
+    """Direct light that goes through steps; in all ``colours`` where light of neighbours is mixed."""
+
+    direct: PatternView
+    steps: tuple[ImageStep, ...]
+    mosaic: NDArray[np.int64]
+    colours: bool
+
+    def expected(self, image: Image) -> Signal:
+        """See `PatternView`."""
+        if self.colours:
+            return np.asarray(np.take_along_axis(self.planes(image), self.mosaic[None], 0)[0])
+        return np.asarray(self._processed(self.direct.expected(image)[None], image)[0])
+
+    def planes(self, image: Image) -> Signal:
+        """See `PatternView`."""
+        return self._processed(self.direct.planes(image), image)
+
+    def _processed(self, signal: Signal, image: Image) -> Signal:
+        for step in self.steps:
+            signal = step.apply(signal, image)
+        return signal
+
+    def through(self, transmission: SpectralCurve | None) -> ProcessedView:
+        """See `PatternView`."""
+        steps = tuple(step.through(transmission) for step in self.steps)
+        return ProcessedView(self.direct.through(transmission), steps, self.mosaic, self.colours)

@@ -6,14 +6,11 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from dsl_core.errors import DeviceError
-from dsl_core.simulation.effects.base import Effect, ExtraEffect
+from dsl_core.simulation.effects.base import Effect, ExtraEffect, LightPath
 from dsl_core.simulation.effects.depth_of_field import DepthOfField
-from dsl_core.simulation.effects.distortion import Distortion
-from dsl_core.simulation.effects.film_shape import FILM_BEND, FILM_PERIOD, FILM_TILT
-from dsl_core.simulation.effects.glare import Glare
+from dsl_core.simulation.effects.film import FILM_BEND, FILM_PERIOD, FILM_TILT, Orders, SecondOrders
 from dsl_core.simulation.effects.interreflection import Interreflection
-from dsl_core.simulation.effects.orders import Orders, SecondOrders
-from dsl_core.simulation.effects.path import LightPath
+from dsl_core.simulation.effects.lens import Distortion, Glare, Vignetting
 from dsl_core.simulation.effects.projector_light import BlackLevel, Blur, Gamma, Halo, LedCycle
 from dsl_core.simulation.effects.sensor import (
     Ambient,
@@ -25,7 +22,7 @@ from dsl_core.simulation.effects.sensor import (
 )
 from dsl_core.simulation.effects.specular import Specular
 from dsl_core.simulation.effects.subsurface import Subsurface
-from dsl_core.simulation.effects.surfaces_light import Shading, Shadow, Vignetting
+from dsl_core.simulation.effects.surfaces_light import Shading, Shadow
 
 #: Beyond the plain renderer, in the order in which light meets them.
 EXTRAS: tuple[ExtraEffect, ...] = (Interreflection(), Subsurface(), Specular(), Glare(), DepthOfField())

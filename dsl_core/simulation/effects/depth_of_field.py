@@ -11,11 +11,19 @@ from numpy.typing import NDArray
 
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.effects.base import ExtraEffect, with_response
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import SLACK, Limits
-from dsl_core.simulation.effects.machine import PLAIN_MS, PLAIN_NS, slowness
-from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
+from dsl_core.simulation.effects.base import (
+    SLACK,
+    ExtraEffect,
+    Image,
+    ImageStep,
+    LightPath,
+    Limits,
+    PatternView,
+    Signal,
+    with_response,
+)
+from dsl_core.simulation.effects.cost import PLAIN_MS, PLAIN_NS, slowness
+from dsl_core.simulation.effects.tolerance import EffectBound
 from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.scenes.truth import Parts
 
@@ -62,7 +70,7 @@ class DepthOfField(ExtraEffect):
         blurs = self.blurs(limits.path)
         sharp = limits.path.rig.projector_response.blur_px
         share = gaussian_distance(sharp, math.hypot(sharp, float(blurs.projector_px.max())))
-        share += 1 - _CameraStage.of(blurs.camera_px).kept()
+        share += 1 - _CameraStep.of(blurs.camera_px).kept()
         widest = float(blurs.camera_px.max()) / _DISC
         reason = (
             f"circles of confusion reach {widest:.2g} px"
@@ -73,7 +81,7 @@ class DepthOfField(ExtraEffect):
 
     def needs_colours(self, path: LightPath) -> bool:
         """Where the camera mixes pixels at all."""
-        return _CameraStage.of(self.blurs(path).camera_px).kept() < 1
+        return _CameraStep.of(self.blurs(path).camera_px).kept() < 1
 
     def blurs(self, path: LightPath) -> Blurs:
         """Defocus at every pixel; none where there is no surface."""
@@ -90,8 +98,8 @@ class DepthOfField(ExtraEffect):
             _blur(to_projector, self.projector_aperture_mm * path.rig.projector.fx_px),
         )
 
-    def light(self, path: LightPath) -> View:
-        """The direct light of a projector that is out of focus here and there."""
+    def direct_light(self, path: LightPath) -> PatternView:
+        """See `ExtraEffect`: the direct light of a projector that is out of focus here and there."""
         levels, weights = layers(self.blurs(path).projector_px)
         sharp = path.rig.projector_response.blur_px
         views = []
@@ -105,9 +113,9 @@ class DepthOfField(ExtraEffect):
             )  # fmt: skip
         return LayeredView(tuple(views), tuple(weights))
 
-    def stage(self, path: LightPath) -> Stage:
+    def step(self, path: LightPath) -> ImageStep:
         """See `ExtraEffect`: what the camera makes of it."""
-        return _CameraStage.of(self.blurs(path).camera_px)
+        return _CameraStep.of(self.blurs(path).camera_px)
 
     def cost_s(self, limits: Limits) -> float:
         """That of pixels which are rendered with two blurs, and of blurring the picture."""
@@ -163,24 +171,24 @@ def _parts_in(path: LightPath, mask: NDArray[np.bool_]) -> Parts:
 class LayeredView:
     """Views that are mixed by weights at every pixel."""
 
-    views: tuple[View, ...]
+    views: tuple[PatternView, ...]
     weights: tuple[NDArray[np.float32], ...]
 
     def expected(self, image: Image) -> Signal:
-        """See `View`."""
+        """See `PatternView`."""
         return np.asarray(sum(w * v.expected(image) for v, w in zip(self.views, self.weights, strict=True)))
 
     def planes(self, image: Image) -> Signal:
-        """See `View`."""
+        """See `PatternView`."""
         return np.asarray(sum(w * v.planes(image) for v, w in zip(self.views, self.weights, strict=True)))
 
     def through(self, transmission: SpectralCurve | None) -> LayeredView:
-        """See `View`."""
+        """See `PatternView`."""
         return LayeredView(tuple(view.through(transmission) for view in self.views), self.weights)
 
 
 @dataclass(frozen=True)
-class _CameraStage:
+class _CameraStep:
     """Each layer's light is blurred by its own Gaussian; where layers meet, their shares are made one."""
 
     sigmas_px: tuple[float, ...]
@@ -188,14 +196,14 @@ class _CameraStage:
     shares: NDArray[np.float32]
 
     @classmethod
-    def of(cls, sigma_px: Floats) -> _CameraStage:
-        """The stage of a map of blurs."""
+    def of(cls, sigma_px: Floats) -> _CameraStep:
+        """The step of a map of blurs."""
         sigmas, weights = layers(sigma_px)
         shares = sum(_gaussian(w, s) for s, w in zip(sigmas, weights, strict=True))
         return cls(tuple(sigmas), tuple(weights), np.asarray(shares, np.float32))
 
     def apply(self, signal: Signal, image: Image) -> Signal:
-        """See `Stage`."""
+        """See `ImageStep`."""
         return np.stack([self._blurred(plane) for plane in signal])
 
     def _blurred(self, plane: Signal) -> Signal:
@@ -207,8 +215,8 @@ class _CameraStage:
         own = [_centre(sigma) * w for sigma, w in zip(self.sigmas_px, self.weights, strict=True)]
         return float((sum(own) / self.shares).min())
 
-    def through(self, transmission: SpectralCurve | None) -> _CameraStage:
-        """See `Stage`."""
+    def through(self, transmission: SpectralCurve | None) -> _CameraStep:
+        """See `ImageStep`."""
         return self
 
 

@@ -12,14 +12,11 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
-from dsl_core.simulation.effects.base import ExtraEffect
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import SLACK, Limits
+from dsl_core.simulation.effects.base import SLACK, ExtraEffect, Image, ImageStep, LightPath, Limits, Signal
 from dsl_core.simulation.effects.patches import Patches
-from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage
-from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.rendering.renderer import Renderer, surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
-from dsl_core.simulation.rendering.surface_light import surface_shading
 from dsl_core.simulation.scenes.truth import FINE_NM, Materials, Parts
 
 Floats = NDArray[np.float64]
@@ -56,7 +53,7 @@ class Interreflection(ExtraEffect):
         reason = f"surfaces send each other up to {share:.2g} % of the brightest direct light"
         return limits.of_light(SLACK * (1 + limits.glare) * most, reason)
 
-    def most(self, limits: Limits) -> Floats:
+    def most_light(self, limits: Limits) -> Floats:
         """Indirect light of a white pattern, no shadow among patches, DN per ms, (rows * columns,)."""
         path = limits.path
         exchange = Exchange.of(path, see_all=True)
@@ -75,9 +72,9 @@ class Interreflection(ExtraEffect):
         exchange = Exchange.of(path, see_all=True)
         return float(exchange.solve(np.ones((len(exchange.patches.pixels), _BANDS))).max(initial=0.0))
 
-    def stage(self, path: LightPath) -> Stage:
+    def step(self, path: LightPath) -> ImageStep:
         """See `ExtraEffect`."""
-        return _InterreflectionStage(path, Exchange.of(path), _light_on_samples(path), path.rig.response)
+        return _InterreflectionStep(path, Exchange.of(path), _light_on_samples(path), path.rig.response)
 
 
 def _flat_rig(path: LightPath) -> Rig:
@@ -165,14 +162,14 @@ def _band_means(values: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class _InterreflectionStage:
+class _InterreflectionStep:
     path: LightPath
     exchange: Exchange
     samples: Renderer
     response: Rgb
 
     def apply(self, signal: Signal, image: Image) -> Signal:
-        """See `Stage`."""
+        """See `ImageStep`."""
         arrives = self.samples.of_parts(image).cpu().numpy().astype(np.float64)
         light = self.exchange.solve(arrives.reshape(-1, _BANDS))
         shape = self.path.truth.depth_mm.shape
@@ -187,8 +184,8 @@ class _InterreflectionStage:
         plane = np.bincount(self.exchange.parts[0], parts, channel.size)
         return plane.reshape(self.path.truth.depth_mm.shape).astype(np.float32)
 
-    def through(self, transmission: SpectralCurve | None) -> _InterreflectionStage:
-        """See `Stage`: the filter stands before the camera, so that the light on surfaces stays."""
+    def through(self, transmission: SpectralCurve | None) -> _InterreflectionStep:
+        """See `ImageStep`: the filter stands before the camera, so that the light on surfaces stays."""
         red, green, blue = self.path.rig.response
         if transmission is not None:
             passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.scenes.height_field import HeightField
-from dsl_core.simulation.scenes.surfaces import Surface
+from dsl_core.simulation.scenes.surfaces import HeightField, Surface
 from dsl_core.simulation.scenes.truth import Parts, SceneTruth
 
 Floats = NDArray[np.float64]

@@ -6,13 +6,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from dsl_core.model.plan import CapturePlan, Setting
-from dsl_core.simulation.effects.base import Effect
-from dsl_core.simulation.effects.bound import EffectBound
+from dsl_core.simulation.effects.base import Effect, LightPath, Limits
 from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.machine import PLAIN_MS, PLAIN_NS, slowness
-from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
+from dsl_core.simulation.effects.cost import PLAIN_MS, PLAIN_NS, slowness
+from dsl_core.simulation.effects.tolerance import ONE_DN, EffectBound, Tolerance
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from dsl_core.optics.led_cycle import LEDS
-from dsl_core.simulation.effects.base import Effect, with_response
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.path import LightPath
+from dsl_core.simulation.effects.base import Effect, LightPath, Limits, with_response
+from dsl_core.simulation.effects.tolerance import EffectBound
 
 #: A blur that no sample of the twin shows.
 _SHARP_PX = 1e-3

@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dsl_core.simulation.effects.base import Effect, with_sensor
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import Limits
-from dsl_core.simulation.effects.path import LightPath
+from dsl_core.simulation.effects.base import Effect, LightPath, Limits, with_sensor
+from dsl_core.simulation.effects.tolerance import EffectBound
 
 #: Normal noise beyond so many standard deviations comes about once in 10^15 pixels, a million scans.
 TAIL_SIGMAS = 8.0

@@ -9,15 +9,20 @@ from numpy.typing import NDArray
 
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.effects.base import ExtraEffect
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import SLACK, Limits
-from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage, View
-from dsl_core.simulation.rendering.renderer import Renderer
+from dsl_core.simulation.effects.base import (
+    SLACK,
+    ExtraEffect,
+    Image,
+    ImageStep,
+    LightPath,
+    Limits,
+    PatternView,
+    Signal,
+)
+from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.rendering.renderer import Renderer, surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
-from dsl_core.simulation.rendering.surface_light import surface_shading
-from dsl_core.simulation.scenes.finish import Finish
-from dsl_core.simulation.scenes.truth import Materials, Parts
+from dsl_core.simulation.scenes.truth import Finish, Materials, Parts
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +54,7 @@ class Specular(ExtraEffect):
         most = SLACK * (1 + limits.glare) * float(limits.specular.max())
         return limits.of_light(most, f"a white pattern's highlight is {most:.3g} DN/ms")
 
-    def most(self, limits: Limits) -> Floats:
+    def most_light(self, limits: Limits) -> Floats:
         """Highlights of a white pattern, the brightest colour, DN per ms, (rows * columns,)."""
         path = limits.path
         pixel, _, share = glossy_parts(path)
@@ -63,13 +68,13 @@ class Specular(ExtraEffect):
         glossy = list(glossy_materials(limits.path.truth.materials))
         return int(np.isin(limits.path.truth.material, glossy).sum())
 
-    def stage(self, path: LightPath) -> Stage:
+    def step(self, path: LightPath) -> ImageStep:
         """See `ExtraEffect`."""
         mirror = replace(path.truth, materials=Materials.of({"surface": np.ones(len(NM))}), mixed=None)
         parts = glossy_parts(path)
         if not len(parts[0]):
-            return _SpecularStage(None)
-        return _SpecularStage(
+            return _SpecularStep(None)
+        return _SpecularStep(
             Renderer(
                 path.rig, mirror, film=path.film, device=path.device, orders=path.orders, shaded=path.shaded,
                 parts=parts,
@@ -119,16 +124,16 @@ def highlight(finish: Finish, points_mm: Floats, normals: Floats, light_mm: Floa
 
 
 @dataclass(frozen=True)
-class _SpecularStage:
-    shine: View | None
+class _SpecularStep:
+    shine: PatternView | None
 
     def apply(self, signal: Signal, image: Image) -> Signal:
-        """See `Stage`."""
+        """See `ImageStep`."""
         if self.shine is None:
             return signal
         more = self.shine.expected(image)[None] if len(signal) == 1 else self.shine.planes(image)
         return signal + more
 
-    def through(self, transmission: SpectralCurve | None) -> _SpecularStage:
-        """See `Stage`."""
-        return _SpecularStage(None if self.shine is None else self.shine.through(transmission))
+    def through(self, transmission: SpectralCurve | None) -> _SpecularStep:
+        """See `ImageStep`."""
+        return _SpecularStep(None if self.shine is None else self.shine.through(transmission))

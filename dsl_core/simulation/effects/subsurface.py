@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.simulation.effects.base import ExtraEffect
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import SLACK, Limits
-from dsl_core.simulation.effects.path import Image, LightPath, Signal, Stage
-from dsl_core.simulation.scenes.finish import Finish
-from dsl_core.simulation.scenes.truth import Materials
+from dsl_core.simulation.effects.base import SLACK, ExtraEffect, Image, ImageStep, LightPath, Limits, Signal
+from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.scenes.truth import Finish, Materials
 
 Floats = NDArray[np.float64]
 #: Light that wanders farther than 99.9 % of it, or than this, is taken to leave nearer, px.
@@ -60,9 +57,9 @@ class Subsurface(ExtraEffect):
         clear = list(translucent(limits.path.truth.materials))
         return int(np.isin(limits.path.truth.material, clear).sum())
 
-    def stage(self, path: LightPath) -> Stage:
+    def step(self, path: LightPath) -> ImageStep:
         """See `ExtraEffect`."""
-        return _SubsurfaceStage(
+        return _SubsurfaceStep(
             tuple(
                 _Region.of(path.truth.material == index, of_colours)
                 for index, of_colours in _spreads_px(path)
@@ -153,16 +150,16 @@ class _Region:
 
 
 @dataclass(frozen=True)
-class _SubsurfaceStage:
+class _SubsurfaceStep:
     regions: tuple[_Region, ...]
 
     def apply(self, signal: Signal, image: Image) -> Signal:
-        """See `Stage`."""
+        """See `ImageStep`."""
         planes = list(signal)
         for region in self.regions:
             planes = [region.spread(plane, colour) for colour, plane in enumerate(planes)]
         return np.stack(planes)
 
-    def through(self, transmission: SpectralCurve | None) -> _SubsurfaceStage:
-        """See `Stage`."""
+    def through(self, transmission: SpectralCurve | None) -> _SubsurfaceStep:
+        """See `ImageStep`."""
         return self

@@ -1,4 +1,4 @@
-"""How surfaces stand in the light: shading and cast shadow; and the camera's uneven gain."""
+"""How surfaces stand in the light: shading and cast shadow."""
 
 from __future__ import annotations
 
@@ -6,12 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dsl_core.optics.flat_field import relative_gain
-from dsl_core.simulation.effects.base import Effect
-from dsl_core.simulation.effects.bound import EffectBound
-from dsl_core.simulation.effects.limits import SLACK, Limits
-from dsl_core.simulation.effects.path import LightPath
-from dsl_core.simulation.rendering.surface_light import surface_shading
+from dsl_core.simulation.effects.base import SLACK, Effect, LightPath, Limits
+from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.rendering.renderer import surface_shading
 
 
 class Shading(Effect):
@@ -69,27 +66,3 @@ class Shadow(Effect):
 
     def _hidden(self, path: LightPath) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
         return np.asarray(np.isfinite(path.truth.depth_mm) & ~path.truth.lit)
-
-
-class Vignetting(Effect):
-    """Gain of the camera that differs from pixel to pixel."""
-
-    name = "vignetting"
-    summary = "uneven gain of the camera"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        gain = relative_gain(path.rig)
-        return {"gain": f"{float(gain.min()):.3g} to {float(gain.max()):.3g}"}
-
-    def bound(self, limits: Limits) -> EffectBound:
-        """The largest deviation of the gain from one."""
-        if limits.path.rig.flat_field is None:
-            return limits.of_dn(0.0, "the camera has an even gain")
-        gain = relative_gain(limits.path.rig)
-        most = float(np.abs(gain - 1).max())
-        return limits.of_share(most / float(gain.min()), f"gains differ from one by up to {100 * most:.2g} %")
-
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return replace(path, rig=path.rig.model_copy(update={"flat_field": None}))

@@ -1,4 +1,7 @@
-"""How far pictures may be from those with all effects. Imports nothing heavy: the window reads it too."""
+"""What an effect changes at most, and how far pictures may be from those with all effects.
+
+Imports nothing heavy: the window reads it too.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from dsl_core.errors import DeviceError
-from dsl_core.simulation.effects.bound import EffectBound
+
+
+@dataclass(frozen=True)
+class EffectBound:
+    """The most that an effect changes in any pixel of any picture of a plan, and what decides it.
+
+    ``dn`` in counts, ``sigmas`` in standard deviations of the darkest pixel's noise.
+    """
+
+    dn: float
+    sigmas: float
+    reason: str
 
 
 @dataclass(frozen=True)

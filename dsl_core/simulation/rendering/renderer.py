@@ -20,14 +20,14 @@ from torch import Tensor
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import zero_order
+from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.optics.sensor import bayer_channels
-from dsl_core.simulation.rendering.line_light import Runs, add_band, white_runs
+from dsl_core.simulation.rendering.first_orders import Runs, add_band, order_light, white_runs
 from dsl_core.simulation.rendering.order_tables import OrderTables
 from dsl_core.simulation.rendering.pattern_table import PatternTable
-from dsl_core.simulation.rendering.slice_light import order_light
 from dsl_core.simulation.rendering.spectral_tables import BROAD, NARROW, NM, SpectralTables, zero_table
-from dsl_core.simulation.rendering.surface_light import surface_shading
 from dsl_core.simulation.scenes.truth import Parts, SceneTruth
 
 ORDERS = (1, -1, 2, -2)
@@ -201,3 +201,18 @@ class Renderer:
 def as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Drive levels (height, width, 3) of an image that may be grey."""
     return image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
+
+
+def surface_shading(rig: Rig, truth: SceneTruth, shaded: bool = True) -> NDArray[np.float64]:
+    """Cosine of incidence times inverse square distance times gain, zero in shadow, (rows, columns).
+
+    Without ``shaded``, what is lit is lit like a surface at the reference distance facing the projector.
+    """
+    if not shaded:
+        return np.asarray(truth.lit * relative_gain(rig))
+    points = pixel_rays(rig.camera) * np.nan_to_num(truth.depth_mm, nan=1.0)
+    to_light = rig.pose.projector_centre_mm[:, None, None] - points
+    distance = np.linalg.norm(to_light, axis=0)
+    cosine = (np.nan_to_num(truth.normals) * to_light).sum(0) / distance
+    light = cosine.clip(min=0) * (rig.reference_distance_mm / distance) ** 2 * truth.lit
+    return np.asarray(light * relative_gain(rig))

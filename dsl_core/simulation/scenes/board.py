@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from dsl_core.errors import PlanError
 from dsl_core.model.board import Board, Charuco, Checkerboard
 from dsl_core.simulation.scenes import materials as spectra
-from dsl_core.simulation.scenes.options import ENDLESS, IMAGE_CENTRE_MM, check_range
-from dsl_core.simulation.scenes.surfaces import Paint, tilted, turned, uniform
-from dsl_core.simulation.scenes.truth import Materials, Scene
+from dsl_core.simulation.scenes.surfaces import ENDLESS, Paint, tilted, turned, uniform
+from dsl_core.simulation.scenes.truth import IMAGE_CENTRE_MM, Materials, Scene, check_range
 
 Floats = NDArray[np.float64]
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.simulation.scenes import materials as spectra
-from dsl_core.simulation.scenes.options import ENDLESS, IMAGE_CENTRE_MM, check_range
-from dsl_core.simulation.scenes.surfaces import Paint, Sphere, tilted, turned, uniform
-from dsl_core.simulation.scenes.truth import Materials, Scene
+from dsl_core.simulation.scenes.surfaces import ENDLESS, Paint, Sphere, tilted, turned, uniform
+from dsl_core.simulation.scenes.truth import IMAGE_CENTRE_MM, Materials, Scene, check_range
 
 _STAGE_POSITIONS_MM = tuple(np.linspace(600.0, 900.0, 15).tolist())
 

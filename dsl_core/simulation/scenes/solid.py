@@ -6,11 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.simulation.scenes import materials as spectra
-from dsl_core.simulation.scenes.finish import SKIN, WAX, Finish
-from dsl_core.simulation.scenes.height_field import height_field
-from dsl_core.simulation.scenes.options import ENDLESS, IMAGE_CENTRE_MM, check_range
-from dsl_core.simulation.scenes.surfaces import Block, Rectangle, Sphere, tilted, uniform
-from dsl_core.simulation.scenes.truth import Materials, Scene
+from dsl_core.simulation.scenes.surfaces import (
+    ENDLESS,
+    Block,
+    Rectangle,
+    Sphere,
+    height_field,
+    tilted,
+    uniform,
+)
+from dsl_core.simulation.scenes.truth import IMAGE_CENTRE_MM, SKIN, WAX, Finish, Materials, Scene, check_range
 
 Floats = NDArray[np.float64]
 _CX, _CY = IMAGE_CENTRE_MM

@@ -1,4 +1,4 @@
-"""What a scene is and what is known of it: palettes of spectra and maps seen by one camera."""
+"""What a scene is, and what is known of it: palettes of materials, and maps seen by one camera."""
 
 from __future__ import annotations
 
@@ -8,20 +8,44 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.errors import PlanError
 from dsl_core.model.geometry import Lens
 from dsl_core.optics.pinhole import pixel_rays, rays_at
-from dsl_core.simulation.scenes.finish import Finish
 from dsl_core.simulation.scenes.surfaces import Surface, materials_along, trace
 
 #: Fine grid of all palettes, nm: 400 to 700 in steps of 1, shape (301,).
 FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
 FINE_NM.setflags(write=False)
 
+#: The optical centre of the published camera lies beside the middle of its image; at 700 mm by this much.
+IMAGE_CENTRE_MM = (6.0, -2.0)
 #: What light comes from: pixel, material and share of the pixel, each (n,).
 Parts = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]
 
 #: Rays into a pixel on an edge, which tell the shares of its two materials.
 EDGE_RAYS = 256
+
+
+@dataclass(frozen=True)
+class Finish:
+    """Gloss and translucency of a material; the defaults are matte and opaque.
+
+    ``gloss`` is the reflectance of its surface at normal incidence (0.04 for a refractive index of 1.5),
+    ``roughness`` the width of the highlight, 0..1, whose square is the alpha of the GGX distribution.
+    ``spread_mm`` says how far red, green and blue light wander inside before they leave: the length d of
+    Burley's diffusion profile, whose mean distance is 2.5 d.
+    """
+
+    gloss: float = 0.0
+    roughness: float = 0.3
+    spread_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+#: Skin: diffuse mean free paths of 3.67, 1.37 and 0.68 mm (H. W. Jensen, J. Buhler, SIGGRAPH 2002, "skin 1")
+#: by 3.5 (P. H. Christensen, B. Burley, Approximate Reflectance Profiles, 2015); oily sheen of index 1.4.
+SKIN = Finish(gloss=0.028, roughness=0.5, spread_mm=(1.05, 0.39, 0.19))
+#: Paraffin wax, index 1.43; its spread is an assumption between skin and marble.
+WAX = Finish(gloss=0.031, roughness=0.45, spread_mm=(2.0, 1.6, 1.2))
 
 
 @dataclass(frozen=True)
@@ -167,3 +191,10 @@ def _spots(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     bits = count.bit_length() - 1
     reverse = sum(((index >> bit) & 1) << (bits - 1 - bit) for bit in range(bits))
     return (index + 0.5) / count - 0.5, (np.asarray(reverse) + 0.5) / count - 0.5
+
+
+def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """Raise `PlanError` unless ``low <= value <= high``."""
+    if not low <= value <= high:
+        wanted = f"{low:g} and {high:g} {unit}".rstrip()
+        raise PlanError(f"Option {name} must lie between {wanted}, not {value:g}.")

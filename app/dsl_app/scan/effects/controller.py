@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from dsl_app.connection.controller import RigController
@@ -48,7 +47,7 @@ class EffectsController:
         world = _world_of(devices)
         state.offered.set(world is not None)
         state.in_use.set(options.get(EFFECTS, EffectChoice.USUAL.value))
-        state.tolerance.set(ONE_DN if world is None else world.tolerance)
+        state.tolerance.set(ONE_DN if world is None else world.request.tolerance)
         self._asked = (state.in_use.value, state.tolerance.value)
 
     def _take_link(self, link: Link) -> None:
@@ -119,9 +118,9 @@ def _world_of(devices: DeviceRig | None) -> World | None:
 def view_of(world: World, choice: str, tolerance: Tolerance, plan: CapturePlan) -> EffectsView:
     """What a world would render with a choice; the world itself is not changed."""
     from dsl_core.simulation.effects.catalogue import Choice
+    from dsl_core.simulation.rendered_scene import EffectRequest
 
-    other = replace(world, effects=Choice.of(choice), tolerance=tolerance, settings=plan.settings, _path=None)
-    made = other.effect_plan()
+    made = world.effect_plan(EffectRequest(Choice.of(choice), tolerance, plan.settings))
     frame_s, all_s = made.seconds
     return EffectsView(_rows(made), _left_out(made), frame_s, all_s, plan.shot_count)
 

@@ -69,9 +69,9 @@ def test_looking_changes_nothing_in_the_rig(control: EffectsController, bench: S
     devices = bench.rig.state.devices.value
     assert devices is not None
     assert isinstance(devices.camera, SimCamera)
-    before = devices.camera.world.effects
+    before = devices.camera.world.request
     control.look("none", ONE_DN)
-    assert devices.camera.world.effects is before
+    assert devices.camera.world.request is before
     assert control.state.in_use.value == "usual"
 
 

@@ -1,23 +1,66 @@
-"""First-order light of any pattern, summed over slices of the spectrum.
+"""Light of the film's orders on every pixel, for a few white lines or for any pattern.
 
-Within a slice the spectrum is taken as linear, so that its light is the pattern's mean there, and the mean
-of the pattern times the place in the slice, each with a weight. Running integrals give both by two look-ups
-a slice and pixel. Patterns that vary along rows change too little in a slice for the second; those that vary
-both ways are taken at the slices' middle rows.
+A line lights, through an order, the wavelengths between its two edges: two look-ups in cumulative spectra for
+each line and pixel.
+
+Any other pattern is summed over slices of the spectrum. Within a slice the spectrum is taken as linear, so
+that its light is the pattern's mean there, and the mean of the pattern times the place in the slice, each
+with a weight. Running integrals give both by two look-ups a slice and pixel. Patterns that vary along rows
+change too little in a slice for the second; those that vary both ways are taken at the slices' middle rows.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.optics.correspondence import chebyshev_nodes, interpolation_matrix, like
 from dsl_core.simulation.rendering.order_tables import OrderTables
 from dsl_core.simulation.rendering.pattern_table import Edge, PatternTable, between
 from dsl_core.simulation.rendering.spectral_tables import NM, Slicing
+
+#: Bands of white columns: start and stop (px), level 0..1.
+Runs = list[tuple[float, float, float]]
+
+
+def white_runs(colour: NDArray[np.uint8]) -> Runs | None:
+    """Lit bands of a grey, column-only image as (start px, stop px, level 0..1); None for other images."""
+    line = colour[0]
+    if not ((line == line[:, :1]).all() and (colour == line).all()):
+        return None
+    levels = line[:, 0].astype(int)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], levels, [0]])))
+    return [(a - 0.5, b - 0.5, levels[a] / 255) for a, b in pairwise(edges) if levels[a]]
+
+
+def add_band(
+    signal: Tensor, tables: OrderTables, material_channel: Tensor, start: float, stop: float, radiance: float
+) -> None:
+    """Add an order's light of white columns between two edges (px) to the signal (P,)."""
+    near = torch.nonzero((tables.reach_px[0] < stop + 2) & (tables.reach_px[1] > start - 2)).ravel()
+    if len(near) == 0:
+        return
+    pixels = tables.active[near]
+    table_row = material_channel[pixels] * len(NM)
+    coefficients, middle = tables.inverse[:, near], tables.middle_px[near]
+    low, high = tables.limits_nm[0][near], tables.limits_nm[1][near]
+    scale = 1 / tables.spread_px[near]
+    at_edge = []
+    for edge in (start, stop):
+        x = ((edge - middle) * scale).clip(-1, 1)
+        value = coefficients[-1]
+        for c in coefficients[:-1].flip(0):
+            value = torch.addcmul(c, value, x)
+        nm = torch.minimum(torch.maximum(value + float(NM.mean()), low), high) - float(NM[0])
+        whole = nm.long()
+        entry = tables.spectra.cumulative[table_row + whole]
+        at_edge.append(entry[:, 0] + (nm - whole) * entry[:, 1])
+    signal.index_add_(0, pixels, (at_edge[1] - at_edge[0]).abs() * radiance)
 
 
 def order_light(

@@ -1,0 +1,138 @@
+"""What the twin can be asked for: a record of its options, read from text and listed by ``dsl-scan rigs``."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field, ValidationInfo
+
+from dsl_core.errors import DeviceError
+from dsl_core.model.base import Record
+from dsl_core.simulation.effects.catalogue import Choice
+from dsl_core.simulation.effects.tolerance import Tolerance
+from dsl_core.simulation.rendered_scene import AMBIENT_DN_PER_MS
+
+
+def number(name: str, value: object) -> float:
+    """A number of at least 0 from text; raises `DeviceError`."""
+    try:
+        found = float(str(value))
+    except ValueError:
+        found = math.nan
+    if not math.isfinite(found) or found < 0:
+        raise DeviceError(f"The twin's option {name} must be a number of at least 0, not {value!r}.")
+    return found
+
+
+def _number(value: object, info: ValidationInfo) -> float:
+    return number(str(info.field_name), value)
+
+
+def _whole(value: object, info: ValidationInfo) -> int:
+    return int(number(str(info.field_name), value))
+
+
+def _switch(value: object, info: ValidationInfo) -> bool:
+    if value not in ("on", "off"):
+        raise DeviceError(f"The twin's option {info.field_name} must be 'on' or 'off', not {value!r}.")
+    return value == "on"
+
+
+def _size(value: object) -> tuple[int, int] | None:
+    if value == "":
+        return None
+    try:
+        width, height = (int(part) for part in str(value).lower().split("x"))
+    except ValueError:
+        width = height = 0
+    if not (16 <= width <= 4096 and 16 <= height <= 4096):
+        raise DeviceError(f"The twin's size must be like 890x580 (16 to 4096 pixels a side), not {value!r}.")
+    return width, height
+
+
+Number = Annotated[float, BeforeValidator(_number)]
+Whole = Annotated[int, BeforeValidator(_whole)]
+Switch = Annotated[bool, BeforeValidator(_switch)]
+
+
+class Mishaps(Record):
+    """What a person might do wrong, to try out how calibrations notice."""
+
+    wrong_filter_nm: Number | None = Field(
+        default=None, description="filter in the beam, whichever was asked for"
+    )
+    filter_tilt_deg: Number = Field(default=0.0, description="tilt of the filters")
+    bow_mm: Number = Field(default=0.0, description="how far diffusers bulge over 300 mm")
+    stage_scale: Number = Field(
+        default=1.0, description="how far the stage moves from 700 mm, of what it says"
+    )
+    chart_roll_deg: Number = Field(
+        default=0.0, description="how much further a chart is turned than asked for"
+    )
+    board_shift_mm: Number = Field(
+        default=0.0, description="how far a board stands to the right of its place"
+    )
+    print_scale: Number = Field(default=1.0, description="size of a printed board, of what it should be")
+    target_missing: Switch = Field(default=False, description="on: a wall instead of a board or a chart")
+
+
+class TwinOptions(Mishaps):
+    """Options of the twin. All others are those of its scene, which ``dsl-scan scenes`` lists."""
+
+    scene: str = Field(
+        default="color-checker", description="what stands before the camera; its options can follow"
+    )
+    size: Annotated[tuple[int, int] | None, BeforeValidator(_size)] = Field(
+        default=None,
+        description="width and height of the camera's image, such as 112x72; 890x580 if not given",
+    )
+    seed: Whole = Field(default=0, description="seed of the noise")
+    noise: Switch = Field(default=True, description="noise of camera and spectroradiometer, on or off")
+    sigma: Number = Field(
+        default=0.0, description="more Gaussian noise, of full scale; the calibration knows it"
+    )
+    film: Switch = Field(default=True, description="diffraction film before the projector, on or off")
+    device: str = Field(default="cpu", description="where pictures are computed: cpu or cuda")
+    realtime: Switch = Field(default=False, description="on: waits as long as real devices would")
+    effects: str = Field(
+        default="usual",
+        description="what light does: usual, all, none, names, or auto: what the scene calls for",
+    )
+    tolerance: str = Field(
+        default="1DN", description="the most that auto may change a picture, such as 0.5sigma"
+    )
+    truth: Whole | None = Field(
+        default=None,
+        description="number of a rig drawn around the published one, whose calibration nobody knows",
+    )
+    led_cycle_hz: Number = Field(
+        default=0.0, description="how often the LEDs flash in turn; 0: they shine steadily"
+    )
+    ambient_dn_per_ms: Number = Field(default=AMBIENT_DN_PER_MS, description="light of the room")
+    defocus_px: Number = Field(default=0.0, description="blur of a camera that is out of focus")
+    brightness: Number = Field(
+        default=1.0, description="light of the projector, of that of the published rig"
+    )
+
+    @classmethod
+    def of(cls, options: dict[str, str]) -> tuple[TwinOptions, dict[str, str]]:
+        """The twin's options from text, and the others, which are the scene's; raises `DeviceError`.
+
+        >>> TwinOptions.of({"noise": "off", "depth_mm": "650"})[1]
+        {'depth_mm': '650'}
+        """
+        own = {name: text for name, text in options.items() if name in cls.model_fields}
+        made = cls.model_validate(own)
+        _ = made.choice, made.limit  # a wrong text is told now
+        return made, {name: text for name, text in options.items() if name not in own}
+
+    @property
+    def choice(self) -> Choice:
+        """The effects to render."""
+        return Choice.of(self.effects)
+
+    @property
+    def limit(self) -> Tolerance:
+        """The tolerance of effects that the scene decides on."""
+        return Tolerance.of(self.tolerance)

@@ -1,0 +1,70 @@
+"""Options of the twin: their texts are read and refused by name, and all others go to the scene."""
+
+from __future__ import annotations
+
+import pytest
+
+from dsl_core.errors import DeviceError, PlanError
+from dsl_core.simulation.sim_devices import SimCamera, open_twin
+from dsl_core.simulation.twin_options import TwinOptions
+
+
+def test_without_texts_every_option_has_its_default() -> None:
+    chosen, of_scene = TwinOptions.of({})
+    assert (chosen, of_scene) == (TwinOptions(), {})
+    assert (chosen.scene, chosen.size, chosen.noise, chosen.film, chosen.truth) == (
+        "color-checker", None, True, True, None,
+    )  # fmt: skip
+    assert (chosen.choice.text, str(chosen.limit)) == ("usual", "1 DN")
+
+
+def test_texts_are_read_and_those_of_the_scene_are_left() -> None:
+    texts = {
+        "scene": "sphere", "size": "112X72", "seed": "3", "noise": "off", "realtime": "on", "truth": "0",
+        "effects": "halo,blur", "tolerance": "0.5sigma", "wrong_filter_nm": "540", "gloss": "0.04",
+    }  # fmt: skip
+    chosen, of_scene = TwinOptions.of(texts)
+    assert of_scene == {"gloss": "0.04"}
+    assert (chosen.scene, chosen.size, chosen.seed) == ("sphere", (112, 72), 3)
+    assert (chosen.noise, chosen.realtime, chosen.truth) == (False, True, 0)
+    assert (chosen.limit.value, chosen.limit.unit, chosen.wrong_filter_nm) == (0.5, "sigma", 540.0)
+    assert chosen.choice.names is not None
+    assert {"halo", "blur"} < chosen.choice.names
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sentence"),
+    [
+        ("size", "890", "size must be like 890x580 (16 to 4096 pixels a side), not '890'"),
+        ("size", "8x8", "size must be like 890x580 (16 to 4096 pixels a side), not '8x8'"),
+        ("seed", "-1", "option seed must be a number of at least 0, not '-1'"),
+        ("sigma", "much", "option sigma must be a number of at least 0, not 'much'"),
+        ("brightness", "inf", "option brightness must be a number of at least 0, not 'inf'"),
+        ("wrong_filter_nm", "blue", "option wrong_filter_nm must be a number of at least 0, not 'blue'"),
+        ("noise", "yes", "option noise must be 'on' or 'off', not 'yes'"),
+        ("target_missing", "", "option target_missing must be 'on' or 'off', not ''"),
+        ("effects", "glow", "The twin has no effect 'glow'"),
+        ("tolerance", "little", "like 1, 0.5DN or 2sigma, not 'little'"),
+    ],
+)
+def test_a_wrong_text_is_refused_with_its_name_and_what_is_needed(
+    name: str, text: str, sentence: str
+) -> None:
+    with pytest.raises(DeviceError) as raised:
+        open_twin({name: text})
+    assert sentence in str(raised.value)
+
+
+def test_an_option_that_nobody_has_is_refused_by_the_scene() -> None:
+    with pytest.raises(PlanError, match=r"'plane' has no option colour; its options are depth_mm"):
+        open_twin({"scene": "plane", "colour": "red"})
+
+
+def test_a_stage_stands_where_the_option_says() -> None:
+    devices = open_twin({"scene": "stage", "depth_mm": "650", "size": "16x16"})
+    assert devices.stage is not None
+    assert devices.stage.position_mm == 650.0
+    assert isinstance(devices.camera, SimCamera)
+    assert devices.camera.world.truth.depth_mm == pytest.approx(650.0)
+    with pytest.raises(DeviceError, match="option depth_mm must be a number of at least 0, not 'near'"):
+        open_twin({"scene": "plane", "depth_mm": "near"})
