@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from dsl_app.calibrate.evidence.parts import ChartBox
+from dsl_app.calibrate.evidence.charts import ChartBox
 from dsl_app.calibrate.evidence.selftest import READING
 from dsl_app.calibrate.page import CalibratePage
 from dsl_app.calibrate.state import ABOUT

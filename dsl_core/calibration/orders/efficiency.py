@@ -32,6 +32,8 @@ AMPLITUDES, LENGTHS, NOISE_FACTORS = (
 MIN_SAMPLES, ROUNDS = 2, 4
 #: Least relative deviation of a ratio: nonlinearity of a camera and what scatters inside it.
 LEAST_STD = 8e-4
+#: An order stands out from the noise when its ratio is so many deviations above nothing.
+STANDS_OUT = 3.0
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class EfficiencyFit:
 
 def fit_efficiency(order: int, samples: Sequence[RatioSample]) -> EfficiencyFit:
     """Smooth efficiency of one order; raises `CalibrationError` with fewer than two usable samples."""
-    used = [s for s in samples if np.isfinite(s.std) and s.ratio > 3 * s.std]
+    used = [s for s in samples if np.isfinite(s.std) and s.ratio > STANDS_OUT * s.std]
     if len({round(_centre(s)) for s in used}) < MIN_SAMPLES:
         raise CalibrationError(
             f"Order {order:+d} was found through {len(used)} filters; {MIN_SAMPLES} of different wavelengths"

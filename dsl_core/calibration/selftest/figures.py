@@ -172,9 +172,8 @@ def _cycle(cycle: CycleCheck) -> Iterator[Figure]:
         yield Figure(name=f"advised exposure for {wanted:.1f} ms", value=advised, unit="ms")
     safe = " or ".join(f"{each:.2f}" for each in cycle.advised_ms)
     for beat in cycle.beats:
-        advised_one = any(abs(beat.exposure_ms - each) < 0.01 * each for each in cycle.advised_ms)
         worst = max((*beat.channels_percent, beat.ratio_percent), key=lambda each: each.value)
-        published = beat.exposure_ms in PUBLISHED_MS and not advised_one
+        published = beat.exposure_ms in PUBLISHED_MS and not cycle.is_advised(beat.exposure_ms)
         yield _figure(
             f"beat at {beat.exposure_ms:.2f} ms",
             worst,

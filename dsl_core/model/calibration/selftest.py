@@ -106,6 +106,10 @@ class CycleCheck(Record):
     advised_ms: tuple[float, ...]
     beats: tuple[Beat, ...]
 
+    def is_advised(self, exposure_ms: float) -> bool:
+        """Whether an exposure is one of those advised, within 1 %."""
+        return any(abs(exposure_ms - each) < 0.01 * each for each in self.advised_ms)
+
 
 class FocusCheck(Record):
     """Blur (standard deviation) of a projected edge, camera and projector together.

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pyqtgraph as pg
 from dsl_app.calibrate.evidence.base import Evidence, make_evidence
-from dsl_app.calibrate.evidence.parts import ChartBox
+from dsl_app.calibrate.evidence.charts import ChartBox
 from dsl_app.shared.theme import DARK, LIGHT, Theme
 from pytestqt.qtbot import QtBot
 

@@ -7,8 +7,9 @@ import sys
 import time
 
 import pytest
-from dsl_app.calibrate.evidence.base import PlainEvidence, make_evidence
-from dsl_app.calibrate.evidence.parts import Aside, ChartBox, NumberTable, with_spread
+from dsl_app.calibrate.evidence.base import BackgroundReader, PlainEvidence, make_evidence
+from dsl_app.calibrate.evidence.charts import ChartBox
+from dsl_app.calibrate.evidence.tables import NumberTable, with_spread
 from dsl_app.calibrate.wizard.fit_page import FitPage
 from dsl_app.calibrate.wizard.state import Fit, WizardState
 from dsl_app.shared.widgets.deferred import PAUSE_MS
@@ -132,14 +133,14 @@ def test_between_two_charts_the_window_comes_round(qtbot: QtBot) -> None:
 def test_only_the_latest_of_what_is_read_is_shown(qtbot: QtBot) -> None:
     widget = QWidget()
     qtbot.addWidget(widget)
-    aside, shown = Aside(widget), list[object]()
+    reader, shown = BackgroundReader(widget), list[object]()
     for number in range(5):
-        aside.read(lambda number=number: number, shown.append)  # type: ignore[misc]
-    qtbot.waitUntil(lambda: not aside.is_busy)
+        reader.read(lambda number=number: number, shown.append)  # type: ignore[misc]
+    qtbot.waitUntil(lambda: not reader.is_busy)
     qtbot.wait(50)
     assert shown == [4]
-    aside.read(lambda: 1 / 0, shown.append)
-    qtbot.waitUntil(lambda: not aside.is_busy)
+    reader.read(lambda: 1 / 0, shown.append)
+    qtbot.waitUntil(lambda: not reader.is_busy)
     assert isinstance(shown[1], ZeroDivisionError)
 
 

@@ -5,15 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout
 
-from dsl_app.calibrate.evidence.base import Evidence
-from dsl_app.calibrate.evidence.curves import COVER, Named, draw_curves, draw_points
-from dsl_app.calibrate.evidence.parts import Cell, ChartBox, NumberTable, with_spread
-from dsl_app.shared.theme import Theme
+from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
+from dsl_app.calibrate.evidence.charts import (
+    COVER,
+    ChartBox,
+    NamedCurve,
+    channel_curves,
+    draw_curves,
+    draw_points,
+)
+from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.calibration.orders.efficiency import STANDS_OUT
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
 from dsl_core.model.spectral import SpectralCurve
 
@@ -22,16 +27,13 @@ if TYPE_CHECKING:
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-#: An order stands out when its light is so many deviations above nothing.
-STANDS_OUT = 3.0
-CHANNELS = ("red", "green", "blue")
 HEADS = (
-    ("Asked, nm", "Nominal centre of the filter that was asked for"),
+    ("Requested, nm", "Nominal centre of the requested filter"),
     ("Passes, nm", "Effective wavelength of what its curve passes"),
-    ("Found, nm", "Where the places of its first orders say it is, with one standard deviation"),
+    ("Found, nm", "Wavelength by the positions of its first orders, with one standard deviation"),
     ("Off, nm", "Found minus passes"),
-    ("Orders", "Orders of the film that stand out of the noise"),
-    ("Curve", "Whether its transmission was measured or is that of a nominal filter"),
+    ("Orders", "Orders of the film that stand out from the noise"),
+    ("Curve", "Whether its transmission was measured, or assumed to be nominal"),
     ("Verdict", "What is wrong with the filter"),
 )
 
@@ -60,36 +62,19 @@ class BandpassEvidence(Evidence):
         self.warnings = label("", "warn")
         for words in (self.seconds, self.warnings):
             words.setWordWrap(True)
-        self._lay_out()
-
-    def _lay_out(self) -> None:
-        charts = QWidget()
-        row = QHBoxLayout(charts)
-        row.setContentsMargins(0, 6, 0, 0)
-        row.addWidget(self.efficiency, 1)
-        row.addWidget(self.response, 1)
-        parts = QSplitter(Qt.Orientation.Vertical)
-        parts.setChildrenCollapsible(False)
-        parts.addWidget(self.table)
-        parts.addWidget(charts)
-        parts.setSizes([180, 260])
+        self._parts = (self.table, self.efficiency, self.response)
+        charts = side_by_side(self.efficiency, self.response)
+        charts.setContentsMargins(0, 6, 0, 0)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.warnings)
-        column.addWidget(parts, 1)
+        column.addWidget(stacked(self.table, charts, (180, 260)), 1)
         column.addWidget(self.seconds)
 
     def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
         """Show a fit."""
         assert isinstance(record, BandpassCalibration)
         self._record = record
-        self._draw()
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        super().apply_theme(theme)
-        for part in (self.table, self.efficiency, self.response):
-            part.apply_theme(theme)
         self._draw()
 
     def _draw(self) -> None:
@@ -105,22 +90,16 @@ class BandpassEvidence(Evidence):
 
     def _draw_response(self, record: BandpassCalibration) -> None:
         self.response.begin()
-        draw_curves(
-            self.response,
-            [
-                Named(name, colour, curve)
-                for name, colour, curve in zip(CHANNELS, RGB_COLOURS, record.response, strict=True)
-            ],
-        )
+        draw_curves(self.response, channel_curves(record.response))
 
     def _draw_efficiency(self, record: BandpassCalibration) -> None:
         self.efficiency.begin()
         colours = {1: self._theme.pins[0], -1: self._theme.pins[1]}
         curves = [
-            Named(f"order {_signed(order)}", colour, record.efficiency[order])
+            NamedCurve(f"order {_signed(order)}", colour, record.efficiency[order])
             for order, colour in colours.items()
         ]
-        bound = Named("orders ±2, at most", self._theme.muted, _bound_of_seconds(record), dashed=True)
+        bound = NamedCurve("orders ±2, at most", self._theme.muted, _bound_of_seconds(record), dashed=True)
         draw_curves(self.efficiency, [*curves, bound])
         for order, colour in colours.items():
             samples = [
@@ -148,12 +127,12 @@ def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell | str]:
         Cell(off, "warn" if own else ""),
         ", ".join(map(_signed, sorted(orders))) or "none",
         Cell("measured" if each.curve_measured else "nominal", "muted"),
-        Cell(_sentence(own[0].split(": ", 1)[1]), "warn") if own else Cell("as asked for", "good"),
+        Cell(_sentence(own[0].split(": ", 1)[1]), "warn") if own else Cell("as requested", "good"),
     ]
 
 
 def _bound_of_seconds(record: BandpassCalibration) -> SpectralCurve:
-    """What second orders stay below, with 95 % probability."""
+    """What second orders stay below with a probability of 95 %."""
     share = record.second_order_share + COVER * record.second_order_share_std
     nm = np.array(record.efficiency[1].wavelengths_nm)
     return SpectralCurve.of(nm, share * np.maximum(*(record.efficiency[order].at(nm) for order in (1, -1))))

@@ -1,12 +1,14 @@
-"""What a fit rests on, to be looked at before it is accepted: one widget for each calibration."""
+"""What a fit rests on, to be judged before it is accepted: one widget for each calibration."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
+from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
@@ -15,6 +17,13 @@ if TYPE_CHECKING:
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+
+class Themed(Protocol):
+    """A part of evidence that has colours."""
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
 
 
 class Evidence(QWidget):
@@ -29,22 +38,30 @@ class Evidence(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._theme = DARK
+        #: Parts that take the colours of a theme with the widget.
+        self._parts: Sequence[Themed] = ()
 
     def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
         """Show a fit that waits to be accepted; quick enough for the thread of the window."""
         raise NotImplementedError
 
     def show_captures(self, session: CalibrationSession) -> bool:
-        """Show captures that no fit came of, where a person can help by looking; False where not."""
+        """Show captures that gave no fit, where a person can help by looking; False where not."""
         return False
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
+        for part in self._parts:
+            part.apply_theme(theme)
+        self._draw()
+
+    def _draw(self) -> None:
+        """Draw the fit in the colours of the theme; nothing before there is one."""
 
 
 class PlainEvidence(Evidence):
-    """Of a calibration without a widget of its own: its figures say all that is known."""
+    """For a calibration without a widget of its own: its figures say all that is known."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,7 +78,7 @@ class PlainEvidence(Evidence):
         )
 
 
-#: Module and class by the name of the recipe; imported when they are first wanted.
+#: Module and class by the name of the recipe; imported when they are first needed.
 _WIDGETS = {
     "selftest": ("dsl_app.calibrate.evidence.selftest", "SelfTestEvidence"),
     "geometry": ("dsl_app.calibrate.evidence.geometry", "GeometryEvidence"),
@@ -73,10 +90,69 @@ _WIDGETS = {
 
 
 def make_evidence(name: str) -> Evidence:
-    """The widget of a recipe's name; one without a widget of its own says so in words."""
+    """The widget for a recipe's name; `PlainEvidence` if it has none of its own."""
     if name not in _WIDGETS:
         return PlainEvidence()
     module, kind = _WIDGETS[name]
     made = getattr(import_module(module), kind)()
     assert isinstance(made, Evidence)
     return made
+
+
+def side_by_side(*widgets: QWidget) -> QWidget:
+    """Widgets in a row that share the room equally."""
+    made = QWidget()
+    row = QHBoxLayout(made)
+    row.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        row.addWidget(widget, 1)
+    return made
+
+
+def stacked(top: QWidget, bottom: QWidget, sizes: tuple[int, int]) -> QSplitter:
+    """Two widgets above each other, with a handle between them."""
+    made = QSplitter(Qt.Orientation.Vertical)
+    made.setChildrenCollapsible(False)
+    made.addWidget(top)
+    made.addWidget(bottom)
+    made.setSizes(sizes)
+    return made
+
+
+class BackgroundReader(QObject):
+    """Reads something in another thread and shows it in the window's; only the latest is shown."""
+
+    _ended = Signal(int, object, object)
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._number = 0
+        self._show: Callable[[Any], object] | None = None
+        self._ended.connect(self._finish)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something is still being read."""
+        return self._show is not None
+
+    def read(self, work: Callable[[], Any], show: Callable[[Any], object]) -> None:
+        """Call ``show`` with what ``work`` returns, or with the exception that it raised."""
+        self._number, self._show = self._number + 1, show
+        number = self._number
+
+        def run() -> None:
+            try:
+                found, trouble = work(), None
+            except Exception as error:  # shown in the window, never lost in a thread
+                found, trouble = None, error
+            # The widget may have been deleted meanwhile, and this object with it: nobody waits for it then.
+            with suppress(RuntimeError):
+                self._ended.emit(number, found, trouble)
+
+        QThreadPool.globalInstance().start(run)
+
+    def _finish(self, number: int, found: object, trouble: Exception | None) -> None:
+        if number != self._number or self._show is None:
+            return
+        show, self._show = self._show, None
+        show(found if trouble is None else trouble)

@@ -1,23 +1,26 @@
-"""The picture of a chart with its patches outlined and four corners to drag."""
+"""A chart as the camera saw it, with corners to drag, and its patches as measured and as expected."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
+from dsl_core.calibration.colour.chart_alignment import apply_homography, grid_corners
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import QEvent, QRectF, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QHelpEvent, QKeyEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QToolTip, QVBoxLayout, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
+from dsl_core.calibration.colour.patches import INNER
+from dsl_core.optics.charts import CHART_SHAPE
 
 Floats = NDArray[np.float64]
-#: Rows and columns of patches; half width of what is measured of a patch, in distances between patches.
-ROWS, COLUMNS, INNER = 4, 6, 0.28
-CORNER_NAMES = ("dark skin", "bluish green", "black", "white")
-_GRID = np.array([[0, 0], [COLUMNS, 0], [COLUMNS, ROWS], [0, ROWS]], float)
+ROWS, COLUMNS = CHART_SHAPE
+#: Room between patches, px.
+GAP = 4.0
 _ARROWS = {
     Qt.Key.Key_Left: (-1, 0),
     Qt.Key.Key_Right: (1, 0),
@@ -27,28 +30,32 @@ _ARROWS = {
 
 
 def patch_outlines(corners_px: Floats) -> Floats:
-    """Corners (24, 4, 2) of the measured part of each patch, by the homography of the four outer corners."""
+    """Corners (24, 4, 2) of the measured part of each patch; raises `LinAlgError` for corners on a line.
+
+    The homography of the four outer corners is solved here, because it is needed at every move of the mouse.
+    """
     rows = []
-    for (u, v), (x, y) in zip(_GRID, corners_px, strict=True):
+    for (u, v), (x, y) in zip(grid_corners(), corners_px, strict=True):
         rows.append([u, v, 1, 0, 0, 0, -u * x, -v * x])
         rows.append([0, 0, 0, u, v, 1, -u * y, -v * y])
     matrix = np.append(np.linalg.solve(np.array(rows), np.ravel(corners_px)), 1.0).reshape(3, 3)
     square = INNER * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     centres = np.array([[i % COLUMNS + 0.5, i // COLUMNS + 0.5] for i in range(ROWS * COLUMNS)])
-    points = (centres[:, None] + square).reshape(-1, 2)
-    lifted = np.concatenate([points, np.ones((len(points), 1))], 1) @ matrix.T
-    return np.asarray(lifted[:, :2] / lifted[:, 2:]).reshape(-1, 4, 2)
+    return apply_homography(matrix, (centres[:, None] + square).reshape(-1, 2)).reshape(-1, 4, 2)
 
 
 def corners_in(shape: tuple[int, ...]) -> Floats:
     """Corners in the middle of a picture (rows, columns, ...), for a person to drag to where they belong."""
     height, width = shape[:2]
     side = min(0.7 * width / COLUMNS, 0.7 * height / ROWS)
-    return (_GRID - (COLUMNS / 2, ROWS / 2)) * side + ((width - 1) / 2, (height - 1) / 2)
+    return (grid_corners() - (COLUMNS / 2, ROWS / 2)) * side + ((width - 1) / 2, (height - 1) / 2)
 
 
 class ChartPicture(QWidget):
-    """Emits ``moved`` while a corner is dragged or moved by arrow keys; Tab goes to the next corner."""
+    """The picture of a chart with its patches outlined and four corners to drag.
+
+    Emits ``moved`` while a corner is dragged or moved by arrow keys; 1 to 4 choose a corner.
+    """
 
     moved = Signal()
 
@@ -57,7 +64,7 @@ class ChartPicture(QWidget):
         self._theme, self._chosen = DARK, 0
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Chart with its corners")
-        tip = "Drag the corners of the patches, or choose one by 1 to 4 and move it by arrows (Shift: ten)."
+        tip = "Drag the corners of the patches, or choose one with 1 to 4 and move it with the arrow keys (Shift: by 10 px)."
         self.setToolTip(tip)
         self.canvas = pg.GraphicsLayoutWidget()
         self.canvas.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -65,7 +72,7 @@ class ChartPicture(QWidget):
         self.image = pg.ImageItem(axisOrder="row-major")
         # White on black, so that the outlines are seen on every patch.
         self.shadow, self.outlines = (pg.PlotCurveItem(connect="finite") for _ in range(2))
-        self.corners = [pg.TargetItem(size=14, movable=True) for _ in CORNER_NAMES]
+        self.corners = [pg.TargetItem(size=14, movable=True) for _ in grid_corners()]
         for item in (self.image, self.shadow, self.outlines, *self.corners):
             self.box.addItem(item, ignoreBounds=item is not self.image)
         for corner in self.corners:
@@ -81,7 +88,7 @@ class ChartPicture(QWidget):
         return np.array([[corner.pos().x(), corner.pos().y()] for corner in self.corners])
 
     def show_corners(self, corners_px: Floats) -> None:
-        """Put the corners somewhere, which moves nobody to anything."""
+        """Put the corners somewhere without telling that they moved."""
         for corner, (x, y) in zip(self.corners, corners_px, strict=True):
             corner.blockSignals(True)
             corner.setPos(float(x), float(y))
@@ -89,7 +96,7 @@ class ChartPicture(QWidget):
         self._outline()
 
     def show_picture(self, picture: NDArray[np.uint8]) -> None:
-        """Show a picture, RGB; pixels have their centres at whole numbers."""
+        """Show a picture, RGB (rows, columns, 3); pixels have their centres at whole numbers."""
         self.image.setImage(picture, levels=(0, 255), autoLevels=False)
         height, width = picture.shape[:2]
         self.image.setRect(-0.5, -0.5, width, height)
@@ -136,3 +143,93 @@ class ChartPicture(QWidget):
         self.shadow.setPen(pg.mkPen("#000000", width=3))
         self.outlines.setPen(pg.mkPen("#ffffff", width=1))
         self._paint_corners()
+
+
+def screen_colours(share: Floats) -> list[QColor]:
+    """Screen colours of signals over white (n, 3), in the camera's red, green and blue."""
+    encoded = np.clip(share, 0, 1) ** (1 / 2.2)
+    return [QColor.fromRgbF(*map(float, row)) for row in encoded]
+
+
+class Swatches(QWidget):
+    """The 24 patches as split squares, in reading order: left as measured, right as expected.
+
+    The number below each is its held-out residual, % of white.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._theme = DARK
+        self.measured: list[QColor] = []
+        self.expected: list[QColor] = []
+        self._names: list[str] = []
+        self._held_out: list[float] = []
+        self._sentence = "Reading the picture…"
+        self.setMinimumSize(220, 150)
+        self.setAccessibleName("Patches as measured and as expected")
+
+    def show_colours(
+        self, measured: Floats, expected: Floats, held_out: Sequence[float], names: Sequence[str]
+    ) -> None:
+        """Show signals over white, (24, 3), and residuals as a share of white."""
+        self.measured, self.expected = screen_colours(measured), screen_colours(expected)
+        self._held_out, self._names = list(held_out), list(names)
+        worst = int(np.argmax(held_out))
+        self.setAccessibleDescription(
+            f"Farthest from what is expected is {names[worst]}, by {100 * held_out[worst]:.1f} % of white."
+        )
+        self.update()
+
+    def clear(self, sentence: str) -> None:
+        """Show a sentence instead of patches."""
+        self.measured, self.expected, self._names, self._held_out = [], [], [], []
+        self._sentence = sentence
+        self.setAccessibleDescription(sentence)
+        self.update()
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self.update()
+
+    def _place(self, index: int) -> QRectF:
+        """Where a patch is drawn, with room for its number."""
+        width, height = self.width() / COLUMNS, self.height() / ROWS
+        return QRectF(index % COLUMNS * width, index // COLUMNS * height, width - GAP, height - GAP)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw all patches."""
+        painter = QPainter(self)
+        line = QFontMetricsF(self.font()).height()
+        if not self.measured:
+            painter.setPen(QColor(self._theme.muted))
+            painter.drawText(self.rect(), Qt.AlignmentFlag.AlignTop, self._sentence)
+            return
+        for index, (measured, expected) in enumerate(zip(self.measured, self.expected, strict=True)):
+            place = self._place(index)
+            square = place.adjusted(0, 0, 0, -line)
+            middle = square.center().x()
+            painter.fillRect(
+                QRectF(square.left(), square.top(), middle - square.left(), square.height()), measured
+            )
+            painter.fillRect(QRectF(middle, square.top(), square.right() - middle, square.height()), expected)
+            painter.setPen(QPen(QColor(self._theme.line), 1))
+            painter.drawRect(square)
+            painter.setPen(QColor(self._theme.muted))
+            below = QRectF(place.left(), square.bottom(), place.width(), line)
+            painter.drawText(below, Qt.AlignmentFlag.AlignHCenter, f"{100 * self._held_out[index]:.2f}")
+
+    def event(self, event: QEvent) -> bool:
+        """Show the name of the patch under the mouse."""
+        if isinstance(event, QHelpEvent) and self._names:
+            inside = [i for i in range(len(self._names)) if self._place(i).contains(event.pos().toPointF())]
+            words = (
+                f"{self._names[inside[0]]}: held out {100 * self._held_out[inside[0]]:.2f} %"
+                if inside
+                else ""
+            )
+            QToolTip.showText(
+                event.globalPos(), f"{words}. Left measured, right expected." if words else "", self
+            )
+            return True
+        return super().event(event)

@@ -3,54 +3,62 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pyqtgraph as pg
+from dsl_core.calibration.colour.figures import WORST
 from numpy.typing import NDArray
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
-from dsl_app.calibrate.evidence.base import Evidence
-from dsl_app.calibrate.evidence.chart_picture import ChartPicture, corners_in
-from dsl_app.calibrate.evidence.curves import Named, draw_curves, level_line
-from dsl_app.calibrate.evidence.parts import BAR, DOT, Aside, Cell, ChartBox, NumberTable
-from dsl_app.calibrate.evidence.swatches import Swatches
-from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side, stacked
+from dsl_app.calibrate.evidence.chart_picture import ChartPicture, Swatches, corners_in
+from dsl_app.calibrate.evidence.charts import (
+    BAR,
+    CHANNELS,
+    DASHES,
+    DOT,
+    LINE,
+    Bars,
+    ChartBox,
+    channel_curves,
+    draw_bars,
+    draw_curves,
+    range_from_zero,
+)
+from dsl_app.calibrate.evidence.tables import Cell, NumberTable
+from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.plots import RGB_COLOURS
-from dsl_core.calibration.colour.color_checker import WORST_PERCENT
-from dsl_core.model.calibration.color_checker import TURNS, ColorCheckerCalibration
+from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
 from dsl_core.model.rig import Rgb
 
 if TYPE_CHECKING:
-    from dsl_core.campaign.color_checker.recipe import ChartView
+    from dsl_core.campaign.color_checker.chart_view import ChartView
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-CHANNELS = ("red", "green", "blue")
 #: What a person does where no chart was found.
 HELP = (
-    "No fit came of this picture. Drag the four corners to the outer corners of the 24 patches, in any order"
-    " round the chart, until all outlines lie inside patches; then fit."
+    "This picture gave no fit. Drag the four corners to the outer corners of the 24 patches, beginning at any"
+    " of them, until all outlines are inside patches; then fit."
 )
 NO_FIT = "There is no fit yet."
 HEADS = (
     ("Patch", "Name of the patch"),
     *(
-        (f"{name.capitalize()}, %", "Measured under white, of a perfect white, with its deviation")
+        (f"{name.capitalize()}, %", "Measured under white, relative to a perfect white, with its deviation")
         for name in CHANNELS
     ),
     ("Expected, %", "What the refined curves expect: red, green, blue"),
     ("In fit", "Rms of measured minus modelled signals, % of the patch's white"),
-    ("Held out", "The same with curves that never saw the patch"),
+    ("Held out", "The same with curves fitted without the patch"),
 )
 
 
 class ColorCheckerEvidence(Evidence):
-    """Three tabs; moved corners are asked for as settings of the next fit."""
+    """Three tabs; moved corners become settings of the next fit."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -62,14 +70,14 @@ class ColorCheckerEvidence(Evidence):
         self.swatches = Swatches()
         self.words = label("", "muted")
         self.words.setWordWrap(True)
-        self.again = QPushButton("Fit with these corners")
-        self.again.setToolTip("Measure the patches anew where the corners are now, and refine again")
-        self.back = QPushButton("Put corners back")
-        self.back.setToolTip("Put the corners where the shown fit has them")
+        self.again = push_button(
+            "Fit with these corners", "Measure the patches again at the current corners, and refine again"
+        )
+        self.back = push_button("Reset corners", "Move the corners back to where the fit shown here has them")
         self.table = NumberTable("Patches", HEADS)
         self.residuals = ChartBox(
             "Residuals of the patches",
-            "Rms of measured minus modelled signals; held out: by curves that never saw the patch.",
+            "Rms of measured minus modelled signals; held out: with curves fitted without the patch.",
             "Of white (%)",
             "",
         )
@@ -81,12 +89,14 @@ class ColorCheckerEvidence(Evidence):
             "Emission of the LEDs", "Solid after, dotted before the chart; 95 % bands.", "Emission",
             "Wavelength (nm)",
         )  # fmt: skip
-        self._aside = Aside(self)
+        self._reader = BackgroundReader(self)
+        boxes = (self.residuals, self.response, self.emission)
+        self._parts = (self.chart, self.swatches, self.table, *boxes)
         self.tabs = QTabWidget()
         self.tabs.setDocumentMode(True)
         self.tabs.setAccessibleName("Evidence of the Color Checker")
         self.again.setAccessibleName("Fit with these corners")
-        self.back.setAccessibleName("Put corners back")
+        self.back.setAccessibleName("Reset corners")
         self.tabs.addTab(self._chart_tab(), "Chart")
         self.tabs.addTab(self._patches_tab(), "Patches")
         self.tabs.addTab(self._curves_tab(), "Curves")
@@ -99,8 +109,8 @@ class ColorCheckerEvidence(Evidence):
 
     def _chart_tab(self) -> QWidget:
         tab, right = QWidget(), QVBoxLayout()
-        right.addWidget(label("Measured beside expected", "heading"))
-        right.addWidget(label("Numbers: residual when held out, % of white", "muted"))
+        right.addWidget(label("Measured next to expected", "heading"))
+        right.addWidget(label("Numbers: held-out residual, % of white", "muted"))
         right.addWidget(self.swatches, 1)
         row = QHBoxLayout()
         row.addWidget(self.chart, 3)
@@ -116,24 +126,17 @@ class ColorCheckerEvidence(Evidence):
         return tab
 
     def _patches_tab(self) -> QWidget:
-        parts = QSplitter(Qt.Orientation.Vertical)
-        parts.setChildrenCollapsible(False)
-        parts.addWidget(self.residuals)
-        parts.addWidget(self.table)
-        parts.setSizes([250, 210])
-        parts.setContentsMargins(0, 8, 0, 0)
-        return parts
+        tab = stacked(self.residuals, self.table, (250, 210))
+        tab.setContentsMargins(0, 8, 0, 0)
+        return tab
 
     def _curves_tab(self) -> QWidget:
-        tab = QWidget()
-        row = QHBoxLayout(tab)
-        row.setContentsMargins(0, 8, 0, 0)
-        row.addWidget(self.response, 1)
-        row.addWidget(self.emission, 1)
+        tab = side_by_side(self.response, self.emission)
+        tab.setContentsMargins(0, 8, 0, 0)
         return tab
 
     def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit; the picture of the chart is read aside."""
+        """Show a fit; the picture of the chart is read in the background."""
         assert isinstance(record, ColorCheckerCalibration)
         bench, step = session.bench, session.steps[0]
         self._record, self._view = record, None
@@ -143,11 +146,11 @@ class ColorCheckerEvidence(Evidence):
         self._draw()
 
         def read() -> ChartView:
-            from dsl_core.campaign.color_checker.recipe import chart_view
+            from dsl_core.campaign.color_checker.chart_view import chart_view
 
             return chart_view(record, bench, step)
 
-        self._aside.read(read, self._take)
+        self._reader.read(read, self._take)
 
     def show_captures(self, session: CalibrationSession) -> bool:
         """Show the picture in which no chart was found, for its corners to be set by hand."""
@@ -162,19 +165,12 @@ class ColorCheckerEvidence(Evidence):
         self._say("Reading the picture…")
 
         def read() -> NDArray[np.uint8]:
-            from dsl_core.campaign.color_checker.recipe import white_picture
+            from dsl_core.campaign.color_checker.chart_view import white_picture
 
             return white_picture(bench, step)
 
-        self._aside.read(read, self._take_picture)
+        self._reader.read(read, self._take_picture)
         return True
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        super().apply_theme(theme)
-        for part in (self.chart, self.swatches, self.table, self.residuals, self.response, self.emission):
-            part.apply_theme(theme)
-        self._draw()
 
     # Corners ---------------------------------------------------------------------------------------
 
@@ -206,12 +202,12 @@ class ColorCheckerEvidence(Evidence):
         self.chart.show_corners(np.array(record.corners_px))
         if self._view is not None:
             self._say(
-                f"The chart is {TURNS[record.quarter_turns]}, {record.distance_mm:.0f} mm away, tilted by"
-                f" {record.tilt_deg:.1f}°. Drag corners that are wrong."
+                f"The chart is {ORIENTATIONS[record.quarter_turns]}, {record.distance_mm:.0f} mm away, tilted by"
+                f" {record.tilt_deg:.1f}°. Drag any corner that is wrong."
             )
 
     def _corner_moved(self) -> None:
-        self._say("All outlines must lie inside patches.")
+        self._say("All outlines must be inside patches.")
         for button in (self.again, self.back):
             button.setEnabled(True)
 
@@ -238,17 +234,11 @@ class ColorCheckerEvidence(Evidence):
 
     def _draw_pair(self, box: ChartBox, after: Rgb, before: Rgb) -> None:
         box.begin()
-        old = [
-            Named(f"{name} before", colour, curve.model_copy(update={"std": None}), dashed=True)
-            for name, colour, curve in zip(CHANNELS, RGB_COLOURS, before, strict=True)
-        ]
-        new = [
-            Named(name, colour, curve)
-            for name, colour, curve in zip(CHANNELS, RGB_COLOURS, after, strict=True)
-        ]
-        draw_curves(box, [*old, *new])
+        bare = [curve.model_copy(update={"std": None}) for curve in before]
+        old = [replace(each, name=f"{each.name} before", dashed=True) for each in channel_curves(bare)]
+        draw_curves(box, [*old, *channel_curves(after)])
         keys = [(name, colour, DOT) for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)]
-        box.name_curves([*keys, ("after", self._theme.text, "━"), ("before", self._theme.text, "┅")])
+        box.name_curves([*keys, ("after", self._theme.text, LINE), ("before", self._theme.text, DASHES)])
 
     def _draw_patches(self) -> None:
         record, view = self._record, self._view
@@ -270,7 +260,7 @@ class ColorCheckerEvidence(Evidence):
                     *measured,
                     expected,
                     f"{100 * patch.residual:.2f}",
-                    Cell(f"{held:.2f}", "bad" if held > WORST_PERCENT else ""),
+                    Cell(f"{held:.2f}", "bad" if held > WORST else ""),
                 ]
             )
         self.table.fill(rows)
@@ -282,32 +272,18 @@ class ColorCheckerEvidence(Evidence):
 
     def _draw_residuals(self, record: ColorCheckerCalibration) -> None:
         box, theme = self.residuals, self._theme
-        box.begin()
-        at = np.arange(len(record.patches))
         kinds = (
-            ("before the refinement", theme.line, [patch.start for patch in record.patches]),
-            ("held out", theme.pins[1], [patch.held_out for patch in record.patches]),
-            ("in the fit", theme.pins[0], [patch.residual for patch in record.patches]),
+            Bars("before the refinement", theme.line, 100 * np.array([p.start for p in record.patches])),
+            Bars("held out", theme.pins[1], 100 * np.array([p.held_out for p in record.patches])),
+            Bars("in the fit", theme.pins[0], 100 * np.array([p.residual for p in record.patches])),
         )
-        top = 0.0
-        for side, (_, colour, values) in enumerate(kinds):
-            heights = 100 * np.array(values)
-            top = max(top, float(heights.max()))
-            box.item.addItem(
-                pg.BarGraphItem(
-                    x=at + 0.27 * (side - 1), height=heights, width=0.25, brush=colour, pen=pg.mkPen(None)
-                )
-            )
-        if top > WORST_PERCENT / 2:
-            level_line(box, WORST_PERCENT, theme.bad, "limit")
-            top = max(top, 1.1 * WORST_PERCENT)
-        box.item.getAxis("bottom").setTicks([[(i, str(i + 1)) for i in range(len(at))]])
+        top = draw_bars(box, kinds, [str(number) for number in range(1, len(record.patches) + 1)])
+        range_from_zero(box, top, WORST, theme)
         box.plot.setLabel("bottom", "Patch, in reading order")
-        box.item.setRange(xRange=(-0.6, len(at) - 0.4), yRange=(0, 1.08 * top), padding=0)
         totals = (record.start, record.held_out, record.residual)
         box.name_curves(
             [
-                (f"{name}, {100 * total:.2f} % in all", colour, BAR)
-                for (name, colour, _), total in zip(kinds, totals, strict=True)
+                (f"{kind.name}, {100 * total:.2f} % in all", kind.colour, BAR)
+                for kind, total in zip(kinds, totals, strict=True)
             ]
         )

@@ -6,24 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyqtgraph as pg
+from dsl_core.calibration.geometry.diagnosis import CELLS, MIN_POSES
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor
-from PySide6.QtWidgets import (
-    QGraphicsRectItem,
-    QHBoxLayout,
-    QPushButton,
-    QSplitter,
-    QTableWidgetItem,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QGraphicsRectItem, QHBoxLayout, QTableWidgetItem, QVBoxLayout
 
-from dsl_app.calibrate.evidence.base import Evidence
-from dsl_app.calibrate.evidence.curves import level_line
-from dsl_app.calibrate.evidence.parts import BAR, DOT, Cell, ChartBox, NumberTable, like_a_picture
+from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
+from dsl_app.calibrate.evidence.charts import (
+    BAR,
+    DOT,
+    Bars,
+    ChartBox,
+    draw_bars,
+    like_a_picture,
+    range_from_zero,
+)
+from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label, set_role
-from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
+from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_core.campaign.geometry.recipe import RMS_PX
 from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ HEADS = (
     ("Camera, px", "Rms error of the corners in the camera's picture"),
     ("Projector, px", "Rms error of the corners in the projector's picture"),
     ("At, mm", "Mean distance of the board along the camera's axis"),
-    ("Tilt, °", "Angle between board and picture"),
+    ("Tilt, °", "Angle between board and image plane"),
     ("Square, mm", "Side of a square, triangulated, with its deviation"),
     ("Plane, mm", "Rms distance of the triangulated corners from their best plane"),
     ("Verdict", "Whether the pose is used, and why not"),
@@ -45,7 +45,7 @@ HEADS = (
 
 
 class GeometryEvidence(Evidence):
-    """Coverage and bars above a table of poses; unticked poses are left out when it is solved again."""
+    """Coverage and errors above a table of poses; unticked poses are left out when it is solved again."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -61,8 +61,7 @@ class GeometryEvidence(Evidence):
         )
         self.errors = ChartBox(
             "Error of each pose",
-            "Rms distance of corners from where the calibration expects them; below"
-            f" {GOOD_RMS_PX} px is good.",
+            f"Rms distance of corners from where the calibration expects them; below {RMS_PX} px is good.",
             "Rms error (px)",
             "Pose",
             left_width=60,
@@ -70,33 +69,25 @@ class GeometryEvidence(Evidence):
         self.table = NumberTable("Poses", HEADS, words=(0, 8))
         self.diagnosis = label("", "muted")
         self.diagnosis.setWordWrap(True)
-        self.again = QPushButton("Solve again")
-        self.again.setAccessibleName("Solve again with the ticked poses")
-        self.again.setToolTip(
-            "Fit lenses and pose anew with the ticked poses; captures of the others are kept"
+        self.again = push_button(
+            "Solve again", "Fit lenses and pose again with the ticked poses; captures of the others are kept"
         )
+        self.again.setAccessibleName("Solve again with the ticked poses")
         self.again.clicked.connect(self._ask)
         self.table.itemChanged.connect(self._ticked)
         self.table.itemSelectionChanged.connect(self._draw_coverage)
         self._lay_out()
 
     def _lay_out(self) -> None:
-        charts = QWidget()
-        row = QHBoxLayout(charts)
-        row.setContentsMargins(0, 0, 0, 6)
-        row.addWidget(self.coverage, 1)
-        row.addWidget(self.errors, 1)
-        parts = QSplitter(Qt.Orientation.Vertical)
-        parts.setChildrenCollapsible(False)
-        parts.addWidget(charts)
-        parts.addWidget(self.table)
-        parts.setSizes([260, 200])
+        self._parts = (self.coverage, self.errors, self.table)
+        charts = side_by_side(self.coverage, self.errors)
+        charts.setContentsMargins(0, 0, 0, 6)
         foot = QHBoxLayout()
         foot.addWidget(self.diagnosis, 1)
         foot.addWidget(self.again, 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(parts, 1)
+        column.addWidget(stacked(charts, self.table, (260, 200)), 1)
         column.addLayout(foot)
 
     def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
@@ -110,13 +101,10 @@ class GeometryEvidence(Evidence):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        super().apply_theme(theme)
-        for part in (self.coverage, self.errors):
-            part.apply_theme(theme)
+        # Colours are changes of items too, and are not ticks.
         self.table.blockSignals(True)
-        self.table.apply_theme(theme)
+        super().apply_theme(theme)
         self.table.blockSignals(False)
-        self._draw()
 
     # Poses to leave out ----------------------------------------------------------------------------
 
@@ -150,8 +138,7 @@ class GeometryEvidence(Evidence):
     def _ticked(self) -> None:
         choices = self._choices()
         ticked = sum(self._is_ticked(item) for item in choices)
-        wanted = frozenset(item.text() for item in choices if not self._is_ticked(item))
-        changed = wanted != self._unticked
+        changed = frozenset(i.text() for i in choices if not self._is_ticked(i)) != self._unticked
         self.again.setEnabled(changed and ticked >= MIN_POSES)
         self.again.setText(f"Solve again with {ticked} poses" if changed else "Solve again")
         self._diagnose(changed and ticked < MIN_POSES)
@@ -163,7 +150,7 @@ class GeometryEvidence(Evidence):
     def _diagnose(self, too_few: bool) -> None:
         record = self._record
         assert record is not None
-        words, role = "Nothing about these poses is doubtful.", "muted"
+        words, role = "There are no doubts about these poses.", "muted"
         if record.warnings:
             words, role = " ".join(record.warnings), "warn"
         if too_few:
@@ -212,30 +199,16 @@ class GeometryEvidence(Evidence):
         self.coverage.name_curves([*keys, *chosen_keys])
 
     def _draw_errors(self, record: GeometryCalibration) -> None:
-        theme = self._theme
-        self.errors.begin()
-        colours = (theme.pins[0], theme.pins[1])
-        at = np.arange(len(record.poses))
-        values = np.array([(pose.camera_rms_px, pose.projector_rms_px) for pose in record.poses]).T
-        faint = [not pose.used for pose in record.poses]
-        for side, (heights, colour) in enumerate(zip(values, colours, strict=True)):
-            brushes = [_brush(colour, 70 if pale else 255) for pale in faint]
-            bars = pg.BarGraphItem(
-                x=at + (side - 0.5) * 0.36, height=heights, width=0.32, brushes=brushes, pen=pg.mkPen(None)
-            )
-            self.errors.item.addItem(bars)
-        top = float(values.max())
-        if top > GOOD_RMS_PX / 2:
-            level_line(self.errors, GOOD_RMS_PX, theme.bad, "limit")
-            top = max(top, 1.1 * GOOD_RMS_PX)
-        self.errors.item.setRange(xRange=(-0.6, len(at) - 0.4), yRange=(0, 1.1 * top), padding=0)
-        ticks = [(i, pose.name.removeprefix("Pose ")) for i, pose in enumerate(record.poses)]
-        self.errors.item.getAxis("bottom").setTicks([ticks])
-        names = (
-            f"camera, {record.camera_rms_px:.3f} px in all",
-            f"projector, {record.projector_rms_px:.3f} px",
+        is_pale = [not pose.used for pose in record.poses]
+        camera = np.array([pose.camera_rms_px for pose in record.poses])
+        projector = np.array([pose.projector_rms_px for pose in record.poses])
+        kinds = (
+            Bars(f"camera, {record.camera_rms_px:.3f} px in all", self._theme.pins[0], camera, is_pale),
+            Bars(f"projector, {record.projector_rms_px:.3f} px", self._theme.pins[1], projector, is_pale),
         )
-        self.errors.name_curves([(name, colour, BAR) for name, colour in zip(names, colours, strict=True)])
+        top = draw_bars(self.errors, kinds, [pose.name.removeprefix("Pose ") for pose in record.poses])
+        range_from_zero(self.errors, top, RMS_PX, self._theme)
+        self.errors.name_curves([(kind.name, kind.colour, BAR) for kind in kinds])
 
 
 def _row(pose: PoseQuality) -> list[Cell | str]:
@@ -263,9 +236,3 @@ def _cells(corners_px: Any, size: tuple[int, int], colour: str) -> Any:
     image = pg.ImageItem(picture, axisOrder="row-major")
     image.setRect(-0.5, -0.5, *size)
     return image
-
-
-def _brush(colour: str, alpha: int) -> QColor:
-    made = QColor(colour)
-    made.setAlpha(alpha)
-    return made

@@ -8,11 +8,22 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QGridLayout
 
-from dsl_app.calibrate.evidence.base import Evidence
-from dsl_app.calibrate.evidence.curves import COVER, draw_points, level_line
-from dsl_app.calibrate.evidence.parts import BAR, DOT, LINE, Aside, ChartBox, with_spread
-from dsl_app.shared.theme import Theme
+from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence
+from dsl_app.calibrate.evidence.charts import (
+    BAR,
+    CHANNELS,
+    COVER,
+    DASHES,
+    DOT,
+    LINE,
+    ChartBox,
+    draw_points,
+    level_line,
+    range_about_zero,
+)
+from dsl_app.calibrate.evidence.tables import with_spread
 from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.calibration.selftest.figures import BEAT_PERCENT, LINEARITY_PERCENT, RAMP_PERCENT
 from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
 
 if TYPE_CHECKING:
@@ -21,13 +32,9 @@ if TYPE_CHECKING:
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-CHANNELS = ("red", "green", "blue")
-#: What a good rig stays below, percent: distance from the line, of full scale; rms distance from the power
-#: law; beat at an advised exposure.
-LINEARITY_PERCENT, GAMMA_PERCENT, BEAT_PERCENT = 0.5, 1.0, 0.3
-#: Drive below which the little light is mostly noise.
+#: Drive level below which the light is mostly noise.
 DIM = 0.15
-READING = "Reading the frames' means…"
+READING = "Reading the means of the frames…"
 
 
 class SelfTestEvidence(Evidence):
@@ -45,7 +52,7 @@ class SelfTestEvidence(Evidence):
         )
         self.gamma = ChartBox(
             "Gamma of the projector",
-            "How far the light of each colour lies from its power law, by drive; the legend has exponents.",
+            "Distance of the light of each colour from its power law, by drive level; the legend gives exponents.",
             "Off the law (%)",
             "Drive (of full)",
         )
@@ -62,19 +69,19 @@ class SelfTestEvidence(Evidence):
             "New picture seen (%)",
             "Wait after show (ms)",
         )
-        self._boxes = (self.linearity, self.gamma, self.beat, self.latency)
-        self._aside = Aside(self)
+        self._parts = boxes = (self.linearity, self.gamma, self.beat, self.latency)
+        self._reader = BackgroundReader(self)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(10)
-        for index, box in enumerate(self._boxes):
+        for index, box in enumerate(boxes):
             grid.addWidget(box, index // 2, index % 2)
             grid.setRowStretch(index // 2, 1)
             grid.setColumnStretch(index % 2, 1)
 
     def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit; its captures are read aside."""
+        """Show a fit; its captures are read in the background."""
         assert isinstance(record, SelfTest)
         self._record, self._curves = record, None
         self._draw()
@@ -86,14 +93,7 @@ class SelfTestEvidence(Evidence):
 
             return selftest_curves(load_capture(folder))
 
-        self._aside.read(read, self._take)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        super().apply_theme(theme)
-        for box in self._boxes:
-            box.apply_theme(theme)
-        self._draw()
+        self._reader.read(read, self._take)
 
     def _take(self, curves: SelfTestCurves | Exception) -> None:
         self._curves = curves
@@ -119,14 +119,8 @@ class SelfTestEvidence(Evidence):
         for line, colour in zip(curves.lines, RGB_COLOURS, strict=True):
             draw_points(box, line.value_dn, percent * line.residual_dn, percent * line.std_dn, colour, size=5)
         reach = max(float(np.abs(percent * line.residual_dn).max()) for line in curves.lines)
-        span = max(1.3 * reach, 0.02)
-        if span > LINEARITY_PERCENT / 2:
-            span = max(span, 1.2 * LINEARITY_PERCENT)
-            for limit in (-LINEARITY_PERCENT, LINEARITY_PERCENT):
-                level_line(box, limit, self._theme.bad, "limit" if limit > 0 else "")
-        level_line(box, 0.0, self._theme.muted)
         box.item.setXRange(0, max(float(line.value_dn.max()) for line in curves.lines), padding=0.03)
-        box.item.setYRange(-span, span, padding=0)
+        range_about_zero(box, max(1.3 * reach, 0.02), LINEARITY_PERCENT, self._theme)
         checks = zip(CHANNELS, record.camera.linearity_percent, RGB_COLOURS, strict=True)
         box.name_curves(
             [(f"{name}, at most {each.value:.3f} %", colour, DOT) for name, each, colour in checks]
@@ -137,7 +131,7 @@ class SelfTestEvidence(Evidence):
         box.begin()
         colours = dict(zip(("white", *CHANNELS), (self._theme.text, *RGB_COLOURS), strict=True))
         checks = {check.colour: check for check in record.projector.ramps}
-        span = 1.5 * GAMMA_PERCENT
+        span = 1.5 * RAMP_PERCENT
         for ramp in curves.ramps:
             model = ramp.level ** checks[ramp.colour].gamma.value
             off = 100 * (ramp.light / model - 1)
@@ -146,7 +140,7 @@ class SelfTestEvidence(Evidence):
             box.item.addItem(pg.PlotCurveItem(ramp.level[order], off[order], pen=pen))
             draw_points(box, ramp.level, off, None, colours[ramp.colour], size=5)
             span = max(span, 1.1 * float(np.abs(off[ramp.level > DIM]).max(initial=0)))
-        for limit in (-GAMMA_PERCENT, GAMMA_PERCENT):
+        for limit in (-RAMP_PERCENT, RAMP_PERCENT):
             level_line(box, limit, self._theme.bad, "limit, rms" if limit > 0 else "")
         box.item.setRange(xRange=(0, 1), yRange=(-span, span), padding=0.02)
         box.name_curves(
@@ -159,14 +153,13 @@ class SelfTestEvidence(Evidence):
     def _draw_beat(self, cycle: CycleCheck) -> None:
         box, beats = self.beat, sorted(cycle.beats, key=lambda beat: beat.exposure_ms)
         if not beats:
-            box.say("No exposures were repeated, so nothing is known of a beat.")
+            box.say("No exposures were repeated, so nothing is known about a beat.")
             return
         box.begin()
         theme, at = self._theme, np.arange(len(beats))
         heights = np.array([beat.ratio_percent.value for beat in beats])
         std = np.array([beat.ratio_percent.std for beat in beats])
-        advised = [any(abs(beat.exposure_ms - ms) < 1e-3 for ms in cycle.advised_ms) for beat in beats]
-        brushes = [theme.good if good else theme.muted for good in advised]
+        brushes = [theme.good if cycle.is_advised(beat.exposure_ms) else theme.muted for beat in beats]
         box.item.addItem(
             pg.BarGraphItem(x=at, height=heights, width=0.55, brushes=brushes, pen=pg.mkPen(None))
         )
@@ -197,7 +190,7 @@ class SelfTestEvidence(Evidence):
                 (
                     f"safe after {with_spread(latency.wait_ms.value, latency.wait_ms.std)} ms",
                     theme.accent,
-                    "┅",
+                    DASHES,
                 ),
                 (f"show takes {latency.blocking_ms.value:.1f} ms", theme.text, ""),
                 (f"stale {latency.stale_frames} of {latency.checked}", theme.text, ""),

@@ -6,15 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from dsl_app.calibrate.evidence.base import Evidence
-from dsl_app.calibrate.evidence.curves import Named, draw_curves
-from dsl_app.calibrate.evidence.parts import Cell, ChartBox, NumberTable, like_a_picture, with_spread
-from dsl_app.shared.theme import Theme
+from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
+from dsl_app.calibrate.evidence.charts import (
+    CHANNELS,
+    ChartBox,
+    channel_curves,
+    draw_curves,
+    like_a_picture,
+)
+from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 
 if TYPE_CHECKING:
@@ -22,22 +25,21 @@ if TYPE_CHECKING:
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
 
-NAMES = ("red", "green", "blue")
 HEADS = (
     ("Channel", "Channel of the camera"),
     *(
         (f"{name.capitalize()} LED", f"Signal under {name} at full drive, with its deviation")
-        for name in NAMES
+        for name in CHANNELS
     ),
     (
         "White / sum",
-        "Signal under white over the sum of those under red, green and blue: one where light adds",
+        "Signal under white over the sum of those under red, green and blue: 1 if light adds up",
     ),
 )
 
 
 class SpectralonEvidence(Evidence):
-    """Emission with its bands beside the flat field, the signals of white below."""
+    """Emission with its bands next to the flat field, the signals of white below."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -50,7 +52,7 @@ class SpectralonEvidence(Evidence):
         )
         self.field = ChartBox(
             "Flat field",
-            "Relative gain of the camera over its image, without the light's own fall-off; one is the mean.",
+            "Relative gain of the camera over its image, without the fall-off of the light; the mean is 1.",
             "Row (px)",
             "Column (px)",
             prepare=self._prepare_field,
@@ -69,38 +71,23 @@ class SpectralonEvidence(Evidence):
         self._theme_bar()
 
     def _lay_out(self) -> None:
-        charts = QWidget()
-        row = QHBoxLayout(charts)
-        row.setContentsMargins(0, 0, 0, 6)
-        row.addWidget(self.emission, 1)
-        row.addWidget(self.field, 1)
+        self._parts = (self.table, self.emission, self.field)
+        charts = side_by_side(self.emission, self.field)
+        charts.setContentsMargins(0, 0, 0, 6)
         below = QWidget()
         column = QVBoxLayout(below)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(label("Signals of white at unit shading, DN/ms", "heading"))
         column.addWidget(self.table, 1)
         column.addWidget(self.words)
-        parts = QSplitter(Qt.Orientation.Vertical)
-        parts.setChildrenCollapsible(False)
-        parts.addWidget(charts)
-        parts.addWidget(below)
-        parts.setSizes([330, 170])
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(parts)
+        whole.addWidget(stacked(charts, below, (330, 170)))
 
     def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
         """Show a fit."""
         assert isinstance(record, SpectralonCalibration)
         self._record = record
-        self._draw()
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        super().apply_theme(theme)
-        for part in (self.table, self.emission, self.field):
-            part.apply_theme(theme)
-        self._theme_bar()
         self._draw()
 
     def _theme_bar(self) -> None:
@@ -110,6 +97,7 @@ class SpectralonEvidence(Evidence):
             axis.setPen(self._theme.line)
 
     def _draw(self) -> None:
+        self._theme_bar()
         record = self._record
         if record is None:
             return
@@ -120,19 +108,13 @@ class SpectralonEvidence(Evidence):
 
     def _draw_emission(self, record: SpectralonCalibration) -> None:
         self.emission.begin()
-        draw_curves(
-            self.emission,
-            [
-                Named(name, colour, curve)
-                for name, colour, curve in zip(NAMES, RGB_COLOURS, record.emission.curves, strict=True)
-            ],
-        )
+        draw_curves(self.emission, channel_curves(record.emission.curves))
 
     def _draw_field(self, record: SpectralonCalibration) -> None:
         flat = record.flat_field
         gain = np.array(flat.gain)
         if min(gain.shape) < 2:
-            self.field.say("The camera sees evenly: no variation over the image stands out of the noise.")
+            self.field.say("The camera sees evenly: no variation over the image stands out from the noise.")
             return
         self.field.begin()
         self.field.item.addItem(self.image)
@@ -159,7 +141,7 @@ def _rows(record: SpectralonCalibration) -> list[list[Cell | str]]:
             ),
             f"{white.white_over_sum[c]:.4f}",
         ]
-        for c, name in enumerate(NAMES)
+        for c, name in enumerate(CHANNELS)
     ]
 
 
@@ -169,6 +151,6 @@ def _words(record: SpectralonCalibration) -> str:
     return (
         f"White over the sum of the LEDs, by spectra: {added}, from {emission.readings} readings."
         f" Target {plane.distance_mm:.0f} mm away, tilted by {plane.tilt_deg:.1f}°."
-        f" What the flat field leaves: {100 * record.unevenness:.2f} % rms; reduced χ² of an even camera"
+        f" Unevenness left by the flat field: {100 * record.unevenness:.2f} % rms; reduced χ² of an even camera"
         f" {record.flat_field_chi_square:.1f}."
     )

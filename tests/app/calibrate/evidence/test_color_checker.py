@@ -10,9 +10,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from dsl_app.calibrate.evidence.base import make_evidence
-from dsl_app.calibrate.evidence.chart_picture import patch_outlines
+from dsl_app.calibrate.evidence.chart_picture import patch_outlines, screen_colours
 from dsl_app.calibrate.evidence.color_checker import ColorCheckerEvidence
-from dsl_app.calibrate.evidence.swatches import screen_colours
 from dsl_app.shared.theme import Theme
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
@@ -208,13 +207,13 @@ def test_corners_are_set_by_hand_where_no_chart_was_found(qtbot: QtBot, session:
     wanted = load_recipe("color-checker", heard.args[0])
     # The next attempt begins where the person left the corners.
     assert widget.show_captures(unfitted(session, wanted))
-    qtbot.waitUntil(lambda: not widget._aside.is_busy, timeout=20_000)
+    qtbot.waitUntil(lambda: not widget._reader.is_busy, timeout=20_000)
     assert np.allclose(widget.chart.corners_px, corners + np.eye(4, 2) * (1, 0), atol=0.01)
     widget.show_fit(
         AcceptedCalibration(name="color-checker", title=""), calibration(session.bench.rig), session
     )
     assert np.allclose(widget.chart.corners_px, CORNERS)
-    qtbot.waitUntil(lambda: not widget._aside.is_busy, timeout=20_000)
+    qtbot.waitUntil(lambda: not widget._reader.is_busy, timeout=20_000)
 
 
 def unfitted(session: CalibrationSession, recipe: object) -> CalibrationSession:

@@ -13,7 +13,6 @@ from dsl_app.shared.theme import Theme
 from PySide6.QtCore import QThreadPool
 from pytestqt.qtbot import QtBot
 
-from dsl_core.calibration.selftest import figures as selftest_figures
 from dsl_core.campaign.selftest.recipe import SelfTestRecipe
 from dsl_core.campaign.session import CalibrationSession
 from dsl_core.io.campaign_folder import CampaignFolder
@@ -70,7 +69,7 @@ def test_beats_are_bars_in_the_order_of_exposures(
     beats = sorted(record.cycle.beats, key=lambda beat: beat.exposure_ms)
     assert bars(widget.beat) == [pytest.approx([beat.ratio_percent.value for beat in beats])]
     assert "cycle of 16.6" in words(widget.beat)
-    qtbot.waitUntil(lambda: not widget._aside.is_busy, timeout=10_000)
+    qtbot.waitUntil(lambda: not widget._reader.is_busy, timeout=10_000)
 
 
 def test_captures_that_are_gone_are_said_in_words(
@@ -85,16 +84,6 @@ def test_captures_that_are_gone_are_said_in_words(
         assert bars(widget.beat)
     finally:
         shutil.move(kept, folder)
-
-
-def test_limits_are_those_of_the_figures() -> None:
-    ours = (
-        selftest_evidence.LINEARITY_PERCENT,
-        selftest_evidence.GAMMA_PERCENT,
-        selftest_evidence.BEAT_PERCENT,
-    )
-    figures = selftest_figures
-    assert ours == (figures.LINEARITY_PERCENT, figures.RAMP_PERCENT, figures.BEAT_PERCENT)
 
 
 def test_a_widget_closed_while_it_reads_does_no_harm(

@@ -108,7 +108,7 @@ def test_planes_film_and_held_out_errors_are_shown(qtbot: QtBot, theme: Theme) -
     assert "no&nbsp;residual&nbsp;was&nbsp;needed" in widget.held_out.legend.text()
     assert np.allclose(points(widget.shifts)[0], [(600, 0.1), (900, -0.2)])
     assert widget.warnings.text().startswith("Through the filter of 450 nm")
-    qtbot.waitUntil(lambda: not widget._aside.is_busy, timeout=20_000)
+    qtbot.waitUntil(lambda: not widget._reader.is_busy, timeout=20_000)
 
 
 def test_columns_over_depth_are_those_of_the_models(qtbot: QtBot) -> None:

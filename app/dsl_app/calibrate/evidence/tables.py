@@ -1,0 +1,83 @@
+"""Tables of numbers that evidence shows, and how numbers are written with their deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtGui import QColor, QFont
+from PySide6.QtWidgets import QTableWidgetItem
+
+from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A number or words of a table; ``role`` is good, warn, bad or muted."""
+
+    text: str
+    role: str = ""
+
+
+class NumberTable(ReadTable):
+    """Read-only rows of numbers with digits of equal width, right-aligned below their heads."""
+
+    def __init__(self, name: str, heads: Sequence[tuple[str, str]], words: Sequence[int] = (0,)) -> None:
+        """``heads`` are names and tooltips of the columns; ``words`` are the columns that hold words."""
+        super().__init__(name, "", [head for head, _ in heads])
+        self._theme, self._words, self._rows = DARK, set(words), list[list[Cell]]()
+        for column, (_, tip) in enumerate(heads):
+            head = self.horizontalHeaderItem(column)
+            assert head is not None
+            head.setToolTip(tip)
+            head.setTextAlignment(LEFT if column in self._words else RIGHT)
+        self.verticalHeader().setDefaultSectionSize(22)
+        self.horizontalHeader().setStretchLastSection(len(heads) - 1 in self._words)
+        self.setStyleSheet("QTableView::item { padding: 0px 6px; }")
+        font = self.font()
+        font.setFeature(QFont.Tag("tnum"), 1)
+        self.setFont(font)
+
+    def fill(self, rows: Sequence[Sequence[Cell | str]]) -> None:
+        """Show other rows, with typographic minus signs."""
+        self._rows = [[each if isinstance(each, Cell) else Cell(each) for each in row] for row in rows]
+        self.show_rows([[self._item(each, i) for i, each in enumerate(row)] for row in self._rows])
+        self._colour()
+
+    def _item(self, each: Cell, column: int) -> QTableWidgetItem:
+        if column in self._words:
+            return cell(each.text)
+        return cell(each.text.replace("-", "−"), side=RIGHT)
+
+    def row_texts(self, row: int) -> list[str]:
+        """The texts of a row."""
+        found = [self.item(row, column) for column in range(self.columnCount())]
+        return [each.text() if each is not None else "" for each in found]
+
+    def _colour(self) -> None:
+        theme = self._theme
+        colours = {"": theme.text, "good": theme.good, "warn": theme.warn, "bad": theme.bad}
+        for i, row in enumerate(self._rows):
+            for column, each in enumerate(row):
+                item = self.item(i, column)
+                if item is not None:
+                    item.setForeground(QColor(colours.get(each.role, theme.muted)))
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        self._theme = theme
+        self._colour()
+
+
+def with_spread(value: float, std: float) -> str:
+    """A value and its deviation with two digits of the deviation, down to a ten-thousandth.
+
+    >>> with_spread(210.8184, 0.0204), with_spread(3.0, 0.0)
+    ('210.818 ± 0.020', '3')
+    """
+    if std <= 0:
+        return f"{value:g}"
+    digits = min(max(1 - int(np.floor(np.log10(std))), 0), 4)
+    return f"{value:.{digits}f} ± {max(std, 10.0**-digits):.{digits}f}"
