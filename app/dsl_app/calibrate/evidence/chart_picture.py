@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from dsl_core.calibration.colour.chart_alignment import apply_homography, grid_corners
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QHelpEvent, QKeyEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QToolTip, QVBoxLayout, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
-from dsl_core.calibration.colour.patches import INNER
+from dsl_core.calibration.colour.patches import INNER, apply_homography, grid_corners
 from dsl_core.optics.charts import CHART_SHAPE
 
 Floats = NDArray[np.float64]
@@ -64,7 +63,7 @@ class ChartPicture(QWidget):
         self._theme, self._chosen = DARK, 0
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName("Chart with its corners")
-        tip = "Drag the corners of the patches, or choose one with 1 to 4 and move it with the arrow keys (Shift: by 10 px)."
+        tip = "Drag the corners, or choose one with 1 to 4 and move it with the arrow keys (Shift: by 10 px)."
         self.setToolTip(tip)
         self.canvas = pg.GraphicsLayoutWidget()
         self.canvas.setFocusPolicy(Qt.FocusPolicy.NoFocus)

@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from dsl_core.calibration.colour.figures import WORST
 from numpy.typing import NDArray
 from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
@@ -30,6 +29,7 @@ from dsl_app.calibrate.evidence.charts import (
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.widgets.forms import label, push_button, set_role
 from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_core.calibration.colour.color_checker import WORST_PERCENT
 from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
 from dsl_core.model.rig import Rgb
 
@@ -202,8 +202,8 @@ class ColorCheckerEvidence(Evidence):
         self.chart.show_corners(np.array(record.corners_px))
         if self._view is not None:
             self._say(
-                f"The chart is {ORIENTATIONS[record.quarter_turns]}, {record.distance_mm:.0f} mm away, tilted by"
-                f" {record.tilt_deg:.1f}°. Drag any corner that is wrong."
+                f"The chart is {ORIENTATIONS[record.quarter_turns]}, {record.distance_mm:.0f} mm away, tilted"
+                f" by {record.tilt_deg:.1f}°. Drag any corner that is wrong."
             )
 
     def _corner_moved(self) -> None:
@@ -260,7 +260,7 @@ class ColorCheckerEvidence(Evidence):
                     *measured,
                     expected,
                     f"{100 * patch.residual:.2f}",
-                    Cell(f"{held:.2f}", "bad" if held > WORST else ""),
+                    Cell(f"{held:.2f}", "bad" if held > WORST_PERCENT else ""),
                 ]
             )
         self.table.fill(rows)
@@ -278,7 +278,7 @@ class ColorCheckerEvidence(Evidence):
             Bars("in the fit", theme.pins[0], 100 * np.array([p.residual for p in record.patches])),
         )
         top = draw_bars(box, kinds, [str(number) for number in range(1, len(record.patches) + 1)])
-        range_from_zero(box, top, WORST, theme)
+        range_from_zero(box, top, WORST_PERCENT, theme)
         box.plot.setLabel("bottom", "Patch, in reading order")
         totals = (record.start, record.held_out, record.residual)
         box.name_curves(

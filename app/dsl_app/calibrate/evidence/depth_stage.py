@@ -81,8 +81,8 @@ class DepthStageEvidence(Evidence):
         self.film = NumberTable("Film", FILM_HEADS, words=(0, 4))
         self.held_out = ChartBox(
             "Error of held-out first orders",
-            "Rms error, in columns of the projector, of what was left out of the fit in turn; all of them include"
-            " the noise of the samples.",
+            "Rms error, in columns of the projector, of what was held out of the fit in turn; all include the"
+            " noise of the samples.",
             "Rms (px)",
             "",
         )

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyqtgraph as pg
-from dsl_core.calibration.geometry.diagnosis import CELLS, MIN_POSES
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGraphicsRectItem, QHBoxLayout, QTableWidgetItem, QVBoxLayout
 
@@ -23,6 +22,7 @@ from dsl_app.calibrate.evidence.charts import (
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_core.calibration.geometry.pose_series import CELLS, MIN_POSES
 from dsl_core.campaign.geometry.recipe import RMS_PX
 from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
 

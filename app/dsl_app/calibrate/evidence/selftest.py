@@ -52,7 +52,7 @@ class SelfTestEvidence(Evidence):
         )
         self.gamma = ChartBox(
             "Gamma of the projector",
-            "Distance of the light of each colour from its power law, by drive level; the legend gives exponents.",
+            "Distance of each colour's light from its power law, by drive level; the legend gives exponents.",
             "Off the law (%)",
             "Drive (of full)",
         )

@@ -58,7 +58,7 @@ def calibration(**changes: Any) -> BandpassCalibration:
 def test_filters_and_efficiency_are_shown_with_deviations(qtbot: QtBot, theme: Theme) -> None:
     widget = shown(qtbot, "bandpass", calibration(), theme=theme)
     assert widget.table.row_texts(0) == [
-        "450", "451.0", "451.2 ± 0.6", "+0.2", "−1, +1", "measured", "as asked for"
+        "450", "451.0", "451.2 ± 0.6", "+0.2", "−1, +1", "measured", "as requested"
     ]  # fmt: skip
     assert widget.table.row_texts(1)[2:4] == ["590.0 ± 0.6", "+39.0"]
     assert widget.table.row_texts(1)[6] == "Its first orders stand where 590 nm belongs; put the right one in"
@@ -79,7 +79,7 @@ def test_filters_and_efficiency_are_shown_with_deviations(qtbot: QtBot, theme: T
 def test_without_doubts_no_warning_is_shown(qtbot: QtBot) -> None:
     widget = shown(qtbot, "bandpass", calibration(warnings=()))
     assert not widget.warnings.isVisible()
-    assert widget.table.row_texts(1)[6] == "as asked for"
+    assert widget.table.row_texts(1)[6] == "as requested"
 
 
 def test_a_record_without_deviations_of_filters_is_shown(qtbot: QtBot) -> None:
