@@ -27,7 +27,7 @@ from dsl_core.campaign.common.flat_target import WHITE, capture_uniform, read_un
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.common.white_shot import other_light, shoot_white
 from dsl_core.errors import CalibrationError
-from dsl_core.model.calibration.color_checker import TURNS, ColorCheckerCalibration
+from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
@@ -84,7 +84,9 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         return (
             Figure(name="patches found", value=24, unit="", low=24, high=24),
             Figure(
-                name=f"chart {TURNS[pose.quarter_turns]}", value=90.0 * pose.quarter_turns, unit="degrees"
+                name=f"chart {ORIENTATIONS[pose.quarter_turns]}",
+                value=90.0 * pose.quarter_turns,
+                unit="degrees",
             ),
             other_light(white, "chart"),
         )

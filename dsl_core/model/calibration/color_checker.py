@@ -11,11 +11,8 @@ from dsl_core.model.rig import Rgb
 
 Point = tuple[float, float]
 Row3 = tuple[float, float, float]
-#: How a chart is turned, by quarter turns clockwise.
+#: How a chart is turned, by its quarter turns clockwise.
 ORIENTATIONS = ("upright", "turned clockwise", "upside down", "turned anticlockwise")
-
-#: How a chart is turned, in words, by its quarter turns clockwise.
-TURNS = ("upright", "turned clockwise", "upside down", "turned anticlockwise")
 
 
 class PatchResult(Record):

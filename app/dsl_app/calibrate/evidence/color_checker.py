@@ -34,7 +34,7 @@ from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerC
 from dsl_core.model.rig import Rgb
 
 if TYPE_CHECKING:
-    from dsl_core.campaign.color_checker.chart_view import ChartView
+    from dsl_core.campaign.color_checker.recipe import ChartView
     from dsl_core.campaign.session import CalibrationSession
     from dsl_core.model.base import Record
     from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -146,7 +146,7 @@ class ColorCheckerEvidence(Evidence):
         self._draw()
 
         def read() -> ChartView:
-            from dsl_core.campaign.color_checker.chart_view import chart_view
+            from dsl_core.campaign.color_checker.recipe import chart_view
 
             return chart_view(record, bench, step)
 
@@ -165,7 +165,7 @@ class ColorCheckerEvidence(Evidence):
         self._say("Reading the picture…")
 
         def read() -> NDArray[np.uint8]:
-            from dsl_core.campaign.color_checker.chart_view import white_picture
+            from dsl_core.campaign.color_checker.recipe import white_picture
 
             return white_picture(bench, step)
 

@@ -22,8 +22,7 @@ from dsl_app.calibrate.evidence.charts import (
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, set_role
-from dsl_core.calibration.geometry.pose_series import CELLS, MIN_POSES
-from dsl_core.campaign.geometry.recipe import RMS_PX
+from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
 from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ class GeometryEvidence(Evidence):
         )
         self.errors = ChartBox(
             "Error of each pose",
-            f"Rms distance of corners from where the calibration expects them; below {RMS_PX} px is good.",
+            f"Rms distance of corners from their expected positions; below {GOOD_RMS_PX} px is good.",
             "Rms error (px)",
             "Pose",
             left_width=60,
@@ -207,7 +206,7 @@ class GeometryEvidence(Evidence):
             Bars(f"projector, {record.projector_rms_px:.3f} px", self._theme.pins[1], projector, is_pale),
         )
         top = draw_bars(self.errors, kinds, [pose.name.removeprefix("Pose ") for pose in record.poses])
-        range_from_zero(self.errors, top, RMS_PX, self._theme)
+        range_from_zero(self.errors, top, GOOD_RMS_PX, self._theme)
         self.errors.name_curves([(kind.name, kind.colour, BAR) for kind in kinds])
 
 
