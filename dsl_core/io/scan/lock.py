@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 from dsl_core.errors import StoreError
+from dsl_core.io.atomic import write_all
 
 #: Windows locks byte ranges for reading too, so the locked byte lies behind the text.
 _LOCK_BYTE = 1 << 20
@@ -31,7 +32,7 @@ class SessionLock:
             ) from error
         with contextlib.suppress(OSError):  # the number is a courtesy; a full disk must not cost the lock
             os.ftruncate(self._descriptor, 0)
-            os.write(self._descriptor, f"{os.getpid()}\n".encode())
+            write_all(self._descriptor, f"{os.getpid()}\n".encode())
 
     def release(self) -> None:
         """Give the lock back; a second call does nothing."""
