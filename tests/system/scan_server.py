@@ -42,7 +42,7 @@ def make(kind: str) -> tuple[CapturePlan, DeviceRig]:
     plan = CapturePlan(
         camera_size_px=(48, 36),
         code=GrayCode(rows=False),
-        spectral=LineComb(width_px=20, step_px=20, period_px=160),
+        spectral=LineComb(width_px=40, step_px=40, period_px=160),
         settings=(Setting(exposure_ms=100.0, level=0.5),),
         code_settings=(0,),
     )

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -79,37 +81,51 @@ def _frames_left(folder: Path) -> int:
         return -1
 
 
-@pytest.fixture(params=["made", pytest.param("twin", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=["made", pytest.param("twin", marks=pytest.mark.slow)])
 def server(request: pytest.FixtureRequest) -> Iterator[Server]:
     server = Server(request.param)
     yield server
     server.close()
 
 
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    """A folder in memory where there is one: a killed process loses nothing that it gave to the system.
+
+    Only a power cut tells memory from a disk, and waiting for the disk takes most of the time.
+    """
+    memory = Path("/dev/shm")
+    if not (os.access(memory, os.W_OK) and shutil.disk_usage(memory).free > 1 << 28):
+        yield tmp_path
+        return
+    with tempfile.TemporaryDirectory(prefix="dsl-scan-test-", dir=memory) as name:
+        yield Path(name)
+
+
 @pytest.mark.timeout(300)
-def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, tmp_path: Path) -> None:
-    duration_s = server.duration_s(tmp_path / "unbroken.dsl")
-    unbroken = _frames(tmp_path / "unbroken.dsl")
+def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: Path) -> None:
+    duration_s = server.duration_s(folder / "unbroken.dsl")
+    unbroken = _frames(folder / "unbroken.dsl")
     assert unbroken.std() > 0
     # By frames and not by time alone, since the time that a scan takes changes with the machine's load.
     share = np.sort(np.random.default_rng(2024).uniform(0.0, 0.95, KILLS))
     left = []
     for number, moment in enumerate(share * len(unbroken)):
-        folder = tmp_path / f"{number}.dsl"
-        server.scan(folder, kill_after=(int(moment), moment % 1 * duration_s / len(unbroken)))
-        left.append(_frames_left(folder))
-        assert server.scan(folder) == 0
-        assert find_problems(SessionReader(folder), verify=True) == []
-        np.testing.assert_array_equal(_frames(folder), unbroken)
+        scan = folder / f"{number}.dsl"
+        server.scan(scan, kill_after=(int(moment), moment % 1 * duration_s / len(unbroken)))
+        left.append(_frames_left(scan))
+        assert server.scan(scan) == 0
+        assert find_problems(SessionReader(scan), verify=True) == []
+        np.testing.assert_array_equal(_frames(scan), unbroken)
     # The kills must have hit scans under way, at many different frames.
     assert len({count for count in left if count > 0}) >= KILLS // 2, left
 
 
 @pytest.mark.parametrize("server", ["made"], indirect=True)
-def test_one_scan_killed_again_and_again_gets_there(server: Server, tmp_path: Path) -> None:
-    duration_s = server.duration_s(tmp_path / "unbroken.dsl")
-    folder = tmp_path / "scan.dsl"
+def test_one_scan_killed_again_and_again_gets_there(server: Server, folder: Path) -> None:
+    duration_s = server.duration_s(folder / "unbroken.dsl")
+    scan = folder / "scan.dsl"
     for _ in range(KILLS):
-        server.scan(folder, kill_after=(0, duration_s / 4))
-    assert server.scan(folder) == 0
-    np.testing.assert_array_equal(_frames(folder), _frames(tmp_path / "unbroken.dsl"))
+        server.scan(scan, kill_after=(0, duration_s / 4))
+    assert server.scan(scan) == 0
+    np.testing.assert_array_equal(_frames(scan), _frames(folder / "unbroken.dsl"))
