@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DeviceError
-from dsl_core.model.describe import describe_shot
 from dsl_core.model.frames import Frame
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken
 
 PatternImage = Callable[[CapturePlan, Shot], NDArray[np.uint8]]

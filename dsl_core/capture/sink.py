@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.model.describe import describe_shot
 from dsl_core.model.frames import Frame, FrameSink
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 
 #: Sees every frame after it is stored.
 Watch = Callable[[Shot, Frame], object]

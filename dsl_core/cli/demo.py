@@ -60,7 +60,7 @@ def demo(
 
 def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
     """The first of the name and its numbered neighbours that is free, or holds this demo unfinished."""
-    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.manifest import read_manifest
     from dsl_core.io.scan.origin import rig_notes
 
@@ -110,7 +110,7 @@ def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Datase
     """Figures, exports and the report."""
     from dsl_core import pipeline
     from dsl_core.cli.results import print_figures
-    from dsl_core.evaluation.report.content import report_content
+    from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export
     from dsl_core.workflows import scans

@@ -87,7 +87,7 @@ def evaluate(
 ) -> None:
     """Compare a result with known truth, in figures and one self-contained HTML page."""
     from dsl_core import pipeline
-    from dsl_core.evaluation.report.content import report_content
+    from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import deviations, figures
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.staging import check_targets

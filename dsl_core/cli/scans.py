@@ -115,7 +115,7 @@ def scan(
     """Capture a plan; every frame is safe on disk before the next is taken."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.origin import rig_notes
 
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)

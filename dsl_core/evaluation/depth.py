@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,35 +110,3 @@ def straightness_mm(positions_mm: Sequence[float], depths_mm: Sequence[float]) -
     """
     line = np.polyfit(positions_mm, depths_mm, 1)
     return float(np.sqrt(np.mean((np.polyval(line, positions_mm) - np.asarray(depths_mm)) ** 2)))
-
-
-@dataclass(frozen=True)
-class DepthRow:
-    """The score of one method at one stage position and noise level (sigma as a share of full scale)."""
-
-    method: str
-    position_mm: float
-    noise_sigma: float
-    score: DepthScore
-
-
-def depth_table(rows: Iterable[DepthRow]) -> str:
-    """Per-pixel RMSE in mm (coverage in %) as Markdown: one block a method, positions down, noise across."""
-    by_cell = {(row.method, row.position_mm, row.noise_sigma): row.score for row in rows}
-    methods = list(dict.fromkeys(method for method, _, _ in by_cell))
-    positions = sorted({position for _, position, _ in by_cell})
-    sigmas = sorted({sigma for _, _, sigma in by_cell})
-    lines: list[str] = []
-    for method in methods:
-        lines += [f"**{method}**: RMSE in mm per pixel (coverage)", ""]
-        lines += ["| depth, mm | " + " | ".join(f"σ {sigma:g}" for sigma in sigmas) + " |"]
-        lines += ["|---:|" + "---:|" * len(sigmas)]
-        for position in positions:
-            cells = [_cell(by_cell.get((method, position, sigma))) for sigma in sigmas]
-            lines.append(f"| {position:.1f} | " + " | ".join(cells) + " |")
-        lines.append("")
-    return "\n".join(lines)
-
-
-def _cell(score: DepthScore | None) -> str:
-    return "not run" if score is None else f"{score.rmse_mm:.3f} ({score.coverage:.2%})"

@@ -34,7 +34,7 @@ _TO_DEVIATION = 1.4826
 
 
 @dataclass(frozen=True)
-class FlatTarget:
+class SeenTarget:
     """The plane of a target and what lies about it.
 
     ``left_out`` pixels of the region have a depth but are limited or lie off the plane. ``residual_mm``
@@ -79,7 +79,7 @@ class FlatTarget:
 
 def flat_target(
     points_mm: Floats, flags: NDArray[np.integer] | None = None, region: Region | None = None
-) -> FlatTarget:
+) -> SeenTarget:
     """Find the plane of a flat target among points (3, h, w) of an image or a region of it.
 
     Limited pixels are not counted, nor what lies off the plane. Raises `DecodeError` when the region lies
@@ -102,7 +102,7 @@ def flat_target(
         )
     residual = np.full(points_mm.shape[1:], np.nan, np.float32)
     residual[rows, columns] = np.where(kept, behind, np.nan)
-    return FlatTarget(plane, int(measured.sum() - kept.sum()), residual, grid, centres, off)
+    return SeenTarget(plane, int(measured.sum() - kept.sum()), residual, grid, centres, off)
 
 
 def _cut(shape: tuple[int, ...], region: Region | None) -> tuple[slice, slice]:

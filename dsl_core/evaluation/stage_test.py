@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import straightness_mm
-from dsl_core.evaluation.flat_target import FlatTarget
+from dsl_core.evaluation.flat_target import SeenTarget
 from dsl_core.evaluation.verdict import Verdict, estimate_row
 
 Floats = NDArray[np.floating[Any]]
@@ -69,7 +69,7 @@ class StageTest:
     patches: int
 
 
-def stage_test(positions_mm: Sequence[float], targets: Sequence[FlatTarget]) -> StageTest:
+def stage_test(positions_mm: Sequence[float], targets: Sequence[SeenTarget]) -> StageTest:
     """Judge a flat target over positions of a stage, in any order.
 
     Raises `DecodeError` for fewer than three positions, positions that are not numbers or all alike, and
@@ -92,7 +92,7 @@ def stage_test(positions_mm: Sequence[float], targets: Sequence[FlatTarget]) -> 
     )
 
 
-def _require_positions(positions_mm: Sequence[float], targets: Sequence[FlatTarget]) -> None:
+def _require_positions(positions_mm: Sequence[float], targets: Sequence[SeenTarget]) -> None:
     if len(positions_mm) != len(targets):
         raise DecodeError(
             f"{len(targets)} results and {len(positions_mm)} positions were given; give one for each."
@@ -131,7 +131,7 @@ def _line(at: Floats, distance: Floats, std: Sequence[float], scale: float, know
 
 
 def _patch_straightness(
-    positions_mm: Sequence[float], targets: Sequence[FlatTarget]
+    positions_mm: Sequence[float], targets: Sequence[SeenTarget]
 ) -> tuple[float | None, int]:
     """Root mean square over patches that are seen at all positions, and how many those are."""
     depths = np.stack([target.patches_mm.ravel() for target in targets])

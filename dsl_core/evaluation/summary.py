@@ -12,7 +12,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import DepthScore, depth_score
 from dsl_core.evaluation.scatter import std_of_mean
 from dsl_core.evaluation.spectral import Peak, peak_width, spectral_errors
-from dsl_core.evaluation.uncertainty import DECIDED_FROM, Calibration, calibration
+from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,10 +79,10 @@ class Evaluation:
     """
 
     depth: DepthScore | None
-    depth_calibration: Calibration | None
+    depth_calibration: HonestyCheck | None
     patches: tuple[PatchScore, ...]
     unmeasured: tuple[str, ...]
-    spectral_calibration: Calibration | None
+    spectral_calibration: HonestyCheck | None
 
     def mean(self, figure: str) -> float:
         """Mean of a figure of `PatchScore` over the patches; raises `DecodeError` when there are none."""
@@ -148,14 +148,14 @@ def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     )
 
 
-def _depth(result: xr.Dataset, truth: Truth) -> tuple[DepthScore | None, Calibration | None]:
+def _depth(result: xr.Dataset, truth: Truth) -> tuple[DepthScore | None, HonestyCheck | None]:
     if truth.depth_mm is None or "depth_mm" not in result:
         return None, None
     measured = result["depth_mm"].values
     score = depth_score(measured, truth.depth_mm, truth.lit)
     if "depth_std_mm" not in result:
         return score, None
-    return score, calibration(measured, truth.depth_mm, result["depth_std_mm"].values, truth.lit)
+    return score, check_honesty(measured, truth.depth_mm, result["depth_std_mm"].values, truth.lit)
 
 
 def interior(material: NDArray[np.int32], margin_px: int = _MARGIN_PX) -> NDArray[np.bool_]:
@@ -246,7 +246,7 @@ def _narrow_peak(bands: Floats, truth: Floats) -> Peak | None:
     return peak if peak.fwhm_nm < _PEAKED_NM else None
 
 
-def _spectral_calibration(samples: list[_Sample]) -> Calibration | None:
+def _spectral_calibration(samples: list[_Sample]) -> HonestyCheck | None:
     """Calibration over the bands that data decide, over all samples together."""
     known = [sample for sample in samples if sample.std is not None]
     if not known:
@@ -256,4 +256,4 @@ def _spectral_calibration(samples: list[_Sample]) -> Calibration | None:
     std = np.concatenate([sample.std for sample in known if sample.std is not None], axis=1)
     shares = [sample.share for sample in known if sample.share is not None]
     decided = np.concatenate(shares, axis=1) >= DECIDED_FROM if len(shares) == len(known) else None
-    return calibration(values, truth, std, decided)
+    return check_honesty(values, truth, std, decided)

@@ -21,7 +21,7 @@ _LEVELS = (0.5, 0.68, 0.8, 0.9, 0.95, 0.99)
 
 
 @dataclass(frozen=True)
-class Calibration:
+class HonestyCheck:
     """Observed against promised coverage.
 
     ``coverage_95`` is the share of values whose 95 % band holds the truth; ``curve`` lists (promised,
@@ -36,7 +36,7 @@ class Calibration:
     curve: tuple[tuple[float, float], ...]
 
 
-def calibration(values: Floats, truth: Floats, std: Floats, decided: Mask | None = None) -> Calibration:
+def check_honesty(values: Floats, truth: Floats, std: Floats, decided: Mask | None = None) -> HonestyCheck:
     """Compare errors with standard deviations over finite values, optionally only where ``decided``.
 
     Arrays have equal or broadcastable shapes. Raises `DecodeError` when nothing can be compared.
@@ -58,7 +58,7 @@ def calibration(values: Floats, truth: Floats, std: Floats, decided: Mask | None
     )
     positive = deviation > 0
     score = error[positive] / deviation[positive]
-    return Calibration(
+    return HonestyCheck(
         count=error.size,
         share=error.size / int(known.sum()),
         coverage_95=float(np.mean(error <= BAND_95 * deviation)),

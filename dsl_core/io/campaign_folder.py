@@ -22,8 +22,8 @@ from typing import Literal, Self, TypeVar
 from pydantic import Field, ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io import CAMPAIGN_NAME
 from dsl_core.io.atomic import write_atomic
-from dsl_core.io.file_names import CAMPAIGN_NAME
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from dsl_core.errors import StoreError
+from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.plan_file import load_plan
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import load_rig

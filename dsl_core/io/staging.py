@@ -7,11 +7,12 @@ import shutil
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_core.errors import StoreError
+from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.atomic import PARTIAL_SUFFIX, store_error, sync_folder
-from dsl_core.io.folder_kind import FolderKind
 from dsl_core.model.base import Record
 
 
@@ -125,3 +126,29 @@ def _clear(room: Path, targets: Sequence[Path]) -> None:
 
 def _aside(target: Path, room: Path) -> Path:
     return room / (target.name + ".old")
+
+
+#: What is nowhere else, by the file that tells it.
+_IRREPLACEABLE = {MANIFEST_NAME: "holds a scan", CAMPAIGN_NAME: "holds the captures of a campaign"}
+#: Files that systems put into folders that a person looks at.
+_OF_THE_SYSTEM = {".DS_Store", "Thumbs.db", "desktop.ini"}
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """A kind of folder: how to call one, how it is recognised, and which entries of it are its own."""
+
+    name: str
+    is_one: Callable[[Path], bool]
+    owns: Callable[[Path], bool]
+
+    def refusal(self, folder: Path) -> str:
+        """Why another of this kind must not replace a folder; empty when nothing else would be lost."""
+        for file, what in _IRREPLACEABLE.items():
+            if (folder / file).exists():
+                return what
+        entries = [entry for entry in folder.iterdir() if entry.name not in _OF_THE_SYSTEM]
+        if entries and not self.is_one(folder):
+            return f"is not {self.name}"
+        foreign = sorted(entry.name for entry in entries if not self.owns(entry))
+        return f"holds {foreign[0]} beside {self.name}" if foreign else ""

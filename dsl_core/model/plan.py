@@ -216,3 +216,12 @@ class CapturePlan(Record):
     def duration_s(self, latency_ms: float = 0.0) -> float:
         """Seconds the exposures and a latency per frame take together."""
         return sum(shot.exposure_ms + latency_ms for shot in self.shots()) / 1000.0
+
+
+def describe_shot(shot: Shot) -> str:
+    """Name a shot the way a person counts it.
+
+    >>> describe_shot(Shot(44, "spectral", 3, 1, 10.0, 0.8))
+    'frame 44 (spectral pattern 3, setting 1)'
+    """
+    return f"frame {shot.index} ({shot.role} pattern {shot.pattern}, setting {shot.setting})"

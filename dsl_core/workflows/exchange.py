@@ -114,7 +114,7 @@ def import_scan(
 
 def _refuse_other_scan(target: Path, fingerprint: str, calibration: Rig, root: Path) -> None:
     """Raise `StoreError` when the target is a scan, but not of this dataset with this calibration."""
-    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.manifest import read_manifest
 
     if not (target / MANIFEST_NAME).exists():

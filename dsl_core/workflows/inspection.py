@@ -55,7 +55,7 @@ def find_session(result: ResultArrays) -> Path:
 
 def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
     """The scan beside a result with these attributes; raises `StoreError` when it is not there."""
-    from dsl_core.io.file_names import MANIFEST_NAME
+    from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.manifest import read_manifest
 
     captured = attributes.get("captured")

@@ -13,7 +13,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
-    from dsl_core.evaluation.flat_target import FlatTarget, Region
+    from dsl_core.evaluation.flat_target import Region, SeenTarget
     from dsl_core.evaluation.summary import Truth
     from dsl_core.evaluation.time_sweep import SweepPoint
 
@@ -59,7 +59,7 @@ def seconds_of(attributes: Mapping[str, Any]) -> float | None:
 # Depth test ----------------------------------------------------------------------------------------
 
 
-def read_target(path: Path, region: Region | None = None) -> tuple[FlatTarget, float | None]:
+def read_target(path: Path, region: Region | None = None) -> tuple[SeenTarget, float | None]:
     """The flat target that a result shows, and its position if that is known.
 
     Raises `DecodeError` when it shows none, `StoreError` when it cannot be read.
@@ -82,7 +82,7 @@ def read_targets(
     positions_mm: Sequence[float] | None = None,
     region: Region | None = None,
     progress: Progress | None = None,
-) -> tuple[list[FlatTarget], list[float]]:
+) -> tuple[list[SeenTarget], list[float]]:
     """Targets and positions of results; without ``positions_mm`` each result must know its own."""
     if positions_mm is not None and len(positions_mm) != len(paths):
         raise DecodeError(

@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.evaluation.depth import DepthRow, DepthScore, depth_score
+from dsl_core.evaluation.depth import DepthScore, depth_score
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.reconstruction.geometry import reconstruct_geometry
@@ -122,6 +122,16 @@ def verdicts(rows: list[DepthRow]) -> list[str]:
         f" in {fewer}, fewer within 1 mm in {less}"
     )
     return lines
+
+
+@dataclass(frozen=True)
+class DepthRow:
+    """The score of one method at one stage position and noise level (sigma as a share of full scale)."""
+
+    method: str
+    position_mm: float
+    noise_sigma: float
+    score: DepthScore
 
 
 def main() -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from dsl_core import pipeline
 from dsl_core.devices.base import DeviceRig
 from dsl_core.evaluation.summary import Evaluation, Truth, interior
-from dsl_core.evaluation.uncertainty import DECIDED_FROM, Calibration, calibration
+from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
 from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.result import DEPTH_INVALID, Reach
@@ -99,7 +99,7 @@ def calibration_and_truth(devices: DeviceRig) -> tuple[Rig, Truth]:
     return devices.calibration, truth
 
 
-def bright_coverage(result: xr.Dataset, truth: Truth) -> Calibration:
+def bright_coverage(result: xr.Dataset, truth: Truth) -> HonestyCheck:
     """Coverage over decided bands whose true reflectance is not next to zero."""
     assert truth.material is not None
     assert truth.spectra is not None
@@ -113,7 +113,7 @@ def bright_coverage(result: xr.Dataset, truth: Truth) -> Calibration:
         result[name].values.reshape(len(true), -1)[:, pixels]
         for name in ("reflectance", "reflectance_std", "data_share")
     )
-    return calibration(values, true, std, (share >= DECIDED_FROM) & (true > BRIGHT))
+    return check_honesty(values, true, std, (share >= DECIDED_FROM) & (true > BRIGHT))
 
 
 def gap(result: xr.Dataset) -> tuple[int, int]:
@@ -141,7 +141,7 @@ def print_patches(found: Evaluation) -> None:
     print_table(["patch", "pixels", "solved", "RMSE", "angle rad", "dE00", "pixel RMSE", "FWHM nm"], rows)
 
 
-def figures(found: Evaluation, bright: Calibration, fit: float) -> dict[str, Any]:
+def figures(found: Evaluation, bright: HonestyCheck, fit: float) -> dict[str, Any]:
     """Means over a scene as plain numbers."""
     assert found.spectral_calibration is not None
     return {

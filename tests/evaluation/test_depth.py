@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.depth import DepthRow, depth_score, depth_table, fit_plane, straightness_mm
+from dsl_core.evaluation.depth import depth_score, fit_plane, straightness_mm
 
 
 def test_figures_of_known_errors() -> None:
@@ -64,16 +64,3 @@ def test_straightness_ignores_scale_and_offset() -> None:
     assert straightness_mm(positions.tolist(), (1.02 * positions + 4).tolist()) == pytest.approx(0, abs=1e-9)
     bent = positions + np.where(np.arange(15) % 2 == 0, 1.0, -1.0)
     assert straightness_mm(positions.tolist(), bent.tolist()) == pytest.approx(1.0, rel=0.02)
-
-
-def test_table_has_a_block_a_method_and_a_column_a_noise_level() -> None:
-    truth = np.full((4, 4), 600.0)
-    rows = [
-        DepthRow(method, 600.0, sigma, depth_score(truth + error, truth))
-        for method, sigma, error in (("refined", 0.0, 0.25), ("refined", 0.01, 0.5), ("plain", 0.0, 3.0))
-    ]
-    table = depth_table(rows)
-    assert "| depth, mm | σ 0 | σ 0.01 |" in table
-    assert "| 600.0 | 0.250 (100.00%) | 0.500 (100.00%) |" in table
-    assert "| 600.0 | 3.000 (100.00%) | not run |" in table
-    assert table.index("**refined**") < table.index("**plain**")

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from dsl_core.evaluation.rendered_effects import RenderedEffects
-from dsl_core.evaluation.report.content import report_content
-from dsl_core.evaluation.report.scan_report import render_report
+from dsl_core.evaluation.report.scan_report import render_report, report_content
 from dsl_core.evaluation.summary import evaluate
 
 NOTE = {

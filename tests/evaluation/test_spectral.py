@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.spectral import peak_width, spectral_errors
+from dsl_core.evaluation.spectral import compare, peak_width, spectral_errors
+from dsl_core.model.spectral import SpectralCurve
 
 GRID = np.arange(430.0, 661.0, 5.0)
 TRUTH = (0.5 + 0.3 * np.sin(GRID / 40))[:, None]
@@ -96,3 +97,21 @@ def test_a_flank_beyond_the_bands_is_mirrored_and_said() -> None:
 def test_a_flat_curve_has_no_width() -> None:
     with pytest.raises(DecodeError, match="half"):
         peak_width(GRID, np.full(47, 0.4))
+
+
+def test_a_reference_of_another_scale_differs_only_by_the_scale() -> None:
+    truth = np.linspace(0.2, 0.8, GRID.size)
+    reference = SpectralCurve.of(GRID, truth)
+    found = compare(truth / 2, GRID, reference)
+    assert found.scale == pytest.approx(2)
+    assert found.angle_rad == pytest.approx(0, abs=1e-6)
+    assert found.rmse > 0.2
+    assert found.rmse_scaled == pytest.approx(0, abs=1e-9)
+    assert found.delta_e_scaled < 1e-3 < found.delta_e
+
+
+def test_only_shared_bands_are_compared() -> None:
+    found = compare(np.full(GRID.size, 0.5), GRID, SpectralCurve.of([500.0, 600.0], [0.5, 0.5]))
+    assert (found.bands, found.range_nm) == (21, (500.0, 600.0))
+    with pytest.raises(DecodeError, match="5 are needed"):
+        compare(np.full(GRID.size, 0.5), GRID, SpectralCurve.of([700.0, 800.0], [0.5, 0.5]))

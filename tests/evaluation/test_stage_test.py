@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.flat_target import FlatTarget, Region, flat_target
+from dsl_core.evaluation.flat_target import Region, SeenTarget, flat_target
 from dsl_core.evaluation.stage_test import stage_table, stage_test
 from tests.cases.stage_series import LEAN, SHAPE, flat_arrays
 
 POSITIONS = (695.2, 718.6, 742.1, 765.5, 788.9, 812.3, 835.8, 859.2)
 
 
-def target(position_mm: float, region: Region | None = None, **details: Any) -> FlatTarget:
+def target(position_mm: float, region: Region | None = None, **details: Any) -> SeenTarget:
     arrays = flat_arrays(position_mm, **details)
     return flat_target(arrays["points_mm"], arrays["flags"], region)
 

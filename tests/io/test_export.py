@@ -15,8 +15,7 @@ from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.export import export, export_csv, export_envi, export_exr, export_ply, export_png, formats
 from dsl_core.io.export.exr import linear_from_srgb
 from dsl_core.io.export.png import GREY, flags_picture
-from dsl_core.model.flag_classes import FLAG_COLOURS
-from dsl_core.model.result import Flag, reasons
+from dsl_core.model.result import FLAG_COLOURS, Flag, reasons
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import never
 from tests.cases.small_result import COLUMNS, ROWS, UNLIT, UNSURE, WARNED, WAVELENGTHS_NM, small_result

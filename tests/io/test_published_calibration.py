@@ -14,7 +14,6 @@ from dsl_core.io.published import (
     export_calibration,
     load_calibration,
     load_tables,
-    open_first_order_lines,
     save_tables,
 )
 from dsl_core.model.column_residual import ColumnResidual
@@ -147,17 +146,6 @@ def test_a_rig_without_first_orders_cannot_be_exported(tmp_path: Path) -> None:
     export_calibration(small_rig(), tmp_path)
     with pytest.raises(StoreError, match="exists already"):
         export_calibration(small_rig(), tmp_path)
-
-
-@pytest.mark.parametrize("shape", [(2, 4, 3, 5), (2, 4, 15)])
-def test_first_order_lines_are_mapped(tmp_path: Path, shape: tuple[int, ...]) -> None:
-    lines = np.arange(120, dtype=np.int16).reshape(shape)
-    np.save(tmp_path / "lines.npy", lines)
-    mapped = open_first_order_lines(tmp_path / "lines.npy", (5, 3), bands=2, depth_range_mm=(600, 603))
-    assert isinstance(mapped, np.memmap)
-    np.testing.assert_array_equal(mapped, lines.reshape(2, 4, 3, 5))
-    with pytest.raises(CalibrationError, match=r"\(2, 4, 5, 3\) is wanted|\(2, 301, 3, 5\) is wanted"):
-        open_first_order_lines(tmp_path / "lines.npy", (5, 3), bands=2)
 
 
 def test_the_table_says_what_to_do(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_core import pipeline
 from dsl_core.evaluation.summary import Evaluation, Truth
-from dsl_core.evaluation.uncertainty import calibration
+from dsl_core.evaluation.uncertainty import check_honesty
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting, Shot
 from dsl_core.model.result import DEPTH_INVALID, Flag, Reach
@@ -194,7 +194,7 @@ def test_pixels_of_the_order_gap_keep_a_spectrum() -> None:
     values, std = (result[name].values[:, gap] for name in ("reflectance", "reflectance_std"))
     # Colour and prior are all there is; on a grey board that is enough, but it is told that it might not be.
     assert float(np.sqrt(np.mean((values - truth) ** 2))) < 0.1
-    assert calibration(values, truth, std).coverage_95 >= 0.9
+    assert check_honesty(values, truth, std).coverage_95 >= 0.9
     assert std.mean() > 0.1
 
 

@@ -20,9 +20,9 @@ from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
 from dsl_core.errors import DslError
+from dsl_core.io import CAMPAIGN_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.io.file_names import CAMPAIGN_NAME
 from dsl_core.progress import Progress
 
 NO_CAMPAIGN = "No campaign is open. Begin one, or open one that was begun."

@@ -23,7 +23,7 @@ def is_complete(session: Path) -> bool:
 
 def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
     """Files that an export writes."""
-    from dsl_core.io.export.common import depth_files
+    from dsl_core.io.export.depth_maps import depth_files
 
     files: list[Path] = []
     for form, path in targets.items():

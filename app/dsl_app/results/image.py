@@ -229,7 +229,7 @@ class ResultImage(QWidget):
             return item
         result = self._state.result.value
         assert result is not None
-        from dsl_core.evaluation.regions import mask_of_runs
+        from dsl_core.evaluation.marks import mask_of_runs
 
         return tinted(mask_of_runs(mark.runs, result.shape), colour, 110, 8)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dsl_app.results.state import Limits, Quality, ResultsState, View
 from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map, spread_of
 from dsl_core.io.result.result_arrays import ResultArrays
-from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
+from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 
 #: Which light measured a band: orders +1, -1, both, or only the zero order (with the prior).
 ORDER_NAMES = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}

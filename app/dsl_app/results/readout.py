@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QFrame, QVBoxLayout
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.widgets.forms import label
-from dsl_core.evaluation.explanation import explain_pixel
+from dsl_core.evaluation.marks import explain_pixel
 from dsl_core.io.result.result_arrays import ResultArrays
 
 REST = "Point at the picture to read a pixel."

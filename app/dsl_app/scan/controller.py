@@ -265,7 +265,7 @@ class ScanController:
 
     def open(self, path: Path) -> bool:
         """Open a plan, or offer to resume an interrupted scan; False for anything else."""
-        from dsl_core.io.file_names import MANIFEST_NAME
+        from dsl_core.io import MANIFEST_NAME
 
         if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
             self.plans.open_plan(path)
@@ -288,7 +288,7 @@ class ScanController:
 
     def _remember(self, folder: Path) -> bool:
         """Offer to resume a scan that lacks frames; False when there is nothing to resume."""
-        from dsl_core.io.file_names import MANIFEST_NAME
+        from dsl_core.io import MANIFEST_NAME
         from dsl_core.io.scan.session import SessionReader
 
         if not (folder / MANIFEST_NAME).is_file():

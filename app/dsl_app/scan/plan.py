@@ -23,8 +23,8 @@ from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
 from dsl_core.errors import DslError, PlanError
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
-from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.scan.estimate import estimate
 from dsl_core.io.scan.session import SUFFIX

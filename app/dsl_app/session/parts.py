@@ -19,7 +19,7 @@ from dsl_app.scan.state import CalibrationChoice, ScanState, preset_of
 from dsl_app.session.records import ComparePart, ResultsPart, ScanPart, SeriesPart
 from dsl_app.shared.evented import Event, Value
 from dsl_core.evaluation.time_sweep import FIGURES
-from dsl_core.io.file_names import MANIFEST_NAME
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.presets import on_cycles
 

@@ -7,7 +7,7 @@ import re
 from enum import Enum
 from pathlib import Path
 
-from dsl_core.io.file_names import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
+from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.

@@ -1,19 +1,23 @@
-"""Curves as coordinates of small vector drawings; colours are left to the page's style."""
+"""Curves as coordinates of small vector drawings, alone or several with common axes."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.evaluation.uncertainty import BAND_95, Calibration
+from dsl_core.evaluation.uncertainty import BAND_95, HonestyCheck
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.cie_tables import CIE_1931_XYZ, CIE_NM
 from dsl_core.optics.colour import reflectance_to_srgb, xyz_to_srgb
 
 Floats = NDArray[np.float64]
 #: Inner size of a drawing, in its own units.
 WIDTH, HEIGHT = 200.0, 96.0
+_LEAST_TOP = 0.1
 
 
 @dataclass(frozen=True)
@@ -49,17 +53,14 @@ def spectrum_curve(
 ) -> Curve:
     """A reflectance spectrum with its 95 % band and, where known, the truth; all of shape (bands,)."""
     shown = [values] + ([truth] if truth is not None else [])
-    top = _nice_top(float(max(np.nanmax(each) for each in shown)))
+    # A dark patch is not drawn larger than this: its noise would fill the drawing.
+    top = _nice_top(max(_LEAST_TOP, *(float(np.nanmax(each)) for each in shown)))
     x = (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
-    outline = ""
-    if std is not None:
-        upper, lower = values + BAND_95 * std, values - BAND_95 * std
-        outline = points(np.r_[x, x[::-1]], np.r_[upper, lower[::-1]], top)
     return Curve(
         title,
         note,
         points(x, values, top),
-        outline,
+        _band(x, values, std, top),
         "" if truth is None else points(x, truth, top),
         _css(values, bands),
         "" if truth is None else _css(truth, bands),
@@ -76,7 +77,7 @@ def share_curve(bands: Floats, share: Floats) -> Curve:
     return Curve("Share of data", note, points(x, share, 1.0), x_ticks=wavelength_ticks(bands), y_ticks=ticks)
 
 
-def calibration_curve(title: str, found: Calibration) -> Curve:
+def calibration_curve(title: str, found: HonestyCheck) -> Curve:
     """Observed over promised coverage; the dashed diagonal is honesty."""
     promised, observed = np.array([(0.0, 0.0), *found.curve, (1.0, 1.0)]).T
     ticks = (Tick(0.0, "0 %"), Tick(WIDTH, "100 % promised"))
@@ -105,11 +106,6 @@ def points(x: Floats, y: Floats, top: float) -> str:
     return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, height, strict=True) if np.isfinite(b))
 
 
-def _nice_top(largest: float) -> float:
-    """The smallest pleasant axis end that holds the data."""
-    return next((top for top in (0.1, 0.2, 0.4, 0.6, 0.8, 1.0) if largest <= top), np.ceil(largest * 2) / 2)
-
-
 def wavelength_ticks(bands: Floats) -> tuple[Tick, ...]:
     """Ticks at round wavelengths between the first and the last band (nm), which span the width."""
     first, last = float(bands[0]), float(bands[-1])
@@ -125,3 +121,62 @@ def _css(spectrum: Floats, bands: Floats) -> str:
 def _hex(rgb: NDArray[np.float32]) -> str:
     r, g, b = (np.nan_to_num(rgb) * 255 + 0.5).astype(int).tolist()
     return f"#{r:02x}{g:02x}{b:02x}"
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A curve of a chart: its name, CSS colour, SVG points of the line and of its 95 % band."""
+
+    name: str
+    colour: str
+    line: str
+    band: str = ""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Curves that share their axes, with ticks and words."""
+
+    title: str
+    note: str
+    traces: tuple[Trace, ...]
+    x_ticks: tuple[Tick, ...]
+    y_ticks: tuple[Tick, ...]
+
+
+def wavelength_chart(title: str, note: str, curves: Sequence[tuple[str, str, SpectralCurve]]) -> Chart:
+    """Curves given as (name, CSS colour, curve) over their common range of wavelengths."""
+    low = min(curve.wavelengths_nm[0] for _, _, curve in curves)
+    high = max(curve.wavelengths_nm[-1] for _, _, curve in curves)
+    top = _nice_top(max(max(curve.values) for _, _, curve in curves))
+    span = np.array([low, high if high > low else low + 1.0])
+    unit = next((curve.unit for _, _, curve in curves if curve.unit != "1"), "")
+    return Chart(
+        title,
+        note,
+        tuple(_trace(name, colour, curve, span, top) for name, colour, curve in curves),
+        wavelength_ticks(span),
+        (Tick(HEIGHT, "0"), Tick(0.0, f"{top:g} {unit}".strip())),
+    )
+
+
+def _trace(name: str, colour: str, curve: SpectralCurve, span: Floats, top: float) -> Trace:
+    x = (np.array(curve.wavelengths_nm) - span[0]) / (span[1] - span[0]) * WIDTH
+    values, std = np.array(curve.values), None if curve.std is None else np.array(curve.std)
+    return Trace(name, colour, points(x, values, top), _band(x, values, std, top))
+
+
+def _band(x: Floats, values: Floats, std: Floats | None, top: float) -> str:
+    """SVG points of the outline of a 95 % band, empty where no deviation is known."""
+    if std is None:
+        return ""
+    spread = BAND_95 * std
+    return points(np.r_[x, x[::-1]], np.r_[values + spread, (values - spread)[::-1]], top)
+
+
+def _nice_top(largest: float) -> float:
+    """The smallest of 1, 1.2, 1.5, 2, 3, 4, 5, 6, 8, 10 times a power of ten that holds the data."""
+    if not largest > 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(largest))
+    return next(factor * power for factor in (1, 1.2, 1.5, 2, 3, 4, 5, 6, 8, 10) if largest <= factor * power)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.flag_classes import FLAG_COLOURS, GRAVITY
-from dsl_core.model.result import REASONS, Flag
+from dsl_core.model.result import FLAG_COLOURS, GRAVITY, REASONS, Flag
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

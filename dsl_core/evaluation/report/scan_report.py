@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -22,7 +23,7 @@ from dsl_core.evaluation.report.curves import (
 from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import Picture, colour_picture, flag_picture, value_picture
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
-from dsl_core.evaluation.verdict import Verdict
+from dsl_core.evaluation.verdict import Goal, Verdict, verdicts
 from dsl_core.model.plan import CapturePlan
 
 if TYPE_CHECKING:
@@ -203,3 +204,32 @@ def _plan_facts(plan: CapturePlan) -> dict[str, str]:
         "Camera": "{} × {} px".format(*plan.camera_size_px),
         "Projector": "{} × {} px".format(*plan.projector_size_px),
     }
+
+
+def report_content(
+    title: str,
+    result: xr.Dataset,
+    truth: Truth,
+    evaluation: Evaluation,
+    summary: str = "",
+    goals: dict[str, Goal] | None = None,
+) -> ReportContent:
+    """What the report of a result says; plan and costs come from the result's attributes."""
+    attributes = dict(result.attrs)
+    costs = [StageCost(**cost) for cost in json.loads(attributes.pop("stage_costs", "[]"))]
+    plan = attributes.pop("capture_plan", None)
+    effects = RenderedEffects.of_note(str(attributes.get("effects", "")))
+    if effects is not None:
+        del attributes["effects"]
+    return ReportContent(
+        title,
+        result,
+        summary=summary,
+        evaluation=evaluation,
+        truth=truth,
+        verdicts=verdicts(evaluation, goals),
+        costs=costs,
+        plan=CapturePlan.model_validate_json(plan) if plan else None,
+        effects=effects,
+        provenance={str(key).replace("_", " "): str(value) for key, value in attributes.items()},
+    )

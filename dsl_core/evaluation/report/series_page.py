@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dsl_core.evaluation.flat_target import FlatTarget
+from dsl_core.evaluation.flat_target import SeenTarget
 from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import Picture, figure_uri, value_picture
 from dsl_core.evaluation.stage_test import StageTest, stage_table
@@ -37,7 +37,7 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-def stage_page(names: Sequence[str], targets: Sequence[FlatTarget], found: StageTest) -> str:
+def stage_page(names: Sequence[str], targets: Sequence[SeenTarget], found: StageTest) -> str:
     """The depth test; raises `StoreError` when the page's template is not installed."""
     pictures = [
         _residual(name, position, target)
@@ -72,7 +72,7 @@ def sweep_page(points: Sequence[SweepPoint], reference: str) -> str:
     )
 
 
-def stage_rows(names: Sequence[str], targets: Sequence[FlatTarget], found: StageTest) -> Table:
+def stage_rows(names: Sequence[str], targets: Sequence[SeenTarget], found: StageTest) -> Table:
     """A row for each position, in the order of the positions."""
     heads = (
         "Result",
@@ -116,7 +116,7 @@ def sweep_rows(points: Sequence[SweepPoint]) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _residual(name: str, position_mm: float, target: FlatTarget) -> Picture:
+def _residual(name: str, position_mm: float, target: SeenTarget) -> Picture:
     caption = f"{name}: how far behind the plane a pixel lies, RMS {target.plane.rms_mm:.3f} mm"
     title = f"{position_mm:7.1f} mm"
     return value_picture(target.residual_mm, title, caption, "mm", "RdBu_r", symmetric=True)

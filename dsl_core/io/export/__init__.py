@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.csv import export_csv
+from dsl_core.io.export.depth_maps import export_npy, export_tiff
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr
-from dsl_core.io.export.npy import export_npy
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
-from dsl_core.io.export.tiff import export_tiff
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:

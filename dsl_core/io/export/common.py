@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 import dsl_core
 from dsl_core.errors import StoreError
-from dsl_core.model.result import Flag
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,29 +38,6 @@ def require_suffix(path: Path, *suffixes: str) -> None:
 def plane(result: xr.Dataset, name: str) -> NDArray[np.float32]:
     """A variable as float32, dimensions as in the result; NaN where there is no answer."""
     return np.asarray(result[name].values, np.float32)
-
-
-def depth_files(path: Path, has_std: bool, has_flags: bool) -> list[Path]:
-    """Files that hold depth, its deviation and the flags: ``NAME``, ``NAME_std`` and ``NAME_flags``."""
-    endings = [""] + ["_std"] * has_std + ["_flags"] * has_flags
-    return [path.with_name(f"{path.stem}{ending}{path.suffix}") for ending in endings]
-
-
-def depth_planes(
-    result: xr.Dataset, format_name: str, path: Path
-) -> dict[Path, tuple[str, NDArray[np.float32 | np.uint16]]]:
-    """What `depth_files` hold, each with a sentence that says so."""
-    require(result, format_name, "depth_mm")
-    planes: list[tuple[str, NDArray[np.float32 | np.uint16]]] = [
-        ("Depth along the camera axis, mm; NaN where there is no answer", plane(result, "depth_mm"))
-    ]
-    has_std, has_flags = "depth_std_mm" in result, "flags" in result
-    if has_std:
-        planes.append(("Standard deviation of depth, mm", plane(result, "depth_std_mm")))
-    if has_flags:
-        bits = ", ".join(f"{int(flag)} {str(flag.name).lower().replace('_', ' ')}" for flag in Flag)
-        planes.append((f"Flags, the sum of: {bits}", np.asarray(result["flags"].values, np.uint16)))
-    return dict(zip(depth_files(path, has_std, has_flags), planes, strict=True))
 
 
 def wavelengths_nm(result: xr.Dataset) -> list[float]:

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
-from dsl_core.model.flag_classes import FLAG_COLOURS, FLAG_NAMES, gravest_flag
-from dsl_core.model.result import Flag
+from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, Flag, gravest_flag
 from dsl_core.optics.relighting import relight
 from dsl_core.solve.many import Check, never
 

@@ -23,7 +23,7 @@ from dsl_core.io.published.dataset import (
 )
 from dsl_core.io.published.layout import FileRecord, check_dataset
 from dsl_core.io.published.stereo import Stereo, load_stereo, save_stereo
-from dsl_core.io.published.tables import SpectralTables, load_tables, open_first_order_lines, save_tables
+from dsl_core.io.published.tables import SpectralTables, load_tables, save_tables
 
 __all__ = [
     "PUBLISHED_SETTINGS",
@@ -41,7 +41,6 @@ __all__ = [
     "load_stereo",
     "load_tables",
     "open_dataset",
-    "open_first_order_lines",
     "save_stereo",
     "save_tables",
 ]

@@ -20,20 +20,20 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.folder_kind import FolderKind
 from dsl_core.io.published.layout import (
     DEPTH_NAME,
     FOLDERS,
     FileRecord,
     Place,
+    PngInfo,
     Survey,
     file_name,
     find_folder,
     folder_name,
+    probe_png,
     survey,
 )
-from dsl_core.io.published.png_probe import PngInfo, probe_png
-from dsl_core.io.staging import staged
+from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.rig import BayerPattern

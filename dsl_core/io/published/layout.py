@@ -19,13 +19,13 @@ and level; these names are known too.
 from __future__ import annotations
 
 import re
+import struct
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from dsl_core.io.published.png_probe import PngInfo, probe_png
 from dsl_core.model.plan import CapturePlan, Role, Setting
 
 #: ``optional`` is what is not there and need not be.
@@ -235,3 +235,35 @@ def _loss(role: Role) -> str:
         "code": "depth is decoded from it: capture it, for depth.npy alone cannot be imported",
     }
     return losses[role]
+
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_END = b"\0\0\0\0IEND\xaeB`\x82"
+_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+
+
+@dataclass(frozen=True)
+class PngInfo:
+    """What a PNG's header says; ``bits`` is per channel."""
+
+    width_px: int
+    height_px: int
+    bits: int
+    channels: int
+
+
+def probe_png(path: Path) -> PngInfo | str:
+    """The header of a PNG, or in words why the file is not a whole one."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(33)
+            file.seek(max(path.stat().st_size - len(_END), 0))
+            tail = file.read()
+    except OSError as error:
+        return f"cannot be read ({error.strerror})"
+    if len(head) < 33 or not head.startswith(_SIGNATURE) or head[12:16] != b"IHDR":
+        return "is not a PNG image"
+    if tail != _END:
+        return "is cut off"
+    width, height, bits, colour = struct.unpack(">IIBB", head[16:26])
+    return PngInfo(width, height, bits, _CHANNELS.get(colour, 0))

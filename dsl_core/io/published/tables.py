@@ -96,27 +96,6 @@ def save_tables(
     return targets
 
 
-def open_first_order_lines(
-    path: Path,
-    camera_size_px: tuple[int, int],
-    bands: int = 47,
-    depth_range_mm: tuple[float, float] = (600.0, 900.0),
-) -> NDArray[np.generic]:
-    """Map the line index of the first order, shape (bands, depths, rows, columns), depth every 1 mm.
-
-    The published file has 14.6 GB, so it is mapped, not read. Raises `CalibrationError`.
-    """
-    depths = round(depth_range_mm[1] - depth_range_mm[0]) + 1
-    wanted = (bands, depths, camera_size_px[1], camera_size_px[0])
-    lines = _open(path, mapped=True)
-    if lines.size != np.prod(wanted) or lines.shape[0] != bands:
-        raise CalibrationError(
-            f"{path} has shape {lines.shape}; {wanted} is wanted (bands, depths, rows, columns)."
-            " Give the image size and the depths it was made for."
-        )
-    return lines.reshape(wanted)
-
-
 def find_table(folder: Path, name: str) -> Path | None:
     """The file of a table under its published or its earlier name."""
     return next((folder / n for n in TABLE_NAMES[name] if (folder / n).is_file()), None)
@@ -155,9 +134,9 @@ def _centres(bands: int, wavelengths_nm: ArrayLike | None, path: Path) -> NDArra
     return centres
 
 
-def _open(path: Path, *, mapped: bool = False) -> NDArray[np.generic]:
+def _open(path: Path) -> NDArray[np.generic]:
     try:
-        table = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
+        table = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise CalibrationError(f"{path} is not an array that NumPy can read ({error}).") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "iuf":

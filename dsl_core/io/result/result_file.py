@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.folder_kind import FolderKind
-from dsl_core.io.staging import staged
+from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.result import SCHEMA_VERSION
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.capture_log import LogEntry
 from dsl_core.io.scan.session import SessionReader
-from dsl_core.model.describe import describe_shot
-from dsl_core.model.plan import Shot
+from dsl_core.model.plan import Shot, describe_shot
 
 #: A camera may round the exposure it was asked for by this share.
 EXPOSURE_TOLERANCE = 0.05

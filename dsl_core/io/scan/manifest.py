@@ -14,8 +14,8 @@ import dsl_core
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import write_atomic
-from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan

@@ -14,8 +14,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.scan.capture_log import LogEntry, read_log
 from dsl_core.io.scan.frame_store import ChunkError, FrameStore, checksum
 from dsl_core.io.scan.manifest import Manifest, read_manifest
-from dsl_core.model.describe import describe_shot
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
 LOG_NAME = "frames.jsonl"

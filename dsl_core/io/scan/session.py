@@ -20,8 +20,8 @@ from typing import Self
 
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import StoreError
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import remove_partials
-from dsl_core.io.file_names import MANIFEST_NAME
 from dsl_core.io.scan.capture_log import CaptureLog, LogEntry
 from dsl_core.io.scan.frame_store import checksum
 from dsl_core.io.scan.lock import SessionLock

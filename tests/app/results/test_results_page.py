@@ -42,7 +42,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import Cancelled
-from dsl_core.evaluation.distance import on_screen
+from dsl_core.evaluation.marks import on_screen
 from dsl_core.workflows.inspection import IntensityGraph
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result

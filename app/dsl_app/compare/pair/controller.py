@@ -184,7 +184,7 @@ class CompareController:
 
         def work(progress: Progress) -> Path:
             from dsl_core import pipeline
-            from dsl_core.evaluation.report.content import report_content
+            from dsl_core.evaluation.report.scan_report import report_content
             from dsl_core.io.result.result_file import load_result
 
             progress.report("write the report", 0, 1)

@@ -7,7 +7,7 @@ from enum import Enum
 from pathlib import Path
 
 from dsl_app.shared.evented import Value
-from dsl_core.evaluation.flat_target import FlatTarget, Region
+from dsl_core.evaluation.flat_target import Region, SeenTarget
 from dsl_core.evaluation.stage_test import StageTest
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint
 
@@ -28,7 +28,7 @@ class Row:
 
     path: Path
     position_mm: float | None = None
-    target: FlatTarget | None = None
+    target: SeenTarget | None = None
     target_trouble: str = ""
     point: SweepPoint | None = None
     point_trouble: str = ""

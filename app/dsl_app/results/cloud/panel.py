@@ -17,8 +17,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
-from dsl_core.evaluation.distance import nearest_on_screen, on_screen
-from dsl_core.evaluation.regions import inside_outline
+from dsl_core.evaluation.marks import inside_outline, nearest_on_screen, on_screen
 from dsl_core.io.result.result_arrays import ResultArrays
 
 #: Points among which the one under the moving mouse is looked for; a click looks at all.

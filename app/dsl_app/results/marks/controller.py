@@ -17,7 +17,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
-from dsl_core.evaluation.regions import runs_of
+from dsl_core.evaluation.marks import runs_of
 from dsl_core.io.spectra.reference_file import Reference, ReferenceFile, read_references
 from dsl_core.progress import Progress
 

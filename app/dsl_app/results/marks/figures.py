@@ -9,8 +9,8 @@ import numpy as np
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import Theme
 from dsl_core.errors import DslError
-from dsl_core.evaluation.comparison import compare
-from dsl_core.evaluation.distance import distance_between
+from dsl_core.evaluation.marks import distance_between
+from dsl_core.evaluation.spectral import compare
 from dsl_core.io.result.result_arrays import ResultArrays
 
 

@@ -29,7 +29,7 @@ def mark_of_reference(name: str, colour: int, path: Path, curve: SpectralCurve, 
 
 def fill_region(draft: Mark, result: ResultArrays, progress: Progress) -> Mark:
     """A region with the mean and deviation of its pixels."""
-    from dsl_core.evaluation.regions import mask_of_outline, mask_of_runs, region_spectrum
+    from dsl_core.evaluation.marks import mask_of_outline, mask_of_runs, region_spectrum
 
     progress.report("mean of a region", 0, 1)
     shape = result.shape

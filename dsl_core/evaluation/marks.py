@@ -1,4 +1,4 @@
-"""Regions of an image: which pixels lie in an outline, and the spectrum they have in common."""
+"""What a pixel, two points and a region of a result say: reasons, a distance, a spectrum."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dsl_core.evaluation.uncertainty import DECIDED_FROM
+from dsl_core.model.result import REASONS, Flag
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32] | NDArray[np.float64]
@@ -97,3 +100,92 @@ def region_spectrum(reflectance: Floats, std: Floats, data_share: Floats, mask: 
         pixels=int(at.size),
         used=int(solid.size),
     )
+
+
+def explain_pixel(
+    flags: int,
+    wavelengths_nm: NDArray[np.float64],
+    data_share: NDArray[np.floating] | None = None,
+    depth_std_mm: float | None = None,
+) -> list[str]:
+    """Sentences on every flag of a pixel, with the bands or deviations that belong to it; empty when good."""
+    sentences = []
+    for flag, reason in REASONS.items():
+        if not flags & flag:
+            continue
+        if flag is Flag.BANDS_UNREACHED and data_share is not None:
+            ranges = undecided_ranges(wavelengths_nm, data_share)
+            reason = f"{reason}: {ranges}" if ranges else reason
+        if flag is Flag.NOT_REFINED and depth_std_mm is not None and np.isfinite(depth_std_mm):
+            reason = f"{reason} (±{depth_std_mm:.2g} mm)"
+        sentences.append(reason)
+    return sentences
+
+
+def undecided_ranges(wavelengths_nm: NDArray[np.float64], data_share: NDArray[np.floating]) -> str:
+    """Where the prior decides, as text such as ``430–445 nm, 655–660 nm``."""
+    with np.errstate(invalid="ignore"):
+        undecided = np.asarray(data_share) < DECIDED_FROM
+    parts = []
+    for first, last in _runs(undecided.tolist()):
+        low, high = wavelengths_nm[first], wavelengths_nm[last]
+        parts.append(f"{low:g} nm" if first == last else f"{low:g}–{high:g} nm")
+    return ", ".join(parts)
+
+
+def _runs(marks: Sequence[bool]) -> list[tuple[int, int]]:
+    """First and last index of each stretch of marks."""
+    runs: list[tuple[int, int]] = []
+    for i, mark in enumerate(marks):
+        if mark and runs and runs[-1][1] == i - 1:
+            runs[-1] = (runs[-1][0], i)
+        elif mark:
+            runs.append((i, i))
+    return runs
+
+
+@dataclass(frozen=True)
+class Distance:
+    """The straight distance between two points and its standard deviation, mm."""
+
+    mm: float
+    std_mm: float
+
+
+def distance_between(a_mm: Floats, b_mm: Floats, a_std_mm: float = 0.0, b_std_mm: float = 0.0) -> Distance:
+    """Distance of two points (3,) in camera coordinates; ``std`` are those of their depths.
+
+    A wrong depth moves a point along its ray, of which only the part along the connection counts; errors of
+    the two depths are taken as independent. NaN where a point is.
+    """
+    a, b = np.asarray(a_mm, np.float64), np.asarray(b_mm, np.float64)
+    between = b - a
+    length = float(np.linalg.norm(between))
+    if length == 0.0:
+        return Distance(0.0, float(np.hypot(a_std_mm, b_std_mm)))
+    along = between / length
+    shift_a, shift_b = a_std_mm * along @ (a / a[2]), b_std_mm * along @ (b / b[2])
+    return Distance(length, float(np.hypot(shift_a, shift_b)))
+
+
+def on_screen(points_mm: Floats, projection: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Normalised screen coordinates and depth (n, 3) of points (n, 3) by a 4 x 4 view and projection matrix.
+
+    x and y run from -1 to 1 over the screen; a point behind the eye is NaN.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        clip = points_mm @ projection[:, :3].T + projection[:, 3]
+        return np.asarray(np.where(clip[:, 3:] > 0, clip[:, :3] / clip[:, 3:], np.nan))
+
+
+def nearest_on_screen(
+    seen: NDArray[np.float64], at: tuple[float, float], size_px: tuple[int, int], within_px: float = 6.0
+) -> int | None:
+    """Index of the point of `on_screen` that a person means who points at ``at`` (normalised).
+
+    Of the points within a few pixels it is the foremost; None where there is none.
+    """
+    dx = (seen[:, 0] - at[0]) * size_px[0] / 2
+    dy = (seen[:, 1] - at[1]) * size_px[1] / 2
+    near = np.flatnonzero(dx * dx + dy * dy < within_px**2)
+    return None if near.size == 0 else int(near[np.argmin(seen[near, 2])])

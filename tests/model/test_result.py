@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dsl_core.model.flag_classes import gravest_flag
-from dsl_core.model.result import Flag
+from dsl_core.model.result import Flag, gravest_flag
 
 
 def test_the_gravest_flag_wins() -> None:

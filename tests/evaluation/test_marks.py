@@ -1,5 +1,3 @@
-"""What a person asks of a result: regions, likeness, references, distances, reasons."""
-
 from __future__ import annotations
 
 import numpy as np
@@ -7,14 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dsl_core.errors import DecodeError
-from dsl_core.evaluation.comparison import compare
-from dsl_core.evaluation.distance import distance_between, nearest_on_screen, on_screen
-from dsl_core.evaluation.explanation import explain_pixel, undecided_ranges
-from dsl_core.evaluation.regions import mask_of_outline, mask_of_runs, region_spectrum, runs_of
-from dsl_core.evaluation.similarity import angle_map, likeness, spectrum_at
+from dsl_core.evaluation.marks import (
+    distance_between,
+    explain_pixel,
+    mask_of_outline,
+    mask_of_runs,
+    nearest_on_screen,
+    on_screen,
+    region_spectrum,
+    runs_of,
+    undecided_ranges,
+)
 from dsl_core.model.result import Flag
-from dsl_core.model.spectral import SpectralCurve
 
 NM = np.arange(430.0, 661.0, 5.0)
 
@@ -59,59 +61,6 @@ def test_a_region_leaves_pixels_without_spectrum_out() -> None:
     none = region_spectrum(cube, cube, cube, np.zeros((2, 2), bool))
     assert none.used == 0
     assert np.isnan(none.mean).all()
-
-
-def test_the_angle_does_not_see_brightness() -> None:
-    spectrum = np.linspace(0.1, 0.9, NM.size)
-    cube = np.stack([spectrum, 0.2 * spectrum, spectrum[::-1]], 1)[:, None].astype(np.float32)
-    angles = angle_map(cube, spectrum)
-    assert angles[0, :2] == pytest.approx(0, abs=1e-3)
-    assert angles[0, 2] > 0.5
-    with pytest.raises(DecodeError, match="complete spectrum"):
-        angle_map(cube, np.full(NM.size, np.nan))
-
-
-def test_metamers_look_alike_and_are_not() -> None:
-    from dsl_core.optics.colour import observer_weights
-
-    spectrum = 0.4 + 0.1 * np.sin(NM / 40)
-    # What the eye under D65 cannot see: the part of a wiggle that its three weights are blind to.
-    wiggle = 0.2 * np.sin(NM / 9)
-    weights = observer_weights(NM)
-    blind = wiggle - np.linalg.pinv(weights) @ (weights @ wiggle)
-    cube = np.stack([spectrum, spectrum + blind, 1.5 * spectrum], 1)[:, None].astype(np.float32)
-    found = likeness(cube, spectrum, NM)
-    assert found.metamers(1.0, 0.05).tolist() == [[False, True, False]]
-    assert found.same_spectrum(0.05).tolist() == [[True, False, True]]
-
-
-def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
-    bands = np.arange(430.0, 661.0, 10.0)
-    nm = np.arange(400.0, 701.0, 3.0)
-    np.testing.assert_allclose(spectrum_at(bands, nm, nm / 1000), bands / 1000)
-    # Half a band further is still the band's own light.
-    assert spectrum_at(bands, np.array([435.0, 655.0]), np.array([0.1, 0.3]))[0] == 0.1
-    for low, high in ((400.0, 550.0), (436.0, 700.0)):
-        with pytest.raises(DecodeError, match=rf"{low:g} to {high:g} nm.*430 to 660 nm"):
-            spectrum_at(bands, np.array([low, high]), np.array([0.1, 0.3]))
-
-
-def test_a_reference_of_another_scale_differs_only_by_the_scale() -> None:
-    truth = np.linspace(0.2, 0.8, NM.size)
-    reference = SpectralCurve.of(NM, truth)
-    found = compare(truth / 2, NM, reference)
-    assert found.scale == pytest.approx(2)
-    assert found.angle_rad == pytest.approx(0, abs=1e-6)
-    assert found.rmse > 0.2
-    assert found.rmse_scaled == pytest.approx(0, abs=1e-9)
-    assert found.delta_e_scaled < 1e-3 < found.delta_e
-
-
-def test_only_shared_bands_are_compared() -> None:
-    found = compare(np.full(NM.size, 0.5), NM, SpectralCurve.of([500.0, 600.0], [0.5, 0.5]))
-    assert (found.bands, found.range_nm) == (21, (500.0, 600.0))
-    with pytest.raises(DecodeError, match="5 are needed"):
-        compare(np.full(NM.size, 0.5), NM, SpectralCurve.of([700.0, 800.0], [0.5, 0.5]))
 
 
 def test_distance_counts_errors_along_the_connection_only() -> None:

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import DecodeError
+from dsl_core.evaluation.similarity import angle_map, likeness, spectrum_at
+
+NM = np.arange(430.0, 661.0, 5.0)
+
+
+def test_the_angle_does_not_see_brightness() -> None:
+    spectrum = np.linspace(0.1, 0.9, NM.size)
+    cube = np.stack([spectrum, 0.2 * spectrum, spectrum[::-1]], 1)[:, None].astype(np.float32)
+    angles = angle_map(cube, spectrum)
+    assert angles[0, :2] == pytest.approx(0, abs=1e-3)
+    assert angles[0, 2] > 0.5
+    with pytest.raises(DecodeError, match="complete spectrum"):
+        angle_map(cube, np.full(NM.size, np.nan))
+
+
+def test_metamers_look_alike_and_are_not() -> None:
+    from dsl_core.optics.colour import observer_weights
+
+    spectrum = 0.4 + 0.1 * np.sin(NM / 40)
+    # What the eye under D65 cannot see: the part of a wiggle that its three weights are blind to.
+    wiggle = 0.2 * np.sin(NM / 9)
+    weights = observer_weights(NM)
+    blind = wiggle - np.linalg.pinv(weights) @ (weights @ wiggle)
+    cube = np.stack([spectrum, spectrum + blind, 1.5 * spectrum], 1)[:, None].astype(np.float32)
+    found = likeness(cube, spectrum, NM)
+    assert found.metamers(1.0, 0.05).tolist() == [[False, True, False]]
+    assert found.same_spectrum(0.05).tolist() == [[True, False, True]]
+
+
+def test_a_spectrum_is_not_continued_beyond_its_ends() -> None:
+    bands = np.arange(430.0, 661.0, 10.0)
+    nm = np.arange(400.0, 701.0, 3.0)
+    np.testing.assert_allclose(spectrum_at(bands, nm, nm / 1000), bands / 1000)
+    # Half a band further is still the band's own light.
+    assert spectrum_at(bands, np.array([435.0, 655.0]), np.array([0.1, 0.3]))[0] == 0.1
+    for low, high in ((400.0, 550.0), (436.0, 700.0)):
+        with pytest.raises(DecodeError, match=rf"{low:g} to {high:g} nm.*430 to 660 nm"):
+            spectrum_at(bands, np.array([low, high]), np.array([0.1, 0.3]))
