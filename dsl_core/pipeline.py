@@ -51,11 +51,11 @@ def open_scan(
     from dsl_core.capture.preflight import require_possible
     from dsl_core.capture.runner import Runner
     from dsl_core.capture.sink import WatchedSink
-    from dsl_core.io.scan.session import SessionWriter
+    from dsl_core.io.scan.folder import ScanWriter
     from dsl_core.patterns.images import pattern_image
 
     require_possible(rig, plan)
-    with SessionWriter.open(folder, plan, rig, notes) as writer:
+    with ScanWriter.open(folder, plan, rig, notes) as writer:
         sink = WatchedSink(writer, watch) if watch else writer
         yield Runner(rig, plan, sink, pattern_image, progress=progress, token=token)
 

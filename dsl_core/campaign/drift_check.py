@@ -63,11 +63,11 @@ def measure_drift(
     The light is judged only when the target is the Spectralon. Raises `CalibrationError` when the target does
     not fill the picture, and what a scan raises.
     """
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
 
     plan = pipeline.fit_plan(quick_plan(rig.frame_period_ms), devices)
     pipeline.scan(devices, plan, folder, progress)
-    return drift_figures(SessionReader(folder), rig, spectralon, progress)
+    return drift_figures(ScanReader(folder), rig, spectralon, progress)
 
 
 def drift_figures(

@@ -95,13 +95,13 @@ def opened_campaign(
     """A campaign that no other process writes, and the open devices of its rig."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.campaign_folder import CampaignFolder
-    from dsl_core.io.scan.lock import SessionLock
+    from dsl_core.io.scan.lock import FolderLock
 
     campaign = CampaignFolder.prepare(folder, rig, options, settings)
     # Devices that do not open must not leave a campaign of theirs behind.
     with open_rig(campaign.info.rig, campaign.info.options) as devices:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = SessionLock(folder / "lock")
+        lock = FolderLock(folder / "lock")
         try:
             campaign.save()
             yield campaign, devices

@@ -139,7 +139,7 @@ def _export(
     from dsl_core.io.export import export_csv
     from dsl_core.io.published import export_calibration
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
     from dsl_core.workflows import exchange
     from dsl_core.workflows.scans import calibration_of
 
@@ -150,7 +150,7 @@ def _export(
             return exchange.export_scan(path, target, force, progress)
     if form == "calibration":
         is_scan = path.is_dir()
-        rig = calibration_of(SessionReader(path)) if is_scan else load_calibration(str(path))
+        rig = calibration_of(ScanReader(path)) if is_scan else load_calibration(str(path))
         return export_calibration(rig, target, overwrite=force)
     if form == "csv":
         return export_csv(load_result(path), target, overwrite=force, pixels=pixels)

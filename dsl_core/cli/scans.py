@@ -159,9 +159,9 @@ def resume(
 
 def _say_gaps(output: Output, target: Path) -> None:
     """Say how many frames a scan lacks, and how many of those it has cannot be used."""
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
 
-    reader = SessionReader(target)
+    reader = ScanReader(target)
     missing = len(reader.missing())
     damaged = reader.plan.shot_count - len(reader.sound()) - missing
     more = f"; damaged, and taken again: {damaged}" if damaged else ""

@@ -13,7 +13,7 @@ from dsl_core.io.plan_file import load_plan
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.check import find_problems
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import CapturePlan
 
 Facts = dict[str, Any]
@@ -41,7 +41,7 @@ def describe(path: Path, verify: bool = False) -> Facts:
 
 
 def _session(path: Path, verify: bool) -> Facts:
-    reader = SessionReader(path)
+    reader = ScanReader(path)
     manifest = reader.manifest
     problems = find_problems(reader, verify)
     return {

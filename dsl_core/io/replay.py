@@ -8,7 +8,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import with_options
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 
 
 class ReplayOptions(BaseModel):
@@ -26,5 +26,5 @@ def open_replay(options: dict[str, str]) -> DeviceRig:
     if set(options) != {"session"}:
         given = ", ".join(sorted(options)) or "none"
         raise DeviceError(f"The rig 'replay' takes one option, session=NAME.dsl; given: {given}.")
-    reader = SessionReader(options["session"])
+    reader = ScanReader(options["session"])
     return replay_rig(reader, reader.calibration)

@@ -27,9 +27,9 @@ def export_scan(
     """Write a complete session in the published dataset layout and return the files; raises `StoreError`."""
     from dsl_core.io.published import export_dataset
     from dsl_core.io.scan.check import require_complete
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
 
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     require_complete(reader)
     sensor = calibration_of(reader).sensor
     return export_dataset(

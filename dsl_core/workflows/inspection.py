@@ -21,7 +21,7 @@ from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
     from dsl_core.io.result.result_arrays import ResultArrays
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
     from dsl_core.model.plan import CapturePlan, Shot
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
 class _Cropped:
     """A frame source of a part of the picture."""
 
-    def __init__(self, reader: SessionReader, rows: slice, columns: slice) -> None:
+    def __init__(self, reader: ScanReader, rows: slice, columns: slice) -> None:
         self.reader, self.rows, self.columns = reader, rows, columns
 
     @property
@@ -106,10 +106,10 @@ class FrameBlock:
 def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
     """Read the frames around a pixel (x, y) of a result's scan; raises `StoreError`, `CalibrationError`."""
     from dsl_core.io.scan.check import require_complete
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
     from dsl_core.reconstruction.merge import MergedScan
 
-    progress, reader = progress or NoProgress(), SessionReader(find_session(result))
+    progress, reader = progress or NoProgress(), ScanReader(find_session(result))
     require_complete(reader)
     rig, plan = _calibration(reader, result), reader.plan
     width, height = plan.camera_size_px
@@ -127,7 +127,7 @@ def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress 
     return FrameBlock(radiance, variance, (left, top), rig, plan)
 
 
-def _calibration(reader: SessionReader, result: ResultArrays) -> Rig:
+def _calibration(reader: ScanReader, result: ResultArrays) -> Rig:
     """The calibration that a result was made with: the scan's own, or one of the library."""
     from dsl_core.io.calibration_library import CalibrationLibrary
     from dsl_core.io.scan.origin import calibration_digest, model_of_notes

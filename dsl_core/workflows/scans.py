@@ -54,10 +54,10 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     it is.
     """
     from dsl_core.capture import drift
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
     from dsl_core.patterns.images import pattern_image
 
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     rig = replace(rig, calibration=reader.calibration or rig.calibration)
     sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
     done = [shot for shot in reader.plan.shots() if shot.index in sound]
@@ -83,10 +83,10 @@ def reconstruct_scan(
     """
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.scan.check import require_complete
+    from dsl_core.io.scan.folder import ScanReader
     from dsl_core.io.scan.origin import model_notes
-    from dsl_core.io.scan.session import SessionReader
 
-    reader, timer = SessionReader(folder), timer or StageTimer()
+    reader, timer = ScanReader(folder), timer or StageTimer()
     require_complete(reader)
     if calibration is not None and not override_calibration:
         _require_conditions(folder, reader.manifest, calibration)

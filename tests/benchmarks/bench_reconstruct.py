@@ -67,9 +67,9 @@ def job(kind: str, folder: Path, step_nm: float) -> dict[str, Any]:
 
 def read_all(folder: Path, step_nm: float) -> dict[str, Any]:
     """Read and check every frame, and nothing else."""
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
 
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     return {"frames": sum(1 for _ in reader.read_many(reader.plan.shots()))}
 
 

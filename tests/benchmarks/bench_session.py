@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan
 
@@ -51,13 +51,13 @@ def main() -> None:
         folder = Path(place) / "bench.dsl"
 
         def write() -> None:
-            with SessionWriter.create(folder, plan) as writer:
+            with ScanWriter.create(folder, plan) as writer:
                 for shot in writer.missing():
                     pixels = np.roll(frames[shot.index % len(frames)], shot.index, 0)
                     writer.write(shot, Frame(pixels, shot.exposure_ms, float(shot.index), shot.index))
 
         timed("write, synced", plan, write)
-        reader = SessionReader(folder)
+        reader = ScanReader(folder)
         stored = sum(path.stat().st_size for path in (folder / "frames").iterdir())
         print(f"{stored / 1e6:.0f} MB on disk, {plan.raw_bytes / stored:.2f} times smaller than raw")
         shots = list(plan.shots())
@@ -77,7 +77,7 @@ def main() -> None:
                     lambda t=threads, v=verify: sum(1 for _ in reader.read_many(shots, t, v)),  # type: ignore[misc]
                 )
                 timed(f"read_stack, {how}", plan, lambda t=threads, v=verify: read_stacks(t, v))  # type: ignore[misc]
-        timed("resume (all frames checked)", plan, lambda: SessionWriter.resume(folder, plan).close())
+        timed("resume (all frames checked)", plan, lambda: ScanWriter.resume(folder, plan).close())
 
 
 if __name__ == "__main__":

@@ -21,7 +21,7 @@ from dsl_core import pipeline
 from dsl_core.devices.base import DeviceRig
 from dsl_core.evaluation.summary import Evaluation, Truth, interior
 from dsl_core.evaluation.uncertainty import DECIDED_FROM, HonestyCheck, check_honesty
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.result import DEPTH_INVALID, Reach
 from dsl_core.model.rig import Rig
@@ -85,7 +85,7 @@ def prepare(scene: str, size: str) -> Prepared:
         plan = pipeline.fit_plan(CapturePlan(code=GrayCode(rows=False)), devices)
         pipeline.scan(devices, plan, folder)
         rig, truth = calibration_and_truth(devices)
-        merged = MergedScan(SessionReader(folder), rig)
+        merged = MergedScan(ScanReader(folder), rig)
         code, white = decode_columns(merged)
         stack = stack_lines(merged)
     return Prepared(rig, plan, reconstruct_geometry(rig, plan, code, white, stack), stack, truth)

@@ -8,7 +8,7 @@ import pytest
 
 from dsl_core.campaign.recipes import recipe_names
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 
@@ -57,4 +57,4 @@ def test_what_was_captured_before_the_kill_is_kept(calibrated: Calibrated) -> No
     # A frame that was just being written was none yet: it is cleared away and taken again.
     frames = [p for p in frames if not p.endswith(".partial")]
     assert frames == [p for p in frames if (calibrated.folder / p).exists()]
-    assert not SessionReader(calibrated.folder / INTERRUPTED / "scan.dsl").missing()
+    assert not ScanReader(calibrated.folder / INTERRUPTED / "scan.dsl").missing()

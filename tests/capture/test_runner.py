@@ -18,7 +18,7 @@ from dsl_core.capture.sink import MemorySink
 from dsl_core.capture.status import State, Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DeviceError, PlanError, StoreError
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.progress import CallbackProgress
@@ -320,7 +320,7 @@ def test_ctrl_c_leaves_a_resumable_session(
     tmp_path: Path, rig: DeviceRig, bench: Any, plan: CapturePlan, pattern: Pattern, where: str
 ) -> None:
     folder = tmp_path / "scan.dsl"
-    with SessionWriter.create(folder, plan, rig) as sink:
+    with ScanWriter.create(folder, plan, rig) as sink:
         if where == "snap":
             bench.before_snap = lambda shot, attempt: _raise(KeyboardInterrupt()) if shot == 7 else None
         elif where == "show":
@@ -339,12 +339,12 @@ def test_ctrl_c_leaves_a_resumable_session(
             runner.run()
         assert runner.status.state is State.CANCELLED
     bench.before_snap, bench.before_show = lambda shot, attempt: None, lambda: None
-    with SessionWriter.resume(folder, plan, rig) as sink:
+    with ScanWriter.resume(folder, plan, rig) as sink:
         assert next(sink.missing()).index == 7
         Runner(rig, plan, sink, pattern).run()
     whole = MemorySink(plan)
     Runner(rig, plan, whole, pattern).run()
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     for shot in plan.shots():
         np.testing.assert_array_equal(reader.read(shot), whole.read(shot))
 

@@ -14,7 +14,7 @@ from dsl_core.devices.conformance import CameraConformance, ProjectorConformance
 from dsl_core.devices.registry import open_rig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError, StoreError
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
@@ -53,12 +53,12 @@ class TestReplay(CameraConformance, ProjectorConformance, RigConformance):
 def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
     original = _scan()
     folder = tmp_path / "scan.dsl"
-    with SessionWriter.create(folder, PLAN) as writer:
+    with ScanWriter.create(folder, PLAN) as writer:
         Runner(replay_rig(original), PLAN, writer, pattern_image).run()
     again = MemorySink(PLAN)
     with open_rig("replay", {"session": str(folder)}) as rig:
         Runner(rig, PLAN, again, pattern_image).run()
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     for shot in PLAN.shots():
         np.testing.assert_array_equal(again.read(shot), original.read(shot))
         np.testing.assert_array_equal(reader.read(shot), original.read(shot))

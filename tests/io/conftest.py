@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.io.scan.session import SessionWriter
+from dsl_core.io.scan.folder import ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 
@@ -41,7 +41,7 @@ def frame_of() -> FrameOf:
 def session(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf) -> Path:
     """A finished session."""
     folder = tmp_path / "scan.dsl"
-    with SessionWriter.create(folder, plan) as writer:
+    with ScanWriter.create(folder, plan) as writer:
         for shot in writer.missing():
             writer.write(shot, frame_of(shot))
     return folder

@@ -11,7 +11,7 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import remove_partials, set_aside, write_atomic
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 
@@ -45,10 +45,10 @@ def test_short_writes_of_frames_and_log_lose_nothing(
     tmp_path: Path, plan: CapturePlan, frame_of: Callable[[Shot], Frame], short_writes: list[int]
 ) -> None:
     shots = list(plan.shots())[:3]
-    with SessionWriter.create(tmp_path / "scan.dsl", plan) as writer:
+    with ScanWriter.create(tmp_path / "scan.dsl", plan) as writer:
         for shot in shots:
             writer.write(shot, frame_of(shot))
-    reader = SessionReader(tmp_path / "scan.dsl")
+    reader = ScanReader(tmp_path / "scan.dsl")
     assert list(reader.entries) == [shot.index for shot in shots]
     for shot in shots:
         np.testing.assert_array_equal(reader.read(shot), frame_of(shot).pixels)

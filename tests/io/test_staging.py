@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.published import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.staging import staged
 from dsl_core.model.plan import CapturePlan, LineComb, Shot
 from tests.cases.small_result import small_result
@@ -92,7 +92,7 @@ def test_a_scan_is_never_replaced(session: Path, write: Callable[[Path], None]) 
     with pytest.raises(StoreError, match="is not replaced"):
         write(session.parent)
     assert _tree(session) == before
-    assert SessionReader(session).missing() == []
+    assert ScanReader(session).missing() == []
 
 
 @pytest.mark.parametrize(

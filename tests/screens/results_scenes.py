@@ -14,7 +14,7 @@ from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import Quality, ResultsState, Seek, View
 from PySide6.QtWidgets import QDialog, QTabWidget
 
-from tests.io.test_reference_file import write_library
+from tests.io.spectra.test_reference_file import write_library
 from tests.screens.stage import Stage
 
 

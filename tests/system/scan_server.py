@@ -22,7 +22,7 @@ from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.devices.replay import replay_rig
-from dsl_core.io.scan.session import SessionWriter
+from dsl_core.io.scan.folder import ScanWriter
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.patterns.images import pattern_image
 
@@ -69,7 +69,7 @@ def main() -> None:
         folder, frames, delay_s = json.loads(line)
         child = os.fork()
         if child == 0:
-            with SessionWriter.open(folder, plan, rig) as sink:
+            with ScanWriter.open(folder, plan, rig) as sink:
                 Runner(rig, plan, sink, pattern_image).run()
             os._exit(0)
         if frames is not None:

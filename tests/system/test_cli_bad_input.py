@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.io import atomic
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.frame_store import FrameStore
-from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
@@ -110,7 +110,7 @@ def test_resume_mends_damaged_frames_to_the_bit(
     ending = give("resume", scan_copy)
     assert (ending.code, says in ending.out) == (0, True)
     assert "All 150 frames are stored" in ending.out
-    sound, mended = SessionReader(finished / "scan.dsl"), SessionReader(scan_copy)
+    sound, mended = ScanReader(finished / "scan.dsl"), ScanReader(scan_copy)
     for shot in sound.plan.shots():
         np.testing.assert_array_equal(mended.read(shot), sound.read(shot))
 
@@ -125,7 +125,7 @@ def _with(**changes: object) -> Callable[[Path], str]:
 
 
 def _other_size(scan: Path) -> str:
-    calibration = SessionReader(scan).calibration
+    calibration = ScanReader(scan).calibration
     assert calibration is not None
     return calibration.model_copy(update={"camera": calibration.camera.resized(100, 60)}).model_dump_json()
 
@@ -174,9 +174,9 @@ def test_frames_that_show_nothing(
     picture: Callable[[np.random.Generator], NDArray[np.uint16]],
     sentence: str,
 ) -> None:
-    good = SessionReader(finished / "scan.dsl")
+    good = ScanReader(finished / "scan.dsl")
     scan, rng = tmp_path / "scan.dsl", np.random.default_rng(1)
-    with SessionWriter.create(scan, good.plan) as writer:
+    with ScanWriter.create(scan, good.plan) as writer:
         for shot in writer.missing():
             writer.write(shot, Frame(picture(rng), shot.exposure_ms, shot.index + 1.0, shot.index + 1))
     rig = tmp_path / "rig.json"
@@ -288,7 +288,7 @@ def test_force_replaces_no_scan_and_nobodys_folder(
     )  # told before long work
     onto_itself = give("reconstruct", scan_copy, "-o", scan_copy, "--force")
     assert (onto_itself.code, "holds a scan and is not replaced" in onto_itself.sentence) == (2, True)
-    assert SessionReader(scan_copy).missing() == []
+    assert ScanReader(scan_copy).missing() == []
     documents = tmp_path / "docs"
     documents.mkdir()
     (documents / "thesis.txt").write_text("years")
@@ -326,9 +326,9 @@ def test_a_disk_that_fills_up_loses_nothing(
         ending = give("scan", scan, *SMALL_RIG, *SMALL_PLAN)
     assert ending.code == 2
     assert "disk is full" in ending.sentence
-    assert 100 <= len(SessionReader(scan).missing()) < 150
+    assert 100 <= len(ScanReader(scan).missing()) < 150
     assert give("resume", scan).code == 0
-    sound, mended = SessionReader(finished / "scan.dsl"), SessionReader(scan)
+    sound, mended = ScanReader(finished / "scan.dsl"), ScanReader(scan)
     for shot in sound.plan.shots():
         np.testing.assert_array_equal(mended.read(shot), sound.read(shot))
 

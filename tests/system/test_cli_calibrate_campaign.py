@@ -13,7 +13,7 @@ from dsl_core.devices import registry
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from tests.cases import fake_recipe
 
 from .conftest import Give
@@ -79,7 +79,7 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
         "lab 3",
     ]
     assert give(*scan).code == 0
-    assert SessionReader(tmp_path / "a.dsl").calibration == rig
+    assert ScanReader(tmp_path / "a.dsl").calibration == rig
 
 
 @pytest.mark.parametrize(("folder", "named"), [("lab (1)", []), ("lab", ["--name", "lab/1"])])

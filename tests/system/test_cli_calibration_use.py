@@ -10,7 +10,7 @@ from dsl_core.devices.conditions import current_conditions
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import save_rig
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.rig import Rig
 
 from .conftest import SMALL_RIG, Give
@@ -39,7 +39,7 @@ def with_gain(rig: Rig, gain_db: float) -> Rig:
 def test_a_scan_stores_the_calibration_it_is_told(give: Give, tmp_path: Path, calibrated: Rig) -> None:
     scan = tmp_path / "scan.dsl"
     assert give("scan", scan, *SMALL_RIG, *QUICK, "--calibration", "lab").code == 0
-    assert SessionReader(scan).calibration == calibrated
+    assert ScanReader(scan).calibration == calibrated
     (scan / "frames" / "c.7.0.0").unlink()
     assert give("resume", scan).code == 0
     assert "no calibration 'lob'; it has: lab" in give(
@@ -55,7 +55,7 @@ def test_other_settings_are_refused_unless_overridden(give: Give, tmp_path: Path
     assert "the camera's gain (dB) was 12 and is 0" in ending.sentence
     assert not (tmp_path / "scan.dsl").exists()
     assert give(*command, "--override-calibration").code == 0
-    reader = SessionReader(tmp_path / "scan.dsl")
+    reader = ScanReader(tmp_path / "scan.dsl")
     assert reader.manifest.notes["calibration_overridden"] == "the camera's gain (dB) was 12 and is 0"
     assert reader.calibration is not None
     assert reader.calibration.white_scale == 33.0

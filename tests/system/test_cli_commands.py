@@ -13,7 +13,7 @@ import dsl_core
 from dsl_core.cli.options import PlanChoice
 from dsl_core.io.plan_file import load_plan
 from dsl_core.io.result.result_file import load_result
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import EnsembleCode, GrayCode, LineComb, Setting, XorCode
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
@@ -82,7 +82,7 @@ def test_a_plan_is_written_for_the_rig_and_says_what_it_takes(give: Give, tmp_pa
     info = give("info", path, "--json").json
     assert (info["kind"], info["frames"]) == ("plan", plan.shot_count)
     assert give("scan", tmp_path / "a.dsl", *SMALL_RIG, "--plan", path).code == 0
-    assert SessionReader(tmp_path / "a.dsl").plan == plan
+    assert ScanReader(tmp_path / "a.dsl").plan == plan
 
 
 @pytest.mark.parametrize(
@@ -185,7 +185,7 @@ def test_reconstruct_by_another_solver(give: Give, finished: Path, tmp_path: Pat
 def test_what_the_calibration_lacks_is_said_before_a_frame_is_read(
     give: Give, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(SessionReader, "read")
+    monkeypatch.delattr(ScanReader, "read")
     ending = give("reconstruct", finished / "scan.dsl", "--model", "grid", "-o", tmp_path / "a.zarr")
     assert ending.code == 2
     assert "holds no data-driven correspondence" in ending.sentence
@@ -202,9 +202,9 @@ def test_a_scan_goes_out_and_comes_back_in_the_published_layout(
     assert not (tmp_path / "again.dsl").exists()
     assert give("import", dataset, "-o", tmp_path / "again.dsl").code == 2  # the published rig's size
     own = tmp_path / "own.json"
-    own.write_text(SessionReader(scan).calibration.model_dump_json())  # type: ignore[union-attr]
+    own.write_text(ScanReader(scan).calibration.model_dump_json())  # type: ignore[union-attr]
     assert give("import", dataset, "-o", tmp_path / "back.dsl", "--calibration", own).code == 0
-    before, after = SessionReader(scan), SessionReader(tmp_path / "back.dsl")
+    before, after = ScanReader(scan), ScanReader(tmp_path / "back.dsl")
     for shot in before.plan.shots():
         np.testing.assert_array_equal(after.read(shot), before.read(shot))
     assert give("import", rig, "-o", tmp_path / "rig.json", "--camera-size", "112x72").code == 0

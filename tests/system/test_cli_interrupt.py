@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from dsl_core.cli import main
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 
 from .conftest import SMALL_RIG, Give, without_progress
 
@@ -72,10 +72,10 @@ def test_an_interrupted_scan_says_how_to_resume_and_does(
     assert code == 130, complaint
     assert without_progress(complaint).count("\n") == 1, complaint
     assert f"Go on with: dsl-scan resume {scan}" in complaint
-    assert lines <= FRAMES - len(SessionReader(scan).missing()) < FRAMES
+    assert lines <= FRAMES - len(ScanReader(scan).missing()) < FRAMES
     assert give("reconstruct", scan).code == 2
     assert give("resume", scan, "--json").json["state"] == "finished"
-    whole, mended = SessionReader(unbroken), SessionReader(scan)
+    whole, mended = ScanReader(unbroken), ScanReader(scan)
     assert whole.plan.shot_count == FRAMES
     for shot in whole.plan.shots():
         np.testing.assert_array_equal(mended.read(shot), whole.read(shot))
@@ -100,4 +100,4 @@ def test_a_scan_of_another_scene_is_not_mixed_in(give: Give, scan_copy: Path) ->
     ending = give("resume", scan_copy, "--rig", "twin", *moved)
     assert ending.code == 2
     assert "changed since the scan stopped" in ending.sentence
-    assert len(SessionReader(scan_copy).missing()) == 1
+    assert len(ScanReader(scan_copy).missing()) == 1

@@ -11,8 +11,8 @@ from dsl_core.errors import CalibrationError, DecodeError, StoreError
 from dsl_core.io.calibration_library import HOME_VARIABLE, CalibrationLibrary
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.io.result.result_file import save_result
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import model_notes, rig_notes
-from dsl_core.io.scan.session import SessionReader
 from dsl_core.model.plan import CapturePlan, GrayCode, Setting
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.workflows.inspection import find_session, intensity_graph, read_block
@@ -75,7 +75,7 @@ def test_the_model_is_that_of_the_calibration_of_the_result(
     result: ResultArrays, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(HOME_VARIABLE, str(tmp_path))
-    own = SessionReader(find_session(result)).calibration
+    own = ScanReader(find_session(result)).calibration
     assert own is not None
     other = own.model_copy(update={"white_scale": own.white_scale * 1.5})
     attributes = {**result.attributes, **model_notes(other, "grating")}

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.check import find_problems
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 
 KILLS = 20
 ROOT = Path(__file__).parents[2]
@@ -69,14 +69,14 @@ class Server:
 
 
 def _frames(folder: Path) -> NDArray[np.uint16]:
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     return reader.read_stack(reader.plan.shots())
 
 
 def _frames_left(folder: Path) -> int:
     """Missing frames; -1 when the scan was killed before its session existed."""
     try:
-        return len(SessionReader(folder).missing())
+        return len(ScanReader(folder).missing())
     except StoreError:
         return -1
 
@@ -115,7 +115,7 @@ def test_twenty_killed_scans_resume_to_the_unbroken_one(server: Server, folder: 
         server.scan(scan, kill_after=(int(moment), moment % 1 * duration_s / len(unbroken)))
         left.append(_frames_left(scan))
         assert server.scan(scan) == 0
-        assert find_problems(SessionReader(scan), verify=True) == []
+        assert find_problems(ScanReader(scan), verify=True) == []
         np.testing.assert_array_equal(_frames(scan), unbroken)
     # The kills must have hit scans under way, at many different frames.
     assert len({count for count in left if count > 0}) >= KILLS // 2, left

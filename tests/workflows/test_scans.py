@@ -11,7 +11,7 @@ from dsl_core.capture.drift import pick_reference_shots
 from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.workflows.scans import prepare_resume, resume
@@ -41,36 +41,36 @@ def _taken(scene: int) -> MemorySink:
 def folder(tmp_path: Path) -> Path:
     """A finished scan of scene 1."""
     taken = _taken(1)
-    with SessionWriter.create(tmp_path / "scan.dsl", PLAN, replay_rig(taken)) as writer:
+    with ScanWriter.create(tmp_path / "scan.dsl", PLAN, replay_rig(taken)) as writer:
         for shot in PLAN.shots():
             writer.write(shot, taken.frames[shot.index])
     return tmp_path / "scan.dsl"
 
 
 def _damage(folder: Path, index: int) -> None:
-    path = SessionReader(folder).store.path(index)
+    path = ScanReader(folder).store.path(index)
     path.write_bytes(path.read_bytes()[:-5])
 
 
 def test_a_damaged_frame_that_would_show_drift_is_taken_again(folder: Path) -> None:
     for shot in pick_reference_shots(PLAN.shots()):
         _damage(folder, shot.index)
-    SessionReader(folder).store.path(PLAN.shot_count - 1).unlink()
+    ScanReader(folder).store.path(PLAN.shot_count - 1).unlink()
     resume(replay_rig(_taken(1)), folder)
-    assert SessionReader(folder).sound() == set(range(PLAN.shot_count))
+    assert ScanReader(folder).sound() == set(range(PLAN.shot_count))
 
 
 def test_damage_alone_calls_for_a_look_at_the_scene(folder: Path) -> None:
     _damage(folder, PLAN.shot_count - 1)
     with pytest.raises(DeviceError, match="changed since the scan stopped"):
         resume(replay_rig(_taken(2)), folder)
-    assert SessionReader(folder).sound() == set(range(PLAN.shot_count - 1))
+    assert ScanReader(folder).sound() == set(range(PLAN.shot_count - 1))
 
 
 def test_a_resumed_scan_has_its_own_calibration_and_the_rig_of_the_caller_stays(tmp_path: Path) -> None:
     own, other = (small_rig().model_copy(update={"name": name}) for name in ("own", "other"))
     taken = _taken(1)
-    with SessionWriter.create(tmp_path / "scan.dsl", PLAN, replay_rig(taken, own)):
+    with ScanWriter.create(tmp_path / "scan.dsl", PLAN, replay_rig(taken, own)):
         pass
     mine = replay_rig(taken, other)
     resumed, plan = prepare_resume(mine, tmp_path / "scan.dsl")
@@ -82,4 +82,4 @@ def test_a_resumed_scan_has_its_own_calibration_and_the_rig_of_the_caller_stays(
 
 def test_a_whole_scan_is_left_as_it_is(folder: Path) -> None:
     resume(replay_rig(_taken(2)), folder)
-    assert SessionReader(folder).sound() == set(range(PLAN.shot_count))
+    assert ScanReader(folder).sound() == set(range(PLAN.shot_count))

@@ -15,7 +15,7 @@ from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import DslError
 from dsl_core.io.atomic import store_error
 from dsl_core.io.campaign_folder import CampaignFolder
-from dsl_core.io.scan.lock import SessionLock
+from dsl_core.io.scan.lock import FolderLock
 from dsl_core.progress import Progress
 
 
@@ -102,12 +102,12 @@ class CampaignLock:
     """One writer for each campaign, among all windows and commands of this computer."""
 
     def __init__(self) -> None:
-        self._lock: SessionLock | None = None
+        self._lock: FolderLock | None = None
 
     def take(self, folder: Path) -> None:
         """Lock it; raises `StoreError` when another process writes it, or the folder is read-only."""
         try:
-            self._lock = SessionLock(folder / "lock")
+            self._lock = FolderLock(folder / "lock")
         except OSError as error:
             raise store_error(folder / "lock", error) from error
 

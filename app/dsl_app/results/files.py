@@ -13,10 +13,10 @@ from dsl_core.io.result.result_arrays import ResultArrays
 
 def is_complete(session: Path) -> bool:
     """Whether a scan lacks no frame; who reconstructs it complains of one that cannot be read."""
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
 
     try:
-        return not SessionReader(session).missing()
+        return not ScanReader(session).missing()
     except DslError:
         return True
 

@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from dsl_app.connection.state import RigChoice
+from dsl_core.io.scan.folder import SUFFIX
 from dsl_core.io.scan.origin import rig_of_notes
-from dsl_core.io.scan.session import SUFFIX
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
 from dsl_core.model.presets import name_of
 

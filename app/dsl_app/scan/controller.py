@@ -289,11 +289,11 @@ class ScanController:
     def _remember(self, folder: Path) -> bool:
         """Offer to resume a scan that lacks frames; False when there is nothing to resume."""
         from dsl_core.io import MANIFEST_NAME
-        from dsl_core.io.scan.session import SessionReader
+        from dsl_core.io.scan.folder import ScanReader
 
         if not (folder / MANIFEST_NAME).is_file():
             return False
-        reader = SessionReader(folder)
+        reader = ScanReader(folder)
         missing, total = len(reader.missing()), reader.plan.shot_count
         if not missing:
             return False

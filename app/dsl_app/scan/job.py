@@ -93,9 +93,9 @@ class ScanJob:
 
     def _read_before(self, graphs: IntensityGraphs, progress: Progress) -> None:
         """Add the frames of earlier runs to the graphs."""
-        from dsl_core.io.scan.session import SessionReader
+        from dsl_core.io.scan.folder import ScanReader
 
-        reader = SessionReader(self.request.folder)
+        reader = ScanReader(self.request.folder)
         sound = reader.sound()
         there = [s for s in reader.plan.shots() if s.role == "spectral" and s.index in sound]
         for done, shot in enumerate(there):

@@ -27,7 +27,7 @@ from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.scan.estimate import estimate
-from dsl_core.io.scan.session import SUFFIX
+from dsl_core.io.scan.folder import SUFFIX
 from dsl_core.model.plan import CapturePlan, GrayCode
 from dsl_core.model.presets import PRESETS, on_cycles
 from dsl_core.model.rig import Rig

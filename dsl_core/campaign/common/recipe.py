@@ -18,7 +18,7 @@ from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import store_error, write_atomic
 from dsl_core.io.campaign_folder import read_record
-from dsl_core.io.scan.reader import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
@@ -65,9 +65,9 @@ class Bench:
         """Whether the scan of a step is complete."""
         return self._is_begun(step) and not self.scan_of(step).missing()
 
-    def scan_of(self, step: Step) -> SessionReader:
+    def scan_of(self, step: Step) -> ScanReader:
         """The scan of a step; raises `StoreError`."""
-        return SessionReader(self.step_folder(step) / SCAN_NAME)
+        return ScanReader(self.step_folder(step) / SCAN_NAME)
 
     def scan(self, step: Step, make_plan: Callable[[], CapturePlan], progress: Progress) -> CapturePlan:
         """Scan a step and return the plan; a scan that was begun continues with its own plan."""

@@ -6,14 +6,14 @@ from collections.abc import Iterator
 
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.capture_log import LogEntry
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.plan import Shot, describe_shot
 
 #: A camera may round the exposure it was asked for by this share.
 EXPOSURE_TOLERANCE = 0.05
 
 
-def find_problems(reader: SessionReader, verify: bool = False) -> list[str]:
+def find_problems(reader: ScanReader, verify: bool = False) -> list[str]:
     """Sentences about missing, extra, repeated or wrongly exposed frames, in this order.
 
     With ``verify`` every frame is also read and compared with its checksum (truncated, damaged, swapped).
@@ -22,7 +22,7 @@ def find_problems(reader: SessionReader, verify: bool = False) -> list[str]:
     return [*found, *_unreadable(reader)] if verify else found
 
 
-def require_complete(reader: SessionReader) -> None:
+def require_complete(reader: ScanReader) -> None:
     """Raise `StoreError` with the first problem, and how many more there are, unless all is well."""
     found = find_problems(reader)
     if found:
@@ -30,7 +30,7 @@ def require_complete(reader: SessionReader) -> None:
         raise StoreError(found[0] + more)
 
 
-def _missing(reader: SessionReader) -> Iterator[str]:
+def _missing(reader: ScanReader) -> Iterator[str]:
     shots = reader.missing()
     if shots:
         yield (
@@ -39,7 +39,7 @@ def _missing(reader: SessionReader) -> Iterator[str]:
         )
 
 
-def _extra(reader: SessionReader) -> Iterator[str]:
+def _extra(reader: ScanReader) -> Iterator[str]:
     count = reader.plan.shot_count
     extra = sorted(i for i in reader.store.stored() | set(reader.entries) if i >= count)
     if extra:
@@ -50,7 +50,7 @@ def _extra(reader: SessionReader) -> Iterator[str]:
         )
 
 
-def _wrong_exposure(reader: SessionReader) -> Iterator[str]:
+def _wrong_exposure(reader: ScanReader) -> Iterator[str]:
     for shot in reader.plan.shots():
         entry = reader.entries.get(shot.index)
         if entry and abs(entry.exposure_ms - shot.exposure_ms) > EXPOSURE_TOLERANCE * shot.exposure_ms:
@@ -60,7 +60,7 @@ def _wrong_exposure(reader: SessionReader) -> Iterator[str]:
             )
 
 
-def _repeated(reader: SessionReader) -> Iterator[str]:
+def _repeated(reader: ScanReader) -> Iterator[str]:
     before: tuple[Shot, LogEntry] | None = None
     for shot in reader.plan.shots():
         entry = reader.entries.get(shot.index)
@@ -85,7 +85,7 @@ def _is_repeat(before: LogEntry, entry: LogEntry) -> bool:
     return before.crc32 == entry.crc32 and not clipped and entry.attempts == 1
 
 
-def _unreadable(reader: SessionReader) -> Iterator[str]:
+def _unreadable(reader: ScanReader) -> Iterator[str]:
     present = set(reader.entries) & reader.store.stored()
     for shot in reader.plan.shots():
         if shot.index in present:
@@ -95,9 +95,9 @@ def _unreadable(reader: SessionReader) -> Iterator[str]:
                 yield str(error)
 
 
-def _name(reader: SessionReader, shot: Shot) -> str:
+def _name(reader: ScanReader, shot: Shot) -> str:
     return f"{describe_shot(shot).capitalize()} of {reader.folder}"
 
 
-def _remedy(reader: SessionReader, shot: Shot) -> str:
+def _remedy(reader: ScanReader, shot: Shot) -> str:
     return f"Delete {reader.store.path(shot.index)} and resume the scan to take it again."

@@ -34,7 +34,7 @@ def checksum(pixels: NDArray[np.uint16]) -> int:
 
 
 class ChunkError(Exception):
-    """What is wrong with the file of a frame, as half a sentence; `SessionReader` makes it whole."""
+    """What is wrong with the file of a frame, as half a sentence; `ScanReader` makes it whole."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dsl_core.io.atomic import write_all
 _LOCK_BYTE = 1 << 20
 
 
-class SessionLock:
+class FolderLock:
     """Held from construction to `release`; a lock left by a killed process is free at once."""
 
     def __init__(self, path: Path) -> None:

@@ -21,7 +21,7 @@ from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.scan.lock import SessionLock
+from dsl_core.io.scan.lock import FolderLock
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.model.frames import Frame
@@ -329,7 +329,7 @@ def test_only_one_calibration_runs_at_a_time(bench: CalibrateBench) -> None:
     control.leave()
     bench.control.run("geometry")
     assert "needs selftest" in bench.told, "what it needs is named, and the wizard does not open"
-    lock = SessionLock(bench.campaign / "lock")
+    lock = FolderLock(bench.campaign / "lock")
     bench.control.run("selftest")
     assert "written by another process" in bench.told
     lock.release()

@@ -13,7 +13,7 @@ from dsl_app.scan.state import Phase
 
 from dsl_core.errors import DeviceError
 from dsl_core.io.result.result_file import load_result
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.frames import Frame
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.doubles import InlineRunner
@@ -85,7 +85,7 @@ def test_the_live_demo_connects_the_twin_and_scans(bench: Bench, tmp_path: Path)
     assert state.preset is not None
     assert state.preset.key == "preview"
     folder = tmp_path / "demo" / "scan-20260301-1020.dsl"
-    assert not SessionReader(folder).missing()
+    assert not ScanReader(folder).missing()
     # Scans of a person go where they went before.
     assert state.target.value == tmp_path / "scan-20260301-1020.dsl"
 

@@ -27,7 +27,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QFileDialo
 from pytestqt.qtbot import QtBot
 from shiboken6 import isValid
 
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.faults import FaultPlan, with_faults
 from dsl_core.simulation.sim_devices import SimCamera
@@ -141,7 +141,7 @@ def test_clicking_everything_while_a_scan_runs_loses_nothing(
     bench.wait(lambda: state.phase.value is Phase.DONE)
     assert not caught
     (session,) = (tmp_path / "scans").glob("*.dsl")
-    assert not SessionReader(session).missing()
+    assert not ScanReader(session).missing()
 
 
 def test_closing_during_a_scan_asks_and_the_frames_stay(
@@ -167,7 +167,7 @@ def test_closing_during_a_scan_asks_and_the_frames_stay(
     assert bench.window.close()
     assert "can be resumed" in asked[1]
     (session,) = (tmp_path / "scans").glob("*.dsl")
-    reader = SessionReader(session)
+    reader = ScanReader(session)
     assert reader.plan.shot_count > len(reader.missing()) > 0
 
 

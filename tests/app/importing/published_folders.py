@@ -9,7 +9,7 @@ from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.published import export_calibration
 from dsl_core.io.rig_file import save_rig
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.presets import PRESETS
 from dsl_core.workflows import exchange
 
@@ -48,7 +48,7 @@ def make_folders(folder: Path) -> Folders:
     made = Folders(folder)
     with open_rig("twin", {"scene": "plane", "size": "64x48"}) as devices:
         pipeline.scan(devices, pipeline.fit_plan(QUICK, devices), made.scan)
-    calibration = SessionReader(made.scan).calibration
+    calibration = ScanReader(made.scan).calibration
     assert calibration is not None
     exchange.export_scan(made.scan, made.scene)
     export_calibration(calibration, made.rig)

@@ -19,7 +19,7 @@ from dsl_core.errors import Cancelled
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.published import FileRecord
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.progress import CallbackProgress
 from tests.app.importing.published_folders import Folders, make_folders
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
@@ -97,7 +97,7 @@ def test_a_dataset_becomes_a_scan_with_the_calibration_of_its_rig(bench: Bench, 
     assert bench.trouble == ""
     assert bench.control.start()
     assert bench.done == [bench.home / "scene.dsl"]
-    before, after = SessionReader(made.scan), SessionReader(bench.done[0])
+    before, after = ScanReader(made.scan), ScanReader(bench.done[0])
     for shot in before.plan.shots():
         np.testing.assert_array_equal(after.read(shot), before.read(shot))
     assert [path.name for path in bench.home.iterdir()] == ["scene.dsl"]

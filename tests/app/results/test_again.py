@@ -16,7 +16,7 @@ from dsl_core.cli import main
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import save_rig
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.rig import Rig
 from tests.app.support.compare_bench import make_result
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
@@ -47,7 +47,7 @@ class Bench:
 
     @property
     def rig(self) -> Rig:
-        calibration = SessionReader(self.folder / "small.dsl").calibration
+        calibration = ScanReader(self.folder / "small.dsl").calibration
         assert calibration is not None
         return calibration
 

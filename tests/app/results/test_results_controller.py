@@ -13,7 +13,7 @@ from dsl_app.shared.undo import UndoStack
 from dsl_core.io.result.annotations_file import load_annotations
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 from tests.app.support.small_result import BLUE, DARK, NM, write_reference, write_small_result
-from tests.io.test_reference_file import BRICK, write_library
+from tests.io.spectra.test_reference_file import BRICK, write_library
 
 SQUARE = ((1.5, 5.5), (6.5, 5.5), (6.5, 9.5), (1.5, 9.5))
 

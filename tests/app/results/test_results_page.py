@@ -46,7 +46,7 @@ from dsl_core.evaluation.marks import on_screen
 from dsl_core.workflows.inspection import IntensityGraph
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.small_result import BLUE, DARK, NM, RED, UNREACHED, write_reference, write_small_result
-from tests.io.test_reference_file import write_library
+from tests.io.spectra.test_reference_file import write_library
 
 
 def move(widget: QWidget, to: QPoint, buttons: Qt.MouseButton = Qt.MouseButton.NoButton) -> None:

@@ -18,7 +18,7 @@ from dsl_core.cli.options import PlanChoice
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DecodeError, DeviceError, DslError, StoreError
 from dsl_core.io.calibration_library import LibraryEntry
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb, Shot
 from dsl_core.model.presets import PRESETS
@@ -120,7 +120,7 @@ def test_a_scan_is_stored_and_the_next_has_another_name(bench: ScanBench, tmp_pa
     bench.scans.start()
     assert phase(bench) is Phase.DONE
     assert bench.state.status.value.done == FRAMES
-    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert ScanReader(tmp_path / "first.dsl").missing() == []
     assert bench.state.target.value == tmp_path / "scan-20260301-1020.dsl"
     assert bench.state.picture.value is not None
 
@@ -179,7 +179,7 @@ def test_a_lost_camera_keeps_all_frames_and_the_scan_goes_on_later(
     bench.scans.start()
     assert phase(bench) is Phase.DONE
     assert bench.state.trouble.value == ""
-    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert ScanReader(tmp_path / "first.dsl").missing() == []
 
 
 def test_a_scan_goes_on_over_a_damaged_frame(
@@ -188,13 +188,13 @@ def test_a_scan_goes_on_over_a_damaged_frame(
     with monkeypatch.context() as lost:
         fail_from(lost, FRAMES - 3)
         bench.scans.start()
-    reader = SessionReader(tmp_path / "first.dsl")
+    reader = ScanReader(tmp_path / "first.dsl")
     damaged = next(shot for shot in reader.plan.shots() if shot.role == "spectral")
     path = reader.store.path(damaged.index)
     path.write_bytes(path.read_bytes()[:-5])
     bench.scans.start()
     assert phase(bench) is Phase.DONE
-    assert len(SessionReader(tmp_path / "first.dsl").sound()) == FRAMES
+    assert len(ScanReader(tmp_path / "first.dsl").sound()) == FRAMES
 
 
 def test_a_scene_that_moved_meanwhile_is_refused(
@@ -298,7 +298,7 @@ def test_a_calibration_of_other_settings_needs_an_override(bench: ScanBench, tmp
     assert "--calibration bench --override-calibration" in bench.scans.command_line()
     bench.scans.start()
     assert phase(bench) is Phase.DONE
-    assert "gain" in SessionReader(tmp_path / "first.dsl").manifest.notes["calibration_overridden"]
+    assert "gain" in ScanReader(tmp_path / "first.dsl").manifest.notes["calibration_overridden"]
     assert devices.calibration.conditions is None
 
 
@@ -318,7 +318,7 @@ def test_a_calibration_chosen_during_a_scan_is_for_the_next(
     assert [text for _, text in bench.notifier.told] == [
         "The running scan keeps its calibration. Later scans use bench."
     ]
-    taken = SessionReader(tmp_path / "first.dsl").calibration
+    taken = ScanReader(tmp_path / "first.dsl").calibration
     assert taken is not None
     assert taken.name == own.name
     assert bench.state.calibration.value.key == "bench"
@@ -386,22 +386,22 @@ def test_the_command_line_makes_the_same_plan(bench: ScanBench, preset: object, 
 def test_a_disk_that_fills_up_on_the_way_interrupts_and_loses_nothing(
     bench: ScanBench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    write = SessionWriter.write
+    write = ScanWriter.write
 
-    def full(self: SessionWriter, shot: Shot, frame: Frame) -> None:
+    def full(self: ScanWriter, shot: Shot, frame: Frame) -> None:
         if shot.index >= 20:
             raise StoreError("The disk is full. Free some space.")
         write(self, shot, frame)
 
     with monkeypatch.context() as filling:
-        filling.setattr(SessionWriter, "write", full)
+        filling.setattr(ScanWriter, "write", full)
         bench.scans.start()
     assert phase(bench) is Phase.LOST
     assert "The disk is full" in bench.state.trouble.value
     assert (bench.rig.state.link.value, bench.state.reconnection.value) == (Link.OPEN, Reconnection.NONE)
     assert f"20 of {FRAMES} frames are saved" in bench.state.trouble.value
     bench.scans.start()
-    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert ScanReader(tmp_path / "first.dsl").missing() == []
 
 
 @dataclass

@@ -25,7 +25,7 @@ from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import DeviceError
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import LineComb
 from dsl_core.model.presets import PRESETS
@@ -102,7 +102,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     assert page.run.pause.text() == "&Continue"
     click(page.run.pause)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
-    assert SessionReader(tmp_path / "first.dsl").missing() == []
+    assert ScanReader(tmp_path / "first.dsl").missing() == []
     assert page.plan.isEnabled()
     assert f"{FRAMES} of {FRAMES}" in page.run._what.text()
 
@@ -182,7 +182,7 @@ def test_closing_the_window_during_a_scan_loses_no_frame(qtbot: QtBot, tmp_path:
     qtbot.waitUntil(begun, timeout=60_000)
     bench.scans.pause()
     runner.shut_down()
-    reader = SessionReader(tmp_path / "first.dsl")
+    reader = ScanReader(tmp_path / "first.dsl")
     assert len(list(reader.plan.shots())) - len(reader.missing()) >= seen
 
 

@@ -117,7 +117,7 @@ def read_source(path: Path, library: tuple[str, ...]) -> AgainSource:
     """What the choices depend on, of a scan or of the scan of a result; raises `StoreError`."""
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.check import require_complete
-    from dsl_core.io.scan.session import SessionReader
+    from dsl_core.io.scan.folder import ScanReader
     from dsl_core.reconstruction.torch_device import has_cuda
     from dsl_core.workflows.inspection import session_of
 
@@ -132,7 +132,7 @@ def read_source(path: Path, library: tuple[str, ...]) -> AgainSource:
                 f"{path.name} is no scan. Choose a folder NAME.dsl with all of its frames,"
                 " or open its result first."
             )
-    reader = SessionReader(session)
+    reader = ScanReader(session)
     require_complete(reader)
     if before is None or kind_of(before) is not Kind.RESULT:
         before = None

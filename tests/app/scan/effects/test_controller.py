@@ -14,7 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from dsl_core.io.scan.session import SessionReader
+from dsl_core.io.scan.folder import ScanReader
 from dsl_core.simulation.effects.catalogue import NAMES, NEEDED, USUAL
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.sim_devices import SimCamera
@@ -84,7 +84,7 @@ def test_a_choice_is_put_in_force_by_options_that_scans_note(
     assert "--option effects=auto" in bench.scans.command_line()
     bench.scans.start()
     assert bench.state.phase.value is Phase.DONE
-    notes = SessionReader(tmp_path / "first.dsl").manifest.notes
+    notes = ScanReader(tmp_path / "first.dsl").manifest.notes
     assert '"choice": "auto"' in notes["effects"]
     control.apply("usual", ONE_DN)
     assert bench.rig.state.choice.value == TWIN

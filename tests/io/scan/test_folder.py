@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.scan import session
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 
@@ -22,7 +21,7 @@ FrameOf = Callable[[Shot], Frame]
 
 
 def test_frames_come_back_as_written(session: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
-    reader = SessionReader(session)
+    reader = ScanReader(session)
     shots = list(plan.shots())
     assert reader.plan == plan
     assert reader.missing() == []
@@ -31,7 +30,7 @@ def test_frames_come_back_as_written(session: Path, plan: CapturePlan, frame_of:
 
 
 def test_bulk_reading_keeps_the_order_asked_for(session: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
-    reader = SessionReader(session)
+    reader = ScanReader(session)
     shots = list(plan.shots())[::-1]
     wanted = np.stack([frame_of(shot).pixels for shot in shots])
     many = list(reader.read_many(shots, threads=2))
@@ -57,11 +56,11 @@ def test_resume_goes_on_at_the_first_missing_frame(
 ) -> None:
     folder = tmp_path / "scan.dsl"
     shots = list(plan.shots())
-    with SessionWriter.create(folder, plan) as writer:
+    with ScanWriter.create(folder, plan) as writer:
         for shot in shots[:5]:
             writer.write(shot, frame_of(shot))
-    assert SessionReader(folder).missing() == shots[5:]
-    with SessionWriter.open(folder, plan) as writer:
+    assert ScanReader(folder).missing() == shots[5:]
+    with ScanWriter.open(folder, plan) as writer:
         assert list(writer.missing()) == shots[5:]
 
 
@@ -70,28 +69,28 @@ def test_a_torn_last_line_is_dropped_and_cut_off(
 ) -> None:
     folder = tmp_path / "scan.dsl"
     shots = list(plan.shots())
-    with SessionWriter.create(folder, plan) as writer:
+    with ScanWriter.create(folder, plan) as writer:
         for shot in shots[:3]:
             writer.write(shot, frame_of(shot))
     log = folder / "frames.jsonl"
     whole = log.read_bytes()
     for cut in (1, 10, len(whole.splitlines()[-1])):
         log.write_bytes(whole[:-cut])
-        with SessionWriter.resume(folder, plan) as writer:
+        with ScanWriter.resume(folder, plan) as writer:
             assert list(writer.missing()) == shots[2:]
             assert log.read_bytes() == b"".join(whole.splitlines(keepends=True)[:2])
             writer.write(shots[2], frame_of(shots[2]))
-        assert SessionReader(folder).missing() == shots[3:]
+        assert ScanReader(folder).missing() == shots[3:]
 
 
 def test_a_chunk_without_its_line_or_damaged_is_taken_again(session: Path, plan: CapturePlan) -> None:
     shots = list(plan.shots())
     log = session / "frames.jsonl"
     log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:-1]))
-    damaged = SessionReader(session).store.path(4)
+    damaged = ScanReader(session).store.path(4)
     damaged.write_bytes(damaged.read_bytes()[:-3])
-    SessionReader(session).store.path(6).unlink()
-    with SessionWriter.resume(session) as writer:
+    ScanReader(session).store.path(6).unlink()
+    with ScanWriter.resume(session) as writer:
         assert list(writer.missing()) == [shots[4], shots[6], shots[-1]]
 
 
@@ -101,7 +100,7 @@ def test_a_damaged_line_in_the_middle_is_named(session: Path) -> None:
     lines[2] = b'{"shot": oops}\n'
     log.write_bytes(b"".join(lines))
     with pytest.raises(StoreError, match=r"Line 3 of .*frames.jsonl is damaged"):
-        SessionReader(session)
+        ScanReader(session)
 
 
 def test_another_plan_is_refused_and_the_field_named(session: Path, plan: CapturePlan) -> None:
@@ -110,23 +109,23 @@ def test_another_plan_is_refused_and_the_field_named(session: Path, plan: Captur
     with pytest.raises(
         StoreError, match=r"plan\.settings\[1\]\.exposure_ms is 20\.0 in the session and 25\.0 now"
     ):
-        SessionWriter.open(session, other)
-    with SessionWriter.open(session, plan):
+        ScanWriter.open(session, other)
+    with ScanWriter.open(session, plan):
         pass  # the refusal gave its lock back
 
 
 def test_create_never_overwrites(session: Path, plan: CapturePlan, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="already holds a scan"):
-        SessionWriter.create(session, plan)
+        ScanWriter.create(session, plan)
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
     with pytest.raises(StoreError, match="is not a session"):
-        SessionWriter.create(tmp_path / "thesis", plan)
+        ScanWriter.create(tmp_path / "thesis", plan)
 
 
 def test_reading_something_else_says_what_to_give(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"no manifest.json. Give the folder"):
-        SessionReader(tmp_path)
+        ScanReader(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +134,7 @@ def test_reading_something_else_says_what_to_give(tmp_path: Path) -> None:
 def test_a_damaged_manifest_is_one_sentence(session: Path, content: bytes, where: str) -> None:
     (session / "manifest.json").write_bytes(content)
     with pytest.raises(StoreError, match=f"damaged or from another version: {where}"):
-        SessionReader(session)
+        ScanReader(session)
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((16, 25), np.uint16), np.zeros((16, 24), np.float32)])
@@ -144,7 +143,7 @@ def test_frames_of_another_size_or_type_are_refused(
 ) -> None:
     shot = next(plan.shots())
     with (
-        SessionWriter.create(tmp_path / "scan.dsl", plan) as writer,
+        ScanWriter.create(tmp_path / "scan.dsl", plan) as writer,
         pytest.raises(StoreError, match="but the session takes uint16"),
     ):
         writer.write(shot, Frame(pixels, 10.0))  # type: ignore[arg-type]
@@ -152,33 +151,33 @@ def test_frames_of_another_size_or_type_are_refused(
 
 def test_two_writers_do_not_share_a_session(tmp_path: Path, plan: CapturePlan) -> None:
     with (
-        SessionWriter.create(tmp_path / "scan.dsl", plan),
+        ScanWriter.create(tmp_path / "scan.dsl", plan),
         pytest.raises(StoreError, match=f"another process .number {os.getpid()}"),
     ):
-        SessionWriter.open(tmp_path / "scan.dsl", plan)
-    SessionWriter.open(tmp_path / "scan.dsl", plan).close()
+        ScanWriter.open(tmp_path / "scan.dsl", plan)
+    ScanWriter.open(tmp_path / "scan.dsl", plan).close()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
 def test_the_lock_of_a_killed_process_is_free(tmp_path: Path, plan: CapturePlan) -> None:
     folder = tmp_path / "scan.dsl"
-    SessionWriter.create(folder, plan).close()
+    ScanWriter.create(folder, plan).close()
     code = (
-        "import sys, os; from pathlib import Path; from dsl_core.io.scan.lock import SessionLock\n"
-        "lock = SessionLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()"
+        "import sys, os; from pathlib import Path; from dsl_core.io.scan.lock import FolderLock\n"
+        "lock = FolderLock(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()"
     )
     with subprocess.Popen(
         [sys.executable, "-c", code, str(folder / "lock")],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        cwd=Path(__file__).parents[2],
+        cwd=Path(__file__).parents[3],
     ) as holder:
         assert holder.stdout is not None
         assert holder.stdout.readline() == b"held\n"
         with pytest.raises(StoreError, match=f"number {holder.pid}"):
-            SessionWriter.open(folder, plan)
+            ScanWriter.open(folder, plan)
         holder.kill()
-    SessionWriter.open(folder, plan).close()
+    ScanWriter.open(folder, plan).close()
 
 
 def test_too_small_a_disk_is_told_before_the_start(
@@ -187,7 +186,7 @@ def test_too_small_a_disk_is_told_before_the_start(
     usage = type("Usage", (), {"free": 1 << 20})()
     monkeypatch.setattr("shutil.disk_usage", lambda place: usage)
     with pytest.raises(StoreError, match=r"needs about \d+ MB .* has 1 MB free"):
-        SessionWriter.create(tmp_path / "scan.dsl", plan)
+        ScanWriter.create(tmp_path / "scan.dsl", plan)
     assert not (tmp_path / "scan.dsl").exists()
 
 
@@ -197,7 +196,7 @@ def test_a_full_disk_loses_nothing_and_is_resumable(
 ) -> None:
     folder = tmp_path / "scan.dsl"
     shots = list(plan.shots())
-    with SessionWriter.create(folder, plan) as writer:
+    with ScanWriter.create(folder, plan) as writer:
         for shot in shots[:4]:
             writer.write(shot, frame_of(shot))
         with monkeypatch.context() as patch:
@@ -207,11 +206,11 @@ def test_a_full_disk_loses_nothing_and_is_resumable(
     assert not list((folder / "frames").glob("*.partial"))
     assert (folder / "frames.jsonl").read_bytes().count(b"\n") == 4
     assert (folder / "frames.jsonl").read_bytes().endswith(b"\n")
-    with SessionWriter.resume(folder, plan) as writer:
+    with ScanWriter.resume(folder, plan) as writer:
         assert list(writer.missing()) == shots[4:]
         for shot in writer.missing():
             writer.write(shot, frame_of(shot))
-    reader = SessionReader(folder)
+    reader = ScanReader(folder)
     for shot in shots:
         np.testing.assert_array_equal(reader.read(shot), frame_of(shot).pixels)
 
@@ -250,13 +249,13 @@ def test_a_really_full_disk_loses_nothing(
     mount = ["mount", "-t", "tmpfs", "-o", "size=48k", "tmpfs", str(disk)]
     if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
         pytest.skip("mounting a small file system needs root")
-    monkeypatch.setattr(session, "check_space", lambda *_: None)
+    monkeypatch.setattr("dsl_core.io.scan.folder.check_space", lambda *_: None)
     folder = disk / "scan.dsl"
     shots = list(plan.shots())
     stored: list[Shot] = []
     ballast = disk / "ballast"
     try:
-        with SessionWriter.create(folder, plan) as writer:
+        with ScanWriter.create(folder, plan) as writer:
             ballast.write_bytes(b"x" * 20_000)
 
             def write_until_full() -> None:
@@ -267,13 +266,13 @@ def test_a_really_full_disk_loses_nothing(
             with pytest.raises(StoreError, match="The disk is full"):
                 write_until_full()
         assert 0 < len(stored) < len(shots)
-        assert SessionReader(folder).missing() == shots[len(stored) :]
+        assert ScanReader(folder).missing() == shots[len(stored) :]
         ballast.unlink()
-        with SessionWriter.resume(folder) as writer:
+        with ScanWriter.resume(folder) as writer:
             shot = next(writer.missing())
             assert shot == shots[len(stored)]
             writer.write(shot, frame_of(shot))
-        reader = SessionReader(folder)
+        reader = ScanReader(folder)
         for shot in shots[: len(stored) + 1]:
             np.testing.assert_array_equal(reader.read(shot), frame_of(shot).pixels)
     finally:

@@ -15,7 +15,7 @@ from dsl_core.io.published import Stereo, load_stereo, save_stereo
 from dsl_core.io.published.stereo import Dialect, essential_matrix, fundamental_matrix
 from tests.cases.small_rig import small_rig
 
-SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[3] / "shared"))
+SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[4] / "shared"))
 REAL = SHARED / "data" / "procam_checkerboard" / "upstream_calibration_result.xml"
 
 

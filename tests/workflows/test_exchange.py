@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.published import export_dataset
-from dsl_core.io.scan.session import SessionReader, SessionWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.model.rig import Rig
 from dsl_core.progress import CallbackProgress
@@ -48,7 +48,7 @@ def _dataset(folder: Path, scene: int) -> Path:
 
 
 def _holds(session: Path, scene: int) -> bool:
-    reader = SessionReader(session)
+    reader = ScanReader(session)
     return all(np.array_equal(reader.read(shot), Even(scene).read(shot)) for shot in PLAN.shots())
 
 
@@ -67,12 +67,12 @@ def test_another_calibration_is_refused(tmp_path: Path) -> None:
     other: Rig = RIG.model_copy(update={"white_scale": 2 * RIG.white_scale})
     with pytest.raises(StoreError, match="imported with another calibration"):
         exchange.import_scan(dataset, session, other)
-    assert SessionReader(session).calibration == RIG
+    assert ScanReader(session).calibration == RIG
 
 
 def test_a_scan_of_a_rig_is_not_gone_on_with(tmp_path: Path) -> None:
     session = tmp_path / "scan.dsl"
-    SessionWriter.create(session, PLAN).close()
+    ScanWriter.create(session, PLAN).close()
     with pytest.raises(StoreError, match="does not come from the files"):
         exchange.import_scan(_dataset(tmp_path / "chart", 1), session, RIG)
 
@@ -82,7 +82,7 @@ def test_an_interrupted_import_goes_on_also_from_a_folder_that_moved(tmp_path: P
     progress = CallbackProgress(lambda stage, done, total: progress.token.cancel() if done == 3 else None)
     with pytest.raises(Cancelled):
         exchange.import_scan(dataset, session, RIG, progress)
-    assert SessionReader(session).missing()
+    assert ScanReader(session).missing()
     moved = Path(shutil.move(dataset, tmp_path / "archive"))
     exchange.import_scan(moved, session, RIG)
     assert _holds(session, 1)

@@ -12,8 +12,8 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.check import find_problems, require_complete
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.frame_store import FrameStore
-from dsl_core.io.scan.session import SessionReader, SessionWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
 
@@ -21,19 +21,19 @@ FrameOf = Callable[[Shot], Frame]
 
 
 def _only_problem(folder: Path) -> str:
-    found = find_problems(SessionReader(folder), verify=True)
+    found = find_problems(ScanReader(folder), verify=True)
     assert len(found) == 1, found
     return found[0]
 
 
 def _write(folder: Path, plan: CapturePlan, frames: dict[int, Frame]) -> None:
-    with SessionWriter.create(folder, plan) as writer:
+    with ScanWriter.create(folder, plan) as writer:
         for shot in writer.missing():
             writer.write(shot, frames[shot.index])
 
 
 def test_a_sound_session_has_no_problems(session: Path) -> None:
-    reader = SessionReader(session)
+    reader = ScanReader(session)
     assert find_problems(reader, verify=True) == []
     require_complete(reader)
 
@@ -45,9 +45,9 @@ def test_missing(session: Path) -> None:
     assert "frame 3 (code pattern 3, setting 0)" in problem
     assert "Resume" in problem
     with pytest.raises(StoreError, match="lacks 1 of"):
-        require_complete(SessionReader(session))
+        require_complete(ScanReader(session))
     with pytest.raises(StoreError, match=r"Frame 3 .* cannot be used: its file .*c\.3\.0\.0 cannot be read"):
-        SessionReader(session).read(list(SessionReader(session).plan.shots())[3])
+        ScanReader(session).read(list(ScanReader(session).plan.shots())[3])
 
 
 def test_extra(session: Path) -> None:
@@ -80,7 +80,7 @@ def test_swapped(session: Path) -> None:
     a.rename(spare)
     b.rename(a)
     spare.rename(b)
-    found = find_problems(SessionReader(session), verify=True)
+    found = find_problems(ScanReader(session), verify=True)
     assert len(found) == 2
     assert "holds the picture of frame 7 (swapped or copied)" in found[0]
     assert "holds the picture of frame 2 (swapped or copied)" in found[1]
@@ -104,7 +104,7 @@ def test_metadata_of_another_array(session: Path) -> None:
     path = session / "frames" / "zarr.json"
     path.write_text(path.read_text().replace('"uint16"', '"int32"'))
     with pytest.raises(StoreError, match="gives data_type as int32, but the plan needs uint16"):
-        SessionReader(session)
+        ScanReader(session)
 
 
 @pytest.mark.parametrize("same", ["frame_id", "pixels"])
@@ -124,7 +124,7 @@ def test_equal_pictures_are_believed_when_clipped_or_confirmed(
     frames[1], frames[2] = replace(frames[1], pixels=dark), replace(frames[2], pixels=dark)
     frames[6] = replace(frames[6], pixels=frames[5].pixels, attempts=2)
     _write(tmp_path / "scan.dsl", plan, frames)
-    assert find_problems(SessionReader(tmp_path / "scan.dsl"), verify=True) == []
+    assert find_problems(ScanReader(tmp_path / "scan.dsl"), verify=True) == []
 
 
 def test_frame_numbers_may_start_anew_after_a_resume(
@@ -132,13 +132,13 @@ def test_frame_numbers_may_start_anew_after_a_resume(
 ) -> None:
     folder = tmp_path / "scan.dsl"
     shots = list(plan.shots())
-    with SessionWriter.create(folder, plan) as writer:
+    with ScanWriter.create(folder, plan) as writer:
         writer.write(shots[0], frame_of(shots[0]))
-    with SessionWriter.resume(folder) as writer:
+    with ScanWriter.resume(folder) as writer:
         for shot in shots[1:]:
             frame = frame_of(shot)
             writer.write(shot, replace(frame, frame_id=frame.frame_id - 1))
-    assert find_problems(SessionReader(folder)) == []
+    assert find_problems(ScanReader(folder)) == []
 
 
 def test_wrong_exposure(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
