@@ -19,10 +19,10 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS
 from dsl_core.progress import Progress
 
-#: What the finished scan shows, large enough to look at and small enough to be made while one waits.
+#: What the finished scan shows: large enough to look at and small enough to be made while a person waits.
 SCENE = {"scene": "color-checker", "size": "296x194"}
 PRESET = "quick"
-#: The live scan: the same chart, seen for less than half a minute of the rig's time.
+#: The live scan: the same chart, for less than half a minute.
 LIVE_RIG = RigChoice("twin", tuple(SCENE.items()))
 LIVE_PRESET = "preview"
 SCAN, RESULT = "demo.dsl", "demo.zarr"
@@ -55,10 +55,10 @@ class DemoController:
         if (self._folder / RESULT).exists():
             self._present(self._folder / RESULT)
         elif self._is_made:
-            self._notifier.tell("info", "The demo is being made; it opens by itself when it is ready.")
+            self._notifier.tell("info", "The demo is being made; it opens when it is ready.")
         else:
             self._is_made = True
-            self._notifier.tell("info", "The demo is made for the first time. This takes about a minute.")
+            self._notifier.tell("info", "Making the demo for the first time. This takes about a minute.")
             self._runner.submit(
                 Job("Make the demo", self._make, self._made, self._failed, self._end, exclusive="the demo")
             )
@@ -73,7 +73,7 @@ class DemoController:
         except Cancelled:
             raise
         except DslError:
-            # What another version began, or what was damaged, cannot be gone on with.
+            # A scan of another version, or a damaged one, cannot be resumed.
             shutil.rmtree(session, ignore_errors=True)
             take_demo(session, progress)
         target = self._folder / RESULT
@@ -94,15 +94,15 @@ class DemoController:
     def _present(self, result: Path) -> None:
         self._open_result(result)
         self._notifier.offer(
-            "This is a finished scan of the simulated rig. Point at a patch to see its spectrum; click to pin"
-            " it.",
-            {"Scan one live": self.scan_live},
+            "This is a finished scan of the simulated rig. Point at a patch to see its spectrum; click"
+            " to pin it.",
+            {"Start a live scan": self.scan_live},
         )
 
     # The live one ----------------------------------------------------------------------------------
 
     def scan_live(self) -> None:
-        """Start a short scan of the simulated rig, connecting it where no rig is connected."""
+        """Start a short scan of the simulated rig; connects it if no rig is connected."""
         rig = self._rig.state
         if rig.link.value is Link.OPENING:
             self._when_open()
@@ -113,7 +113,7 @@ class DemoController:
             self._start()
 
     def _when_open(self) -> None:
-        """Start as soon as the rig answers; forget it when it does not."""
+        """Start as soon as the rig is connected; drop the request when it cannot be."""
         link = self._rig.state.link
 
         def judge(now: Link) -> None:
@@ -130,13 +130,13 @@ class DemoController:
         if name != LIVE_RIG.name:
             self._notifier.tell(
                 "info",
-                f"The rig {name} is connected. Disconnect it on the Rig page to see the live demo on the"
-                " simulated rig, or start a scan of your own on the Scan page.",
+                f"The rig {name} is connected. Disconnect it on the Rig page to run the live demo on the"
+                " simulated rig, or start your own scan on the Scan page.",
             )
             return
         scans = self._scan_page()
         if scans.state.phase.value.is_busy:
-            self._notifier.tell("info", "A scan is running already.")
+            self._notifier.tell("info", "A scan is already running.")
             return
         scans.plan_new_scan()
         scans.plans.choose_preset(LIVE_PRESET)
@@ -144,12 +144,12 @@ class DemoController:
         scans.state.then_reconstruct.set(True)
         scans.start()
         if scans.state.phase.value is Phase.PLANNING:
-            # It was refused: what a person starts instead goes where their scans go.
+            # It was refused: the next scan belongs in the person's own folder again.
             scans.plan_new_scan()
 
 
 def take_demo(session: Path, progress: Progress) -> None:
-    """Take the demo's scan on the twin, or go on with it; raises `DslError`."""
+    """Capture the demo's scan on the twin, or resume it; raises `DslError`."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.scan.origin import rig_notes

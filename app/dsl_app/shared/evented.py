@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Event(Generic[T]):
-    """Calls every listener with what happened, in the order they came."""
+    """Calls every listener with what happened, in the order in which they connected."""
 
     def __init__(self) -> None:
         self._listeners: list[Callable[[T], object]] = []
@@ -25,13 +25,13 @@ class Event(Generic[T]):
         return disconnect
 
     def emit(self, value: T) -> None:
-        """Tell all who listen at this moment; one that stops listening meanwhile is still told."""
+        """Call all current listeners; one that disconnects meanwhile is still called."""
         for listener in tuple(self._listeners):
             listener(value)
 
 
 class Value(Generic[T]):
-    """A value with an event; setting an equal value tells nobody."""
+    """A value with an event; setting an equal value calls no listener."""
 
     def __init__(self, value: T) -> None:
         self._value = value
@@ -39,14 +39,14 @@ class Value(Generic[T]):
 
     @property
     def value(self) -> T:
-        """The value now."""
+        """The current value."""
         return self._value
 
     def set(self, value: T) -> None:
-        """Change the value and tell who listens."""
+        """Change the value and call the listeners."""
         if value is self._value:
             return
-        # Arrays and data sets have no single truth of equality: they are told every time.
+        # Arrays and data sets have no single result of ``==``: setting one always calls the listeners.
         if (
             isinstance(value, str | int | float | bool | tuple | frozenset | type(None))
             and value == self._value

@@ -1,4 +1,4 @@
-"""What a file or folder is to this program, judged quickly, and what to say of one that cannot be opened."""
+"""Recognises files and folders quickly, and words why one cannot be opened."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ RESULT_NAME = "zarr.json"
 REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".sli", ".hdr")
 _MARKS = ".marks.json"
 _OPENS = (
-    "It opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
+    "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
     " campaigns and rigs of calibrations, and reference spectra (.csv, .txt, ENVI libraries .sli)."
-    " File, Import takes folders of images."
+    " Use File, Import for folders of images."
 )
 
 
 class Kind(Enum):
-    """What can be told from the outside."""
+    """Kinds of files and folders that are recognised without reading them completely."""
 
     SCAN = "scan"
     RESULT = "result"
@@ -36,7 +36,7 @@ class Kind(Enum):
 
 
 def kind_of(path: Path) -> Kind:
-    """What lies at a path."""
+    """The kind of a file or folder."""
     if not path.exists():
         return Kind.MISSING
     for name, kind in (
@@ -55,7 +55,7 @@ def kind_of(path: Path) -> Kind:
 
 
 def _is_published(folder: Path) -> bool:
-    """Whether another program laid a folder out as published; it need not be complete."""
+    """Whether a folder has the published layout, perhaps incomplete."""
     if any((folder / place).exists() for place in PUBLISHED_PLACES):
         return True
     try:
@@ -79,7 +79,7 @@ def _kind_of_json(path: Path) -> Kind:
 
 
 def meant_by(path: Path) -> Path:
-    """The folder that is meant by one of the files that make it up, else the path itself."""
+    """The folder of a scan, result or campaign if the path is one of its files, else the path itself."""
     if path.name in (MANIFEST_NAME, RESULT_NAME, CAMPAIGN_NAME):
         return path.parent
     if path.name.endswith(_MARKS):
@@ -91,25 +91,22 @@ def refusal(path: Path) -> str:
     """Why nothing opened a path, and what to do."""
     match kind_of(path):
         case Kind.MISSING:
-            return f"{path} is not there any more. Choose another file, or connect the drive that it lies on."
+            return f"{path} does not exist any more. Choose another file, or connect its drive."
         case Kind.REFERENCE:
             return (
-                f"{path.name} may hold a reference spectrum, which is compared with a result. Open a result"
+                f"{path.name} may contain a reference spectrum, to compare with a result. Open a result"
                 " first, then this file again."
             )
         case Kind.PLAN | Kind.PATTERNS:
-            return f"{path.name} says what to scan. Open it on the Scan page, by 'Open plan'."
+            return f"{path.name} says what to scan. Use 'Open plan' on the Scan page to open it."
         case Kind.CALIBRATION:
             return (
-                f"{path.name} is a calibration. Import it into the library, by the Calibrate page or"
+                f"{path.name} is a calibration. Add it to the library on the Calibrate page or by"
                 f" 'dsl-scan calibrations import {path.name}', then choose it on the Scan page."
             )
         case Kind.PUBLISHED:
-            return f"{path.name} was laid out by another program. Take it in by File, Import."
+            return f"{path.name} has the layout of another program. Use File, Import to import it."
         case Kind.UNKNOWN:
-            return (
-                f"{path.name} is no scan, result, reference spectrum or calibration that this program knows."
-                f" {_OPENS}"
-            )
+            return f"{path.name} is not a known scan, result, reference spectrum or calibration. {_OPENS}"
         case kind:
             return f"{path.name} is a {kind.value}, but no page could open it. The log says why (Ctrl+L)."

@@ -1,4 +1,4 @@
-"""What the application remembers: read tolerantly, written atomically. No Qt here."""
+"""Settings and recent files: read tolerantly, written atomically. No Qt here."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HOME_VARIABLE = "DSL_SCAN_HOME"
 
 
 class Settings(BaseModel):
-    """Everything that is remembered between two starts; every field has a default."""
+    """Everything that is remembered between sessions; every field has a default."""
 
     model_config = ConfigDict(extra="ignore", validate_assignment=True)
 
@@ -62,7 +62,7 @@ class RecentFiles:
         self._tell()
 
     def forget(self, path: Path) -> None:
-        """Leave a file out from now on."""
+        """Remove a file from the list."""
         self._settings.recent = [name for name in self._settings.recent if Path(name) != path]
         self._tell()
 
@@ -71,13 +71,13 @@ class RecentFiles:
 
 
 def entry_text(path: Path) -> str:
-    """How a recent file is named in lists: its name and folder, and whether it is gone."""
+    """How lists show a recent file: its name and folder, and whether it is missing."""
     text = f"{path.name}  –  {path.parent}"
     return text if path.exists() else f"{text}  (missing)"
 
 
 def settings_folder() -> Path:
-    """Where settings lie on this system."""
+    """Folder of the settings on this system."""
     given = os.environ.get(HOME_VARIABLE)
     if given:
         return Path(given)
@@ -87,7 +87,7 @@ def settings_folder() -> Path:
 
 
 def data_folder() -> Path:
-    """Where the program keeps what it makes for itself, such as the demo."""
+    """Folder of the program's own data, such as the demo."""
     given = os.environ.get(HOME_VARIABLE)
     if given:
         return Path(given)
@@ -99,8 +99,8 @@ def data_folder() -> Path:
 def load_settings(path: Path) -> tuple[Settings, str]:
     """Settings and a sentence on what was wrong with the file (empty: nothing).
 
-    A field that makes no sense is left at its default; a file that cannot be read is set aside. Settings
-    never keep the application from starting.
+    An invalid field keeps its default; a file that cannot be read is set aside. Settings never keep the
+    application from starting.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -108,9 +108,9 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         return Settings(), ""
     except (OSError, ValueError) as error:
         aside = set_aside(path)
-        return Settings(), f"The settings {path} could not be read ({error}); they start anew.{aside}"
+        return Settings(), f"The settings {path} could not be read ({error}); the defaults are used.{aside}"
     if not isinstance(content, dict):
-        return Settings(), f"The settings {path} hold no settings; they start anew.{set_aside(path)}"
+        return Settings(), f"The file {path} contains no settings; the defaults are used.{set_aside(path)}"
     return _tolerant(content, path)
 
 
@@ -131,6 +131,6 @@ def _tolerant(content: dict[str, Any], path: Path) -> tuple[Settings, str]:
         wrong = {str(item["loc"][0]) for item in error.errors()}
         rest = {key: value for key, value in content.items() if key not in wrong}
         return Settings.model_validate(rest), (
-            f"In the settings {path} these made no sense and are at their defaults:"
+            f"These fields of the settings {path} are invalid and were reset to their defaults:"
             f" {', '.join(sorted(wrong))}."
         )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 class Theme:
     """Colours by role, as ``#rrggbb``.
 
-    ``window`` lies behind everything, ``base`` behind data and input, ``line`` separates. ``muted`` is for
+    ``window`` is the background, ``base`` that of data and input, ``line`` separates. ``muted`` is for
     units and hints. All that is text keeps a contrast of 4.5 to 1 on ``window`` and ``base``. ``pins`` colour
     spectra one after the other and are told apart by people with any colour vision (after Okabe and Ito).
     """

@@ -13,9 +13,9 @@ DEPTH = 200
 
 @dataclass(frozen=True)
 class Change:
-    """Something that was done, in words, and how to do it and take it back.
+    """A change in words, and how to do and undo it.
 
-    ``obstacle`` says why neither can be at this moment; empty when nothing is in the way.
+    ``obstacle`` says why neither is possible now; empty when both are.
     """
 
     text: str
@@ -25,7 +25,7 @@ class Change:
 
 
 class UndoStack:
-    """What was done, last first; a new change forgets what was taken back."""
+    """Changes that can be undone and redone; a new change clears those that were undone."""
 
     def __init__(self) -> None:
         self._done: list[Change] = []
@@ -34,12 +34,12 @@ class UndoStack:
 
     @property
     def undo_text(self) -> str:
-        """What the next undo takes back, empty for nothing."""
+        """The change that undo would undo, empty for none."""
         return self._done[-1].text if self._done else ""
 
     @property
     def redo_text(self) -> str:
-        """What the next redo does again, empty for nothing."""
+        """The change that redo would redo, empty for none."""
         return self._undone[-1].text if self._undone else ""
 
     def push(self, change: Change) -> None:
@@ -50,11 +50,11 @@ class UndoStack:
         self.changed.emit(None)
 
     def undo(self) -> str:
-        """Take the last change back; the reason where that cannot be now, and then it stays the last one."""
+        """Undo the last change; if that is not possible now, returns the reason and changes nothing."""
         return self._move(self._done, self._undone, lambda change: change.undo())
 
     def redo(self) -> str:
-        """Do the change again that was taken back last; the reason where that cannot be now."""
+        """Redo the change that was undone last; if that is not possible now, returns the reason."""
         return self._move(self._undone, self._done, lambda change: change.do())
 
     def _move(self, source: list[Change], target: list[Change], act: Callable[[Change], object]) -> str:
@@ -69,7 +69,7 @@ class UndoStack:
         return reason
 
     def clear(self) -> None:
-        """Forget everything, as when another result is opened."""
+        """Forget all changes, as when another result is opened."""
         self._done.clear()
         self._undone.clear()
         self.changed.emit(None)

@@ -1,7 +1,7 @@
-"""Everything a person can do by menu or key, as one table. No Qt here.
+"""Everything that can be done by menu or shortcut, as one table. No Qt here.
 
-A record says what an action is called and where it stands; the main window makes menus, tool bars and the
-shortcut sheet from the table and connects each to the method of the same name.
+A record holds the text and the place of an action; the main window makes menus and the list of shortcuts from
+the table.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Menu = Literal["File", "View", "Rig", "Calibrate", "Scan", "Results", "Help"]
 
 @dataclass(frozen=True)
 class Action:
-    """One action: ``key`` names the method ``do_<key>`` of the window, ``shortcut`` is Qt's portable text.
+    """One action: ``key`` identifies it, ``shortcut`` is Qt's portable text.
 
     ``page`` limits a shortcut to a page ("" everywhere); ``checkable`` actions have a state.
     """
@@ -31,7 +31,7 @@ class Action:
 
 @dataclass(frozen=True)
 class Page:
-    """One activity of the rail; ``help`` is the help page of who has no better one."""
+    """One activity of the rail; ``help`` is the help page of widgets without one of their own."""
 
     key: str
     title: str
@@ -41,68 +41,72 @@ class Page:
 
 
 PAGES: tuple[Page, ...] = (
-    Page("rig", "Rig", "rig", "Devices, live camera, projector, self-test", "rig"),
+    Page("rig", "Rig", "rig", "Devices, live view, projector, self-test", "rig"),
     Page("calibrate", "Calibrate", "calibrate", "Guided calibrations and their library", "calibrating"),
     Page("scan", "Scan", "scan", "Plan, run and watch a scan", "scanning"),
     Page("results", "Results", "results", "Spectra, depth, quality and the 3D cloud", "numbers"),
-    Page("compare", "Compare", "compare", "Two scans, or a scan against truth", "comparing"),
+    Page("compare", "Compare", "compare", "Compare two scans, or a scan with the truth", "comparing"),
 )
 
 ACTIONS: tuple[Action, ...] = (
     Action("open", "&Open…", "File", "Ctrl+O", "Open a scan, a result, a reference or a calibration"),
-    Action("open_last", "Open the &last again", "File", "Ctrl+Shift+O", "Open what was opened last"),
-    Action("export", "&Export…", "File", "Ctrl+E", "Write the result in formats of other programs"),
+    Action("open_last", "Open &last file", "File", "Ctrl+Shift+O", "Open the most recent file again"),
+    Action("export", "&Export…", "File", "Ctrl+E", "Export the result in formats of other programs"),
     Action("save_figure", "Save &figure…", "File", "", "Save the plot of this page as SVG or PNG"),
     Action(
         "import",
         "&Import…",
         "File",
         "Ctrl+I",
-        "Take in a folder of images or a calibration of another program; says what is missing or misnamed",
+        "Import a folder of images or a calibration of another program; lists missing and misnamed files",
     ),
     Action(
         "show_command",
         "Show &command line",
         "File",
         "Ctrl+Shift+C",
-        "The command that does what this page does",
+        "Show the command that does the same as this page",
     ),
-    Action("quit", "&Quit", "File", "Ctrl+Q", "Leave; a running scan asks first", separator=True),
-    Action("undo", "&Undo", "View", "Ctrl+Z", "Take the last change of pins, regions or settings back"),
-    Action("redo", "&Redo", "View", "Ctrl+Shift+Z", "Do again what was taken back"),
+    Action("quit", "&Quit", "File", "Ctrl+Q", "Quit; asks first while a scan is running", separator=True),
+    Action("undo", "&Undo", "View", "Ctrl+Z", "Undo the last change of pins, regions or settings"),
+    Action("redo", "&Redo", "View", "Ctrl+Shift+Z", "Redo what was undone"),
     *(
         Action(f"page_{page.key}", page.title, "View", f"Ctrl+{i}", page.tip, separator=i == 1)
         for i, page in enumerate(PAGES, 1)
     ),
-    Action("theme_system", "Theme of the &system", "View", checkable=True, separator=True),
+    Action("theme_system", "&System theme", "View", checkable=True, separator=True),
     Action("theme_light", "&Light theme", "View", checkable=True),
     Action("theme_dark", "&Dark theme", "View", checkable=True),
     Action(
-        "show_log", "Show lo&g", "View", "Ctrl+L", "Messages of the program, with a filter", separator=True
+        "show_log", "Show lo&g", "View", "Ctrl+L", "Show or hide the messages of the program", separator=True
     ),
     Action(
         "rig_connect",
         "&Connect or disconnect",
         "Rig",
         "Ctrl+Shift+K",
-        "Open the devices that the Rig page names, or let them go",
+        "Open or close the devices chosen on the Rig page",
     ),
     Action(
-        "rig_live", "&Live view on or off", "Rig", "Ctrl+Shift+V", "Show the camera's frames as they come"
+        "rig_live",
+        "Start or stop &live view",
+        "Rig",
+        "Ctrl+Shift+V",
+        "Show the camera's frames",
     ),
     Action("rig_expose", "&Auto exposure", "Rig", "", "Find the exposure that suits what the camera sees"),
-    Action("calibrate_new", "&New campaign…", "Calibrate", "", "Begin a campaign of the rig at hand"),
-    Action("calibrate_open", "&Open campaign…", "Calibrate", "", "Go on with a campaign that was begun"),
+    Action("calibrate_new", "&New campaign…", "Calibrate", "", "Create a campaign for the current rig"),
+    Action("calibrate_open", "&Open campaign…", "Calibrate", "", "Continue an existing campaign"),
     *(
         Action(f"calibrate_{key}", f"{text}…", "Calibrate", f"F{i}", tip, separator=i == 4)
         for i, (key, text, tip) in enumerate(
             (
-                ("selftest", "&Self-test", "Whether camera, projector, focus and room are good enough"),
+                ("selftest", "&Self-test", "Check whether camera, projector, focus and room are good enough"),
                 ("geometry", "&Geometry", "Find lenses and pose from a printed board"),
-                ("spectralon", "S&pectralon", "Measure the LEDs' light, evenness and white"),
-                ("color-checker", "&Color Checker", "Refine response and emission on known patches"),
-                ("bandpass", "&Bandpass filters", "Measure how bright the film's orders are"),
-                ("depth-stage", "&Depth stage", "Find where the film stands and how it bends"),
+                ("spectralon", "S&pectralon", "Measure the LEDs' light, uniformity and white"),
+                ("color-checker", "&Color Checker", "Refine response and emission with known patches"),
+                ("bandpass", "&Bandpass filters", "Measure the brightness of the film's orders"),
+                ("depth-stage", "&Depth stage", "Find the pose and bending of the film"),
             ),
             4,
         )
@@ -112,7 +116,7 @@ ACTIONS: tuple[Action, ...] = (
         "Calibrate &everything",
         "Calibrate",
         "",
-        "Run all calibrations in order on a rig that places targets itself",
+        "Run all calibrations in order, on a rig that places targets itself",
         separator=True,
     ),
     Action(
@@ -120,43 +124,57 @@ ACTIONS: tuple[Action, ...] = (
         "&Start or resume the scan",
         "Scan",
         "Ctrl+Return",
-        "Take every frame of the plan, or those that an interrupted scan still lacks",
+        "Capture all frames of the plan, or those that an interrupted scan still lacks",
     ),
     Action(
-        "scan_pause", "&Pause or go on", "Scan", "Ctrl+Shift+P", "Wait before the next frame; nothing is lost"
+        "scan_pause",
+        "&Pause or resume",
+        "Scan",
+        "Ctrl+Shift+P",
+        "Pause before the next frame",
     ),
-    Action("scan_stop", "S&top the scan", "Scan", "", "What is stored stays stored, and can be resumed"),
+    Action("scan_stop", "S&top the scan", "Scan", "", "Saved frames are kept, and the scan can be resumed"),
     Action(
         "cancel_jobs",
-        "&Cancel all work",
+        "&Cancel all jobs",
         "Scan",
         "Ctrl+.",
-        "Stop everything that runs, at the next safe point",
+        "Stop all running jobs at the next safe point",
         separator=True,
     ),
     *(
         Action(f"view_{key}", text, "Results", str(i), tip, page="results")
         for i, (key, text, tip) in enumerate(
             (
-                ("colour", "&sRGB", "Colours as the eye sees them under a light"),
+                ("colour", "&sRGB", "Colours as seen under a chosen light"),
                 ("band", "&Band", "Reflectance of one band"),
                 ("depth", "&Depth", "Depth along the camera axis"),
-                ("quality", "&Quality and orders", "Why pixels are limited, and which order measured a band"),
-                ("cloud", "3D &cloud", "The points in space"),
+                (
+                    "quality",
+                    "&Quality and orders",
+                    "Why pixels are limited, and which order measured a band",
+                ),
+                ("cloud", "3D &cloud", "The points in 3D"),
             ),
             1,
         )
     ),
     Action(
-        "band_down", "Band d&own", "Results", ",", "The next shorter wavelength", "results", separator=True
+        "band_down",
+        "Band d&own",
+        "Results",
+        ",",
+        "Next shorter wavelength",
+        "results",
+        separator=True,
     ),
-    Action("band_up", "Band &up", "Results", ".", "The next longer wavelength", "results"),
+    Action("band_up", "Band &up", "Results", ".", "Next longer wavelength", "results"),
     Action(
         "intensity_graph",
         "&Intensity graph",
         "Results",
         "I",
-        "What the pixel under the cursor saw line by line, against the model",
+        "Show what the pixel under the cursor received from each line, against the model",
         "results",
         separator=True,
     ),
@@ -165,17 +183,19 @@ ACTIONS: tuple[Action, ...] = (
         "Copy s&pectra",
         "Results",
         "",
-        "Copy the ticked spectra as a table for a spreadsheet",
+        "Copy the selected spectra as a table for a spreadsheet",
         "results",
         separator=True,
     ),
-    Action("export_spectra", "E&xport spectra…", "Results", "", "Write the ticked spectra as CSV", "results"),
+    Action(
+        "export_spectra", "E&xport spectra…", "Results", "", "Save the selected spectra as CSV", "results"
+    ),
     Action(
         "series_add",
         "Add to a s&eries…",
         "Results",
         "",
-        "Results that are compared together: a depth test, or accuracy over time",
+        "Add results to compare as a series: a depth test, or accuracy over time",
         "compare",
         separator=True,
     ),
@@ -184,14 +204,20 @@ ACTIONS: tuple[Action, ...] = (
         "&Reconstruct again…",
         "Results",
         "Ctrl+R",
-        "Make another result of a scan with other parameters, without scanning again",
+        "Reconstruct a scan with other parameters, without scanning again",
         separator=True,
     ),
-    Action("help_page", "&Help on this page", "Help", "F1", "Explains what has the focus, and its numbers"),
-    Action("tour", "Guided &tour", "Help", "", "What is where in this window, in seven steps"),
-    Action("demo", "&Demo", "Help", "", "A finished scan of the simulated rig", separator=True),
-    Action("live_demo", "Demo, &live", "Help", "", "A short scan of the simulated rig, while you watch"),
-    Action("shortcuts", "&Keyboard shortcuts", "Help", "Ctrl+/", "Every action and its keys"),
+    Action(
+        "help_page",
+        "&Help on this page",
+        "Help",
+        "F1",
+        "Explain the control that has the focus",
+    ),
+    Action("tour", "Guided &tour", "Help", "", "Show what is where in this window, in seven steps"),
+    Action("demo", "&Demo", "Help", "", "Open a finished scan of the simulated rig", separator=True),
+    Action("live_demo", "Demo, &live", "Help", "", "Watch a short scan of the simulated rig"),
+    Action("shortcuts", "&Keyboard shortcuts", "Help", "Ctrl+/", "List every action and its shortcut"),
     Action("report_bundle", "Save a &report bundle…", "Help", "", "Log, settings and versions in one file"),
     Action("about", "&About", "Help", separator=True),
 )

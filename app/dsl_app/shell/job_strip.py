@@ -1,8 +1,9 @@
-"""What runs now, in the status bar: stage, progress, time left, cancel."""
+"""Active jobs in the status bar: stage, progress, time left, cancel."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QProgressBar, QPushButton, QWidget
@@ -13,7 +14,7 @@ from dsl_app.shared.notify import describe_seconds
 
 
 class JobStrip(QWidget):
-    """Shows the oldest active job that somebody waits for, else the oldest; hidden while nothing runs."""
+    """Shows one active job and cancels it or others; hidden while no job is active."""
 
     def __init__(self, runner: QtRunner, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -25,10 +26,10 @@ class JobStrip(QWidget):
         self._bar.setFixedWidth(180)
         self._bar.setAccessibleName("Progress of the running job")
         self._cancel = QPushButton("Cancel")
-        self._cancel.setToolTip("Stop this work at the next safe point; what is finished is kept")
+        self._cancel.setToolTip("Stop this job at the next safe point; finished parts are kept")
         self._cancel.clicked.connect(self._stop_shown)
         self._choices = QMenu(self)
-        self._choices.setAccessibleName("Work to cancel")
+        self._choices.setAccessibleName("Job to cancel")
         self._choices.aboutToShow.connect(self._list_choices)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 4, 0)
@@ -38,7 +39,7 @@ class JobStrip(QWidget):
         self._show()
 
     def _stop_shown(self) -> None:
-        # Where the button has a menu, that says which one is meant.
+        # If the button has a menu, the job is chosen there.
         if self._shown is not None and self._cancel.menu() is None:
             self._stop(self._shown)
 
@@ -47,42 +48,61 @@ class JobStrip(QWidget):
         self._show()
 
     def _show(self) -> None:
-        jobs = self._runner.active
-        self.setVisible(bool(jobs))
+        view = strip_view(self._runner.active)
+        self.setVisible(view is not None)
         self._shown = None
-        if not jobs:
+        if view is None:
             return
-        matter = _that_matter(jobs)
-        self._shown = job = (matter or jobs)[0]
-        self._text.setText(" · ".join(_words_of(job, others=len(jobs) - 1)))
-        self._bar.setRange(0, job.progress.total)
-        self._bar.setValue(job.progress.done)
-        self._offer_choices(len(matter) > 1)
-        self._cancel.setEnabled(not all(each.token.is_cancelled for each in matter or (job,)))
+        self._shown = view.job
+        self._text.setText(view.text)
+        self._bar.setRange(0, view.job.progress.total)
+        self._bar.setValue(view.job.progress.done)
+        self._offer_choices(view.asks_which)
+        self._cancel.setEnabled(view.can_cancel)
 
     # Which job to cancel ---------------------------------------------------------------------------
 
     def _offer_choices(self, several: bool) -> None:
-        """Ask which work is meant where it could be more than one; an open menu stays."""
+        """Ask which job is meant if there are several; an open menu stays."""
         if self._choices.isVisible() or several == (self._cancel.menu() is not None):
             return
         self._cancel.setMenu(self._choices if several else None)  # type: ignore[arg-type]
 
     def _list_choices(self) -> None:
         self._choices.clear()
-        for job in _that_matter(self._runner.active):
+        for job in _major(self._runner.active):
             action = self._choices.addAction(job.title.replace("&", "&&"))
             action.setEnabled(not job.token.is_cancelled)
             action.triggered.connect(lambda _checked=False, job=job: self._stop(job))
 
 
-def _that_matter(jobs: Sequence[Job[Any]]) -> list[Job[Any]]:
-    """Jobs that a person asked for and waits for, the oldest first."""
+@dataclass(frozen=True)
+class StripView:
+    """What the strip shows: a job, and whether Cancel works and asks which job is meant."""
+
+    job: Job[Any]
+    text: str
+    asks_which: bool
+    can_cancel: bool
+
+
+def strip_view(jobs: Sequence[Job[Any]]) -> StripView | None:
+    """The oldest job that a person waits for, else the oldest; None when none is active."""
+    if not jobs:
+        return None
+    major = _major(jobs)
+    job = (major or jobs)[0]
+    can_cancel = not all(each.token.is_cancelled for each in major or (job,))
+    return StripView(job, " · ".join(_words_of(job, len(jobs) - 1)), len(major) > 1, can_cancel)
+
+
+def _major(jobs: Sequence[Job[Any]]) -> list[Job[Any]]:
+    """Jobs that a person started and waits for, the oldest first."""
     return [job for job in jobs if not job.is_minor]
 
 
 def _words_of(job: Job[Any], others: int) -> list[str]:
-    """What a job is at, how long it takes yet, and how many run beside it."""
+    """What a job is doing, the time left, and how many other jobs are active."""
     parts = [job.title]
     if job.token.is_cancelled:
         parts.append("stopping")

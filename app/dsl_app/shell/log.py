@@ -1,4 +1,4 @@
-"""The log dock: what the program said, with a filter."""
+"""The log dock: messages of the program, with a filter."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LEVELS = (("Everything", logging.DEBUG), ("Information", logging.INFO), ("Warnin
 
 
 class LogRecords(QObject, logging.Handler):
-    """Takes log records of any thread to the window's thread and keeps the last ones."""
+    """Passes log records of any thread to the window's thread and keeps the last ones."""
 
     arrived = Signal(int, str)
 
@@ -42,12 +42,12 @@ class LogRecords(QObject, logging.Handler):
 
 
 class LogPanel(QWidget):
-    """Shows the records at or above a level that hold a text."""
+    """Shows the records at or above a level that contain a text."""
 
     def __init__(self, records: LogRecords, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._records = records
-        self._level = ChoiceBox("Least level shown", "Leave out messages below this level")
+        self._level = ChoiceBox("Lowest level shown", "Hide messages below this level")
         for name, level in LEVELS:
             self._level.addItem(name, level)
         self._level.setCurrentIndex(1)
@@ -55,7 +55,7 @@ class LogPanel(QWidget):
         self._filter.setPlaceholderText("Filter by text")
         self._filter.setClearButtonEnabled(True)
         self._filter.setAccessibleName("Filter by text")
-        self._filter.setToolTip("Show only messages that hold this text")
+        self._filter.setToolTip("Show only messages that contain this text")
         copy = QPushButton("Copy")
         copy.setToolTip("Copy the shown lines to the clipboard")
         self.view = QPlainTextEdit()
@@ -63,8 +63,8 @@ class LogPanel(QWidget):
         self.view.setReadOnly(True)
         self.view.setMaximumBlockCount(MOST_LINES)
         self.view.setAccessibleName("Log")
-        self.view.setToolTip("What the program did and what went wrong, the latest last")
-        self.view.setPlaceholderText("Nothing to tell yet.")
+        self.view.setToolTip("What the program did and what went wrong, the latest at the bottom")
+        self.view.setPlaceholderText("No messages yet.")
         row = QHBoxLayout()
         for widget in (QLabel("Show"), self._level, self._filter, copy):
             row.addWidget(widget)

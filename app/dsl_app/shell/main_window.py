@@ -1,4 +1,4 @@
-"""The main window: pages and toasts, with the menus, the log and the actions of the table."""
+"""The main window: pages and toasts, with menus, log and the actions of the table."""
 
 from __future__ import annotations
 

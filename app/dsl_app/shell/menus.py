@@ -13,7 +13,7 @@ from dsl_app.shell.actions import Action
 
 
 class Menus:
-    """Makes an action of Qt for each of the table; ``do`` gets the key of the one that is triggered."""
+    """Makes a Qt action for each one of the table; ``do`` gets the key of the triggered one."""
 
     def __init__(self, window: QMainWindow, table: Iterable[Action], do: Callable[[str], object]) -> None:
         self._window, self._do = window, do
@@ -49,7 +49,7 @@ class Menus:
 
 
 class RecentMenu(QMenu):
-    """Filled anew each time it is shown; what vanished is marked, and choosing it says so."""
+    """Filled each time it is shown; missing files are marked, and choosing one says so."""
 
     def __init__(self, recent: RecentFiles, open_path: Callable[[Path], object], parent: QWidget) -> None:
         super().__init__("Open &recent", parent)
@@ -62,11 +62,11 @@ class RecentMenu(QMenu):
         """List the files by number, the latest first."""
         self.clear()
         for i, path in enumerate(self._recent.paths.value, 1):
-            # Only the first nine have a key of their own.
+            # Only the first nine have a mnemonic.
             number = f"&{i}  " if i < 10 else f"{i}  "
             action = self.addAction(f"{number}{entry_text(path).replace('&', '&&')}")
             action.setToolTip(str(path))
             action.setStatusTip(str(path))
             action.triggered.connect(lambda _checked=False, path=path: self._open(path))
         if self.isEmpty():
-            self.addAction("Nothing was opened yet").setEnabled(False)
+            self.addAction("Nothing has been opened yet").setEnabled(False)

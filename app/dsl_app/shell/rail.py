@@ -13,7 +13,7 @@ from dsl_app.shell.actions import Page
 
 
 class Rail(QFrame):
-    """One button a page, in the order of the work; ``chosen`` tells the key of the page."""
+    """One button per page, in the order of the work; ``chosen`` tells the key of the page."""
 
     chosen = Signal(str)
 
@@ -47,7 +47,7 @@ class Rail(QFrame):
         return button
 
     def mark(self, key: str) -> None:
-        """Show a page as the one that is open."""
+        """Mark a page as open."""
         self._buttons[key].setChecked(True)
 
     def paint_icons(self, theme: Theme) -> None:

@@ -1,4 +1,4 @@
-"""Sentences that appear at the lower right of the window and leave by themselves."""
+"""Messages that appear at the lower right of the window and disappear by themselves."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMessageBox, QPushBut
 
 from dsl_app.shared.notify import Level
 
-#: How long a sentence stays, ms; an error stays until it is closed.
+#: How long a message is shown, ms; an error stays until it is closed.
 STAY_MS = {"info": 5000, "warning": 9000}
 WIDTH_PX, MARGIN_PX, MOST = 420, 16, 4
 
 
 class Toast(QFrame):
-    """One sentence with its details and a way to close it."""
+    """One message with its details and a Close button."""
 
     dismissed = Signal()
 
@@ -48,9 +48,9 @@ class Toast(QFrame):
             offer.clicked.connect(self.dismiss)
             offer.clicked.connect(lambda _checked=False, do=do: do())
             buttons.addWidget(offer)
-        self._add_flat(buttons, "Close", "Take this message away", self.dismiss)
+        self._add_flat(buttons, "Close", "Close this message", self.dismiss)
         if details:
-            self._add_flat(buttons, "Details", "What is known beside this", lambda: self._show(text, details))
+            self._add_flat(buttons, "Details", "Show details", lambda: self._show(text, details))
         buttons.addStretch(1)
 
     @staticmethod
@@ -62,7 +62,7 @@ class Toast(QFrame):
         column.addWidget(button)
 
     def dismiss(self) -> None:
-        """Leave for good."""
+        """Close the message."""
         self.hide()
         self.dismissed.emit()
         self.deleteLater()
@@ -75,7 +75,7 @@ class Toast(QFrame):
 
 
 class Toasts(QObject):
-    """Shows toasts over a window; a `Notifier`. More than `MOST` push the oldest out."""
+    """Shows toasts over a window; a `Notifier`. With more than `MOST`, the oldest is closed."""
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
@@ -85,7 +85,7 @@ class Toasts(QObject):
 
     @property
     def shown(self) -> tuple[Toast, ...]:
-        """What is on the window now."""
+        """The toasts that are shown now."""
         return tuple(self._shown)
 
     def tell(self, level: Level, text: str, details: str = "") -> None:
@@ -115,7 +115,7 @@ class Toasts(QObject):
             self._settle()
 
     def _settle(self) -> None:
-        """Stack what is left from the lower right upwards."""
+        """Stack the toasts from the lower right upwards."""
         bottom = self._window.height() - MARGIN_PX - 24
         for toast in reversed(self._shown):
             toast.setFixedWidth(min(WIDTH_PX, self._window.width() - 2 * MARGIN_PX))

@@ -1,4 +1,4 @@
-"""The guided tour: the window darkens but for one part, and a card beside it says what that is for."""
+"""The guided tour: darkens the window except for one part, and explains that on a card next to it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BACK = (Qt.Key.Key_Left, Qt.Key.Key_Backspace, Qt.Key.Key_PageUp)
 
 @dataclass(frozen=True)
 class Step:
-    """One call-out: the page it stands on, the object name of what it points at, and its words."""
+    """One step: the page it is about, the object name of the widget it points at, and its text."""
 
     page: str
     target: str
@@ -34,61 +34,61 @@ STEPS: tuple[Step, ...] = (
         "rig",
         "rail",
         "Five pages, in the order of the work",
-        "Rig, Calibrate, Scan, Results, Compare. Ctrl+1 to Ctrl+5 open them. Nothing has to be connected: a"
-        " simulated rig is there when no hardware is.",
+        "Rig, Calibrate, Scan, Results, Compare. Ctrl+1 to Ctrl+5 open them. You need no hardware: a"
+        " simulated rig is included.",
     ),
     Step(
         "rig",
         "live-view",
         "What the camera sees",
         "Start the live view to see raw frames with their histogram. Red cells are saturated; the focus score"
-        " rises as edges sharpen. What is shown here never changes what is saved.",
+        " rises as edges get sharper. The display never changes what is saved.",
     ),
     Step(
         "scan",
         "scan-plan",
-        "What is scanned",
-        "Choose a preset, or patterns and exposures of your own. The curve beside it shows what accuracy"
-        " costs in time on this rig.",
+        "What to scan",
+        "Choose a preset, or your own patterns and exposures. The curve next to it shows what accuracy costs"
+        " in time on this rig.",
     ),
     Step(
         "scan",
         "scan-run",
-        "Start, pause, go on",
-        "Frames, time and disk are known before the start, and what keeps it from starting stands here. Every"
-        " frame is safe on disk before the next is taken, so that a scan can be resumed after anything.",
+        "Start, pause, resume",
+        "Frames, time and disk space are shown before the start, and so is anything that prevents it. Every"
+        " frame is saved before the next one is captured: a scan can always be resumed.",
     ),
     Step(
         "results",
         "spectra",
         "Spectra with their uncertainty",
-        "The spectrum under the cursor, with its 95 % band; dashed where no light reached and only smoothness"
-        " decides. Click the picture to pin one; drop a file of a spectroradiometer to compare.",
+        "The spectrum under the cursor, with its 95 % band; dashed where there was no light and only the"
+        " smoothness prior decides. Click the picture to pin it; drop a spectroradiometer file to compare.",
     ),
     Step(
         "results",
         "result-pictures",
         "Five views, one cursor",
-        "Keys 1 to 5: colours, one band, depth, quality, and the points in space. The cursor is the same in"
-        " all of them, and I shows what its pixel saw line by line.",
+        "Keys 1 to 5: colours, one band, depth, quality, and the 3D cloud. All share one cursor, and the key"
+        " I shows what its pixel received from each line.",
     ),
     Step(
         "results",
         "menu-bar",
-        "Help is where you are",
-        "F1 explains what has the focus. File, Show command line gives the command that does the same. Help,"
-        " Guided tour shows this again; Help, Demo opens a finished scan.",
+        "Help wherever you are",
+        "F1 explains the control that has the focus. File, Show command line shows the command that does the"
+        " same. Help, Guided tour repeats this tour; Help, Demo opens a finished scan.",
     ),
 )
 
 
 class Tour(QWidget):
-    """Lies over a window; ``wanted`` tells the step that should be shown, ``ended`` that it is over.
+    """Covers a window; ``step_changed`` tells the step to show, ``ended`` that the tour is over.
 
-    Who hears ``wanted`` opens its page and then calls `point_at` with the part of the window.
+    The receiver of ``step_changed`` opens the page, then calls `point_at` with the part of the window.
     """
 
-    wanted = Signal(object)
+    step_changed = Signal(object)
     ended = Signal()
 
     def __init__(self, steps: Sequence[Step], theme: Theme, window: QWidget) -> None:
@@ -99,9 +99,9 @@ class Tour(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._count, self._title, self._text = label("", "muted"), label("", "heading"), label("")
         self._text.setWordWrap(True)
-        self.skip = _button("&Skip", "Leave the tour (Escape)")
-        self.back = _button("&Back", "The step before (left arrow)")
-        self.next = _button("&Next", "The next step (right arrow or Enter)")
+        self.skip = _button("&Skip", "End the tour (Escape)")
+        self.back = _button("&Back", "Previous step (left arrow)")
+        self.next = _button("&Next", "Next step (right arrow or Enter)")
         self.next.setProperty("role", "primary")
         self.skip.clicked.connect(self.leave)
         self.back.clicked.connect(lambda: self.go(self._at - 1))
@@ -140,7 +140,7 @@ class Tour(QWidget):
         self.go(0)
 
     def go(self, to: int) -> None:
-        """Show a step by its number; behind the last one the tour ends."""
+        """Show a step by its number; after the last one the tour ends."""
         if to >= len(self._steps):
             self.leave()
             return
@@ -153,11 +153,11 @@ class Tour(QWidget):
         self.setAccessibleDescription(step.text)
         self.back.setEnabled(self._at > 0)
         self.next.setText("&Done" if self._at + 1 == len(self._steps) else "&Next")
-        self.wanted.emit(step)
+        self.step_changed.emit(step)
         self.next.setFocus()
 
     def point_at(self, target: QWidget) -> None:
-        """Leave a part of the window bright, and put the card beside it."""
+        """Keep a part of the window bright, and put the card next to it."""
         self._target = target
         self._settle()
 
@@ -181,11 +181,11 @@ class Tour(QWidget):
 
     def _settle(self) -> None:
         self.card.adjustSize()
-        self.card.move(beside(self.hole, self.card.size().width(), self.card.size().height(), self.rect()))
+        self.card.move(next_to(self.hole, self.card.size().width(), self.card.size().height(), self.rect()))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        """Darken all but the target."""
+        """Darken everything except the target."""
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         hole = QPainterPath()
@@ -215,7 +215,7 @@ class Tour(QWidget):
         return True
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        """Follow the window's size, and take the arrows that buttons would use among themselves."""
+        """Follow the window's size, and handle the arrows before buttons use them to move the focus."""
         if watched is self._window and event.type() == QEvent.Type.Resize:
             self.setGeometry(self._window.rect())
             self._settle()
@@ -225,8 +225,8 @@ class Tour(QWidget):
         return False
 
 
-def beside(hole: QRect, width: int, height: int, room: QRect) -> QPoint:
-    """Where a card of a size stands beside a hole: right, left, below or above it, else in its middle."""
+def next_to(hole: QRect, width: int, height: int, room: QRect) -> QPoint:
+    """Position of a card of a size next to a hole: right, left, below or above it, else at its centre."""
     inside = QRect(room.left() + GAP_PX, room.top() + GAP_PX, room.width() - width - 2 * GAP_PX, 0)
     inside.setHeight(room.height() - height - 2 * GAP_PX)
     x = min(max(hole.left(), inside.left()), inside.right())

@@ -56,14 +56,14 @@ STEPS = (
     "vtkmodules.vtkViewsContext2D",
     "vtkmodules.vtkInteractionStyle",
 )
-#: Rest between two steps, s.
+#: Pause between two steps, s.
 REST_S = 0.05
-#: The bulk of some packages: while the system loads it by itself, Python's lock is free.
+#: Large libraries of some packages: while the system loads them, Python's lock is free.
 _BULK = {"torch": "lib/libtorch_cpu.so", "cv2": "cv2.abi3.so"}
 
 
 class WarmUp:
-    """Runs the steps once; `stop` ends after the step at hand."""
+    """Runs the steps once; `stop` ends after the current step."""
 
     def __init__(self, steps: Sequence[str] = STEPS) -> None:
         self._steps = steps
@@ -72,15 +72,15 @@ class WarmUp:
 
     @property
     def is_over(self) -> bool:
-        """Whether it has done all it ever will."""
+        """Whether it has ended."""
         return self._thread.ident is not None and not self._thread.is_alive()
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End soon, and wait for that."""
+        """End after the current step, and wait for that."""
         self._stop.set()
         if self._thread.ident is not None:
             self._thread.join()
@@ -91,12 +91,12 @@ class WarmUp:
                 return
             try:
                 _import(name)
-            except Exception as error:  # who needs it will say so where a person can do something
+            except Exception as error:  # the module that needs it fails with a message
                 _log.debug("%s could not be imported early: %s", name, error)
 
 
 def import_early(names: Sequence[str]) -> None:
-    """Import modules in a thread that nobody waits for."""
+    """Import modules, in a thread, before they are needed."""
     for name in names:
         _import(name)
 
@@ -104,7 +104,7 @@ def import_early(names: Sequence[str]) -> None:
 def _import(name: str) -> None:
     if name in sys.modules:
         return
-    # What modules are made of stays. Looking through all of it for garbage, again and again, would hold
+    # Objects of modules are permanent. Collecting garbage among all of them, again and again, would hold
     # Python's lock longer than anything else here.
     was_on = gc.isenabled()
     gc.disable()

@@ -1,4 +1,4 @@
-"""What the window does itself, of the table of actions: files, help, undo, jobs."""
+"""The actions that the window does itself: files, undo, jobs, help."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ THEMES = ("system", "light", "dark")
 
 
 class WindowActions:
-    """Does for a window what neither its pages nor other parts of the program do."""
+    """Does the actions of a window that neither its pages nor the composition do."""
 
     def __init__(self, window: PagedWindow) -> None:
         self._window, self._parts, self._toasts = window, window.parts, window.toasts
         self._tour: Tour | None = None
 
     def all(self) -> dict[str, Callable[[], object]]:
-        """What is done, by the key of the table."""
+        """Functions by the key of their action."""
         window, undo = self._window, self._parts.undo
         return {
             **{f"page_{key}": partial(window.open_page, key) for key in window.pages},
@@ -74,7 +74,7 @@ class WindowActions:
         if self._parts.recent.paths.value:
             self._window.open_path(self._parts.recent.paths.value[0])
         else:
-            self._toasts.tell("info", "Nothing was opened yet. Choose a file by File, Open.")
+            self._toasts.tell("info", "Nothing has been opened yet. Use File, Open to choose a file.")
 
     def _refuse_export(self) -> None:
         self._toasts.tell("info", "There is nothing to export on this page. Open a result first.")
@@ -84,12 +84,12 @@ class WindowActions:
         if figure is None:
             self._toasts.tell(
                 "info",
-                "There is no figure on this page. The spectra of a result can be saved, and on the Scan page"
-                " what accuracy costs in time.",
+                "There is no figure on this page. You can save the spectra of a result, and the curve of"
+                " accuracy against time on the Scan page.",
             )
             return
         draft = str(Path(self._parts.settings.output_folder) / f"{figure.name}.svg")
-        name, _ = QFileDialog.getSaveFileName(self._window, "Save the figure", draft, FORMATS)
+        name, _ = QFileDialog.getSaveFileName(self._window, "Save figure", draft, FORMATS)
         if not name:
             return
         try:
@@ -101,7 +101,7 @@ class WindowActions:
 
     def _save_report_bundle(self) -> None:
         name, _ = QFileDialog.getSaveFileName(
-            self._window, "Save a report bundle", "dsl-scan-report.zip", "Zip (*.zip)"
+            self._window, "Save report bundle", "dsl-scan-report.zip", "Zip (*.zip)"
         )
         if not name:
             return
@@ -127,10 +127,10 @@ class WindowActions:
         if command:
             command_window(command, self._window).open()
         else:
-            self._toasts.tell("info", "Open something on this page first; then its command is shown here.")
+            self._toasts.tell("info", "Open something on this page first, to see its command.")
 
     def _explain(self) -> None:
-        """Explain what has the focus, else the open page."""
+        """Show the help on the focused control, else on the open page."""
         window = self._window
         help_window(help_of(window.focusWidget()) or window.about_page.help, window).show()
 
@@ -139,14 +139,14 @@ class WindowActions:
             return
         window = self._window
         self._tour = Tour([step for step in STEPS if step.page in window.pages], window.theme, window)
-        self._tour.wanted.connect(self._show_step)
+        self._tour.step_changed.connect(self._show_step)
         self._tour.ended.connect(self._end_tour)
         self._tour.start()
         self._parts.settings.tour_seen = True
 
     def _show_step(self, step: Step) -> None:
         page = self._window.open_page(step.page)
-        # Parts of a result are only there while one is open.
+        # Parts of a result only exist while one is open.
         target = self._window.findChild(QWidget, step.target)
         assert self._tour is not None
         self._tour.point_at(target if target is not None and target.isVisible() else page)
@@ -156,7 +156,7 @@ class WindowActions:
 
 
 def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
-    """Every action with its keys."""
+    """Every action with its shortcut."""
     rows = [
         f"| {action.text.replace('&', '')} | {_keys(action)} | {action.tip} |"
         for action in actions
@@ -164,8 +164,8 @@ def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
     ]
     browser = QTextBrowser()
     browser.setAccessibleName("Keyboard shortcuts")
-    browser.setToolTip("Every action that has a key")
-    browser.setMarkdown("\n".join(["| Action | Keys | What it does |", "|---|---|---|", *rows]))
+    browser.setToolTip("Every action that has a shortcut")
+    browser.setMarkdown("\n".join(["| Action | Shortcut | What it does |", "|---|---|---|", *rows]))
     return text_window("Keyboard shortcuts", browser, parent, 720, 620)
 
 
@@ -174,15 +174,15 @@ def _keys(action: Action) -> str:
 
 
 def about_window(parent: QWidget) -> QDialog:
-    """What this is, which version, under which licence."""
+    """Name, version, reference and licence of the program."""
     from PySide6 import __version__ as qt_version
 
     text = QLabel(
         f"<h3>dsl-scan {__version__}</h3>"
         "<p>Hyperspectral 3D scanning by Dispersed Structured Light: an RGB camera, an RGB projector and a"
         " diffraction film.</p>"
-        "<p>After S. Shin, S. Choi, F. Heide and S.-H. Baek, <i>Dispersed Structured Light for Hyperspectral"
-        " 3D Imaging</i>, CVPR 2024.</p>"
+        "<p>Method: S. Shin, S. Choi, F. Heide and S.-H. Baek, <i>Dispersed Structured Light for"
+        " Hyperspectral 3D Imaging</i>, CVPR 2024.</p>"
         f"<p>BSD-3-Clause · Python {sys.version.split()[0]} · Qt {qt_version} (LGPL)</p>"
     )
     text.setWordWrap(True)
@@ -191,7 +191,7 @@ def about_window(parent: QWidget) -> QDialog:
 
 
 def write_report_bundle(path: Path, lines: Iterable[str], settings: Settings) -> Path:
-    """Write a zip file, over one that exists: who chose its name was asked. Raises `StoreError`."""
+    """Write log, settings and versions as a zip file; replaces an existing one. Raises `StoreError`."""
     versions = sorted(f"{d.metadata['Name']}=={d.version}" for d in distributions())
     facts = {
         "dsl-scan": __version__,

@@ -51,7 +51,7 @@ def test_the_demo_is_made_once_and_offers_a_live_one(bench: Bench, tmp_path: Pat
     result = tmp_path / "demo" / "demo.zarr"
     assert bench.opened == [result]
     assert "reflectance" in load_result(result)
-    assert "Scan one live" in bench.scans.notifier.offers
+    assert "Start a live scan" in bench.scans.notifier.offers
     bench.demo.show()
     assert [job.title for job in bench.runner.finished] == ["Make the demo"]
     assert bench.opened == [result, result]

@@ -78,8 +78,8 @@ def test_a_rig_is_watched_and_scans_from_the_results_page(
         ("rig_live", "No camera is connected."),
         ("rig_expose", "No camera is connected."),
         ("scan_start", "No rig is connected."),
-        ("scan_pause", "No scan is under way."),
-        ("scan_stop", "No scan is under way."),
+        ("scan_pause", "No scan is running."),
+        ("scan_stop", "No scan is running."),
     ],
 )
 def test_without_a_rig_it_says_why_nothing_happens(window: MainWindow, key: str, said: str) -> None:

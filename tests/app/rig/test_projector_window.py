@@ -34,4 +34,4 @@ def test_pixels_are_exact_and_the_window_survives_unplugging(scale: str) -> None
     assert "differing pixels at 1:1: 0" in done.stdout
     assert "differing pixels at 1:2: 0" in done.stdout
     assert "mirrored: The screen" in done.stdout
-    assert "lost: The projector's screen PROJECTOR is gone." in done.stdout
+    assert "lost: The projector's screen PROJECTOR was disconnected." in done.stdout

@@ -4,9 +4,9 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from dsl_app.shared.jobs.base import Job
+from dsl_app.shared.jobs.base import Job, JobProgress
 from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shell.job_strip import JobStrip
+from dsl_app.shell.job_strip import JobStrip, strip_view
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -90,3 +90,28 @@ def test_the_strip_is_hidden_while_nothing_runs(qtbot: QtBot, bench: Bench) -> N
     assert bench.strip.isVisible()
     job.cancel()
     qtbot.waitUntil(lambda: not bench.strip.isVisible())
+
+
+def test_the_oldest_job_that_a_person_waits_for_is_shown() -> None:
+    assert strip_view([]) is None
+    minor, first, second = (
+        Job(title, lambda progress: None, is_minor=title == "Predict")
+        for title in ("Predict", "Export", "Scan")
+    )
+    view = strip_view([minor, first, second])
+    assert view is not None
+    assert (view.job, view.text, view.asks_which) == (first, "Export · and 2 more", True)
+    alone = strip_view([minor])
+    assert alone is not None
+    assert (alone.job, alone.text, alone.asks_which, alone.can_cancel) == (minor, "Predict", False, True)
+
+
+def test_a_job_that_is_stopping_says_so_and_cannot_be_cancelled_twice() -> None:
+    job = Job("Export", lambda progress: None, progress=JobProgress("write", 1, 4))
+    view = strip_view([job])
+    assert view is not None
+    assert view.text == "Export · write"
+    job.cancel()
+    view = strip_view([job])
+    assert view is not None
+    assert (view.text, view.can_cancel) == ("Export · stopping", False)

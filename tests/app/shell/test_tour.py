@@ -7,7 +7,7 @@ import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shell.main_window import MainWindow
-from dsl_app.shell.tour import STEPS, Tour, beside
+from dsl_app.shell.tour import STEPS, Tour, next_to
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QPushButton, QWidget
@@ -91,10 +91,10 @@ def test_the_card_covers_neither_the_target_nor_leaves_the_window(window: MainWi
 
 def test_a_card_stands_where_there_is_room() -> None:
     room = QRect(0, 0, 1000, 800)
-    assert beside(QRect(0, 0, 90, 800), 360, 200, room).x() > 90
-    assert beside(QRect(700, 100, 300, 200), 360, 200, room).x() < 340
-    assert beside(QRect(100, 0, 850, 30), 360, 200, room).y() > 30
-    assert beside(QRect(100, 600, 850, 190), 360, 200, room).y() < 400
+    assert next_to(QRect(0, 0, 90, 800), 360, 200, room).x() > 90
+    assert next_to(QRect(700, 100, 300, 200), 360, 200, room).x() < 340
+    assert next_to(QRect(100, 0, 850, 30), 360, 200, room).y() > 30
+    assert next_to(QRect(100, 600, 850, 190), 360, 200, room).y() < 400
 
 
 def test_a_person_is_offered_the_tour_once(qtbot: QtBot, tmp_path: Path) -> None:

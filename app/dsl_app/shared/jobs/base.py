@@ -1,4 +1,4 @@
-"""Jobs: a piece of work, where it stands, and who runs it. No Qt here."""
+"""Jobs: long work with its state and progress, and the interface of their runner. No Qt here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _numbers = itertools.count(1)
 
 
 class JobState(Enum):
-    """Where a job stands; the last three are final."""
+    """State of a job; the last three are final."""
 
     WAITING = "waiting"
     RUNNING = "running"
@@ -44,13 +44,13 @@ class JobProgress:
 
 @dataclass
 class Job(Generic[T]):
-    """A piece of work and what becomes of it.
+    """Long work and its outcome.
 
     ``work`` runs in a worker thread and reports to the `Progress` it is given; the callbacks run in the
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
-    ``is_minor`` work may be stopped unasked when the window closes: nobody misses it. ``on_accepted`` is told
-    once nothing else keeps the job from its work, before that begins; ``on_ended`` before the others, however
-    it ends.
+    ``is_minor`` jobs are stopped without a question when the window closes. ``on_accepted`` is called when
+    the runner has accepted the job, before the work begins; ``on_ended`` before the other callbacks, however
+    the job ends.
     """
 
     title: str
@@ -70,7 +70,7 @@ class Job(Generic[T]):
     token: CancelToken = field(default_factory=CancelToken)
 
     def accept(self) -> None:
-        """Tell that the job has what it needs; called by its runner."""
+        """Call ``on_accepted``; called by the runner."""
         if self.on_accepted is not None:
             self.on_accepted()
 
@@ -80,7 +80,7 @@ class Job(Generic[T]):
 
     @property
     def remaining_s(self) -> float | None:
-        """Seconds left at the pace so far; None while that cannot be said."""
+        """Seconds left at the pace so far; None while unknown."""
         if self.started_s is None or self.progress.total <= 0 or self.progress.done <= 0:
             return None
         spent = time.monotonic() - self.started_s
@@ -95,7 +95,7 @@ class Job(Generic[T]):
             result = self.work(CallbackProgress(self._report, self.token))
         except Cancelled:
             return self._finish_cancelled
-        except Exception as error:  # told to the person at the window, never lost in a thread
+        except Exception as error:  # shown in the window, never lost in a thread
             _log.warning("%s failed: %s", self.title, error, exc_info=error)
             failure = error
             return lambda: self._finish_failed(failure)
@@ -129,11 +129,11 @@ class Job(Generic[T]):
 
 
 class JobRunner(Protocol):
-    """Runs jobs somewhere and remembers those that are not over."""
+    """Runs jobs and knows those that have not ended."""
 
     @property
     def active(self) -> tuple[Job[Any], ...]:
         """Jobs that wait or run."""
 
     def submit(self, job: Job[Any]) -> Job[Any]:
-        """Start a job; raises `DeviceError` when another one uses what it needs alone."""
+        """Start a job; raises `DeviceError` when another job uses the same exclusive resource."""

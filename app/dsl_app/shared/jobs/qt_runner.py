@@ -1,4 +1,4 @@
-"""Runs jobs in threads and brings their ends back to the window's thread."""
+"""Runs jobs in threads, with callbacks in the window's thread."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dsl_app.shared.jobs.base import Job, JobState
 from dsl_app.shared.jobs.memory import trim_memory
 from dsl_core.errors import DeviceError
 
-#: How often listeners hear of progress, ms: often enough to look alive, seldom enough to cost nothing.
+#: Interval between progress updates, ms: short enough to look smooth, long enough to cost little.
 TICK_MS = 100
 WORKERS = 3
 
@@ -42,9 +42,9 @@ class QtRunner(QObject):
         return tuple(self._active)
 
     def submit(self, job: Job[Any]) -> Job[Any]:
-        """Start a job; raises `DeviceError` when another one uses what it needs alone.
+        """Start a job; raises `DeviceError` when another job uses the same exclusive resource.
 
-        After `shut_down` nobody waits for a job any more, and none is begun.
+        After `shut_down` no job is started any more.
         """
         if self._is_over:
             job.state = JobState.CANCELLED
@@ -52,7 +52,8 @@ class QtRunner(QObject):
         for other in self._active:
             if job.exclusive and other.exclusive == job.exclusive:
                 raise DeviceError(
-                    f"{job.title} needs {job.exclusive}, which {other.title} uses. Wait for it, or cancel it."
+                    f"{job.title} needs {job.exclusive}, which {other.title} uses. Wait until it ends, or"
+                    " cancel it."
                 )
         self._active.append(job)
         job.accept()
@@ -67,7 +68,7 @@ class QtRunner(QObject):
             job.cancel()
 
     def shut_down(self) -> None:
-        """Stop all jobs and wait for their threads; what they had to tell is dropped."""
+        """Stop all jobs and wait for their threads; their callbacks are not called."""
         self._is_over = True
         self.cancel_all()
         self._ticker.stop()

@@ -42,7 +42,7 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     text.setReadOnly(True)
     text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
     text.setAccessibleName("Command line")
-    text.setToolTip("Give this in a terminal to do the same")
+    text.setToolTip("Run this in a terminal to do the same")
     window = text_window("Command line", text, parent, 640, 220)
     copy = QPushButton("Copy")
     copy.setToolTip("Copy the command")
@@ -57,7 +57,7 @@ class OrderCommands(Protocol):
     """What such a dialog asks of its controller."""
 
     def start(self) -> bool:
-        """Carry the order out; False where it cannot be."""
+        """Start the work; False when it cannot start."""
 
     def command_line(self) -> str:
         """The command that does the same."""
@@ -72,7 +72,7 @@ class OrderDialog(QDialog):
     def __init__(self, commands: OrderCommands, parent: QWidget) -> None:
         super().__init__(parent)
         self._orders = commands
-        #: What follows a state as long as the dialog is open.
+        #: Functions that disconnect the dialog from its state when it closes.
         self.stops: list[Callable[[], None]] = []
         self.column = QVBoxLayout(self)
         self.text: QLabel = label("", "muted")
@@ -80,13 +80,13 @@ class OrderDialog(QDialog):
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
-        self.command.setToolTip("The command that does the same in a terminal")
+        self.command.setToolTip("Show the command that does the same in a terminal")
         self.command.clicked.connect(lambda: command_window(commands.command_line(), self).open())
         self.buttons.accepted.connect(self._start)
         self.buttons.rejected.connect(self.reject)
 
     def name_buttons(self, go: str, go_tip: str, cancel_tip: str) -> None:
-        """Say what starting and leaving do."""
+        """Set the texts and tooltips of the buttons."""
         self.go.setText(go)
         self.go.setToolTip(go_tip)
         self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip(cancel_tip)
@@ -97,7 +97,7 @@ class OrderDialog(QDialog):
         self.column.addWidget(self.buttons)
 
     def judge(self, trouble: str, remark: str, is_busy: bool = False) -> None:
-        """Say what is wrong, else the remark; only an order without trouble can be started."""
+        """Show what is wrong, else the remark; the work can only start when nothing is wrong."""
         self.text.setText(trouble or remark)
         set_role(self.text, "warn" if trouble else "muted")
         self.go.setEnabled(not trouble and not is_busy)
@@ -107,7 +107,7 @@ class OrderDialog(QDialog):
             self.accept()
 
     def done(self, result: int) -> None:
-        """Follow nothing more."""
+        """Disconnect from the state."""
         for stop in self.stops:
             stop()
         super().done(result)

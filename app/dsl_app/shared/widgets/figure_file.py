@@ -26,9 +26,9 @@ SUFFIXES = (".svg", ".png")
 
 @dataclass(frozen=True)
 class Figure:
-    """A plot that can be saved: the draft of its file's name, and what gives it the colours of a theme.
+    """A plot that can be saved: its proposed file name, and what applies the colours of a theme.
 
-    ``curves`` are those that the window names beside the plot; in a file a legend has to.
+    ``curves`` are those that the window names next to the plot; the file gets a legend instead.
     """
 
     name: str
@@ -38,9 +38,9 @@ class Figure:
 
 
 def save_figure(figure: Figure, path: Path, theme: Theme) -> None:
-    """Write a figure as its screen shows it, but light, as paper is; ``theme`` is put on again afterwards.
+    """Write a figure as the screen shows it, but in the light theme; ``theme`` is applied again afterwards.
 
-    Raises `StoreError` for another ending than those of `SUFFIXES`, and when the file cannot be written.
+    Raises `StoreError` for an ending that is not in `SUFFIXES`, and when the file cannot be written.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise StoreError(f"{path.name!r} does not end in .svg or .png. Add the ending to the name.")
@@ -57,7 +57,7 @@ def save_figure(figure: Figure, path: Path, theme: Theme) -> None:
 
 def _legend(figure: Figure) -> Any:
     legend = pg.LegendItem(offset=(-12, 8), labelTextColor=LIGHT.text, brush=pg.mkBrush(f"{LIGHT.base}d0"))
-    # It is to grow with the figure.
+    # It scales with the figure.
     legend.setFlag(legend.GraphicsItemFlag.ItemIgnoresTransformations, False)
     legend.setParentItem(figure.plot.getViewBox())
     for curve, name in figure.curves:

@@ -1,4 +1,4 @@
-"""Form controls that behave alike everywhere: units, no accidents by the wheel, names for everybody."""
+"""Form controls that behave alike everywhere: units, no accidental wheel changes, accessible names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class CalmWheel(_Base):
     """Mixin before a widget class: the wheel changes the value only while the widget has the focus."""
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        """Leave the wheel to the page unless the widget has the focus."""
+        """Scroll the page instead, unless the widget has the focus."""
         if self.hasFocus():
             super().wheelEvent(event)
         else:
@@ -94,7 +94,7 @@ class ChoiceBox(CalmWheel, QComboBox):
         self.view().setMinimumWidth(self.view().sizeHintForColumn(0) + self.style().pixelMetric(_SCROLL))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Tell of an entry that was found by typing, which Qt does only for the arrow keys."""
+        """Emit ``activated`` for an entry found by typing, too; Qt does so only for the arrow keys."""
         before = self.currentIndex()
         super().keyPressEvent(event)
         if self.currentIndex() != before and event.text().isprintable() and event.text():
@@ -110,7 +110,7 @@ def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
 
 
 def remark_line() -> QLabel:
-    """A label for what is going on, which keeps a line's room while it is hidden: nothing below it moves."""
+    """A label for the current status; hidden, it still takes up one line, so that nothing below it moves."""
     made = label(" ", "muted")
     made.setWordWrap(True)
     policy = made.sizePolicy()
@@ -120,7 +120,7 @@ def remark_line() -> QLabel:
 
 
 def show_remark(line: QLabel, text: str) -> None:
-    """Say something, or hide the line; the room of one line stays."""
+    """Show a text, or hide the label but keep its line."""
     line.setText(text or " ")
     line.setVisible(bool(text))
 
@@ -152,7 +152,7 @@ def set_role(widget: QWidget, role: str) -> None:
 
 
 class Banner(QFrame):
-    """Hidden while it has nothing to say; ``action`` is the button that deals with it."""
+    """A message across the page that stays until it is resolved; ``action`` is the button that does that."""
 
     def __init__(self, action: str) -> None:
         super().__init__()
@@ -176,7 +176,7 @@ class Banner(QFrame):
 
     @property
     def text(self) -> str:
-        """What it says."""
+        """The message that is shown."""
         return self._text.text()
 
     def say(self, text: str) -> None:

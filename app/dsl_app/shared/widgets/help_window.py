@@ -1,4 +1,4 @@
-"""The help: pages of the resources with links between them, and which of them explains a widget."""
+"""The help window, and which help page explains a widget."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
 
 FOLDER = "help"
-#: The pages in the order in which they are read; others follow.
+#: The pages in reading order; others follow.
 ORDER = (
     "rig",
     "calibrating",
@@ -59,7 +59,7 @@ def help_of(widget: QWidget | None) -> str:
 
 
 def add_help_key(window: QWidget, topic: str) -> None:
-    """Let F1 work in a window of its own, which the keys of the main window do not reach."""
+    """Add F1 to a separate window, which the shortcuts of the main window do not reach."""
     set_help(window, topic)
     key = QShortcut(QKeySequence(Qt.Key.Key_F1), window)
     key.activated.connect(lambda: help_window(help_of(window.focusWidget() or window), window).open())
@@ -73,7 +73,7 @@ def help_window(topic: str, parent: QWidget) -> HelpWindow:
 
 
 class HelpWindow(QDialog):
-    """All pages at the left, one at the right; Back and Forward as in a browser."""
+    """All pages on the left, one on the right; Back and Forward as in a browser."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -87,11 +87,11 @@ class HelpWindow(QDialog):
         self.pages.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.text = QTextBrowser()
         self.text.setAccessibleName("Help")
-        self.text.setToolTip("Links lead to other pages (Alt+Left goes back)")
+        self.text.setToolTip("Links open other pages (Alt+Left goes back)")
         self.text.setOpenExternalLinks(True)
         self.text.document().setDocumentMargin(14)
-        self.back = _button("&Back", "The page before (Alt+Left)", "Alt+Left")
-        self.forward = _button("&Forward", "The page after (Alt+Right)", "Alt+Right")
+        self.back = _button("&Back", "Previous page (Alt+Left)", "Alt+Left")
+        self.forward = _button("&Forward", "Next page (Alt+Right)", "Alt+Right")
         self.close_button = _button("&Close", "Close the help (Escape)", "")
         self._lay_out()
         for page in help_pages():
@@ -130,7 +130,7 @@ class HelpWindow(QDialog):
         return Path(self.text.source().path()).stem
 
     def show_topic(self, topic: str) -> None:
-        """Show a page, at one of its headings if the topic names one; says so when it is not there."""
+        """Show a page, at one of its headings if the topic names one; shows an error if it is missing."""
         name, _, heading = topic.partition("#")
         try:
             url = QUrl.fromLocalFile(str(resource_path(f"{FOLDER}/{name}.md")))

@@ -1,4 +1,4 @@
-"""What every page of the rail can do; the main window knows pages only by this."""
+"""The interface of all pages, by which the main window uses them."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from dsl_app.shared.widgets.figure_file import Figure
 
 
 class PageWidget(QWidget):
-    """A page. Everything is optional: a page overrides what it has to say."""
+    """A page. Everything is optional: a page overrides what applies to it."""
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
-        """Actions of the table, by key, that the page does itself while it is open."""
+        """Actions of the table, by key, that the page does while it is open."""
         return {}
 
     def command_line(self) -> str:
@@ -28,11 +28,11 @@ class PageWidget(QWidget):
         return None
 
     def subject(self) -> Path | None:
-        """The scan or result that the page is about, for who acts on it; None when there is none."""
+        """The scan or result that the page shows, for actions on it; None when there is none."""
         return None
 
     def open_path(self, path: Path) -> bool:
-        """Open a file or folder that was chosen or dropped; False when it is none of the page's."""
+        """Open a file or folder that was chosen or dropped; False when the page cannot open it."""
         return False
 
     @property
@@ -41,10 +41,10 @@ class PageWidget(QWidget):
         return False
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
 
     def release(self) -> None:
-        """Let go of devices, files and threads before the window closes."""
+        """Release devices, files and threads before the window closes."""
 
 
 def dropped_paths(data: QMimeData) -> list[Path]:

@@ -45,7 +45,7 @@ WITH_SHIFT = 10
 
 
 def arrow_step(event: QKeyEvent) -> tuple[int, int] | None:
-    """Steps to the right and down that a key asks for, ten times as far with Shift; None for other keys."""
+    """Steps to the right and down of an arrow key, ten times as far with Shift; None for other keys."""
     step = _STEPS.get(Qt.Key(event.key()))
     if step is None:
         return None
@@ -72,7 +72,7 @@ FIRST_SHARE = 0.4
 
 
 class RegionBox(pg.RectROI):  # type: ignore[misc]
-    """Drag it or its corners; it lies on an image that shows ``cell_px`` pixels a side as one."""
+    """A rectangle to drag by itself or its corners, on an image with cells of ``cell_px`` pixels a side."""
 
     def __init__(self, cell_px: int) -> None:
         super().__init__((0, 0), (1, 1), sideScalers=True)
@@ -80,13 +80,13 @@ class RegionBox(pg.RectROI):  # type: ignore[misc]
         self._cell_px = cell_px
 
     def put_in_middle(self, width_px: int, height_px: int) -> None:
-        """Cover the middle of an image of so many pixels."""
+        """Cover the middle of an image of this size."""
         wide, high = (size * FIRST_SHARE / self._cell_px for size in (width_px, height_px))
         self.setPos((width_px / self._cell_px - wide) / 2, (height_px / self._cell_px - high) / 2)
         self.setSize((wide, high))
 
     def region(self, width_px: int, height_px: int) -> Region:
-        """What it covers, whole cells within the image, at least one."""
+        """The covered region: whole cells within the image, at least one."""
         cell = self._cell_px
         left, top = self.pos().x(), self.pos().y()
         right, bottom = left + self.size().x(), top + self.size().y()
@@ -98,7 +98,7 @@ class RegionBox(pg.RectROI):  # type: ignore[misc]
         return x0 * cell, y0 * cell, (x1 - x0) * cell, (y1 - y0) * cell
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self.setPen(pg.mkPen(theme.accent, width=2))
         self.hoverPen = pg.mkPen(theme.accent, width=3)
         handles: list[Any] = self.getHandles()

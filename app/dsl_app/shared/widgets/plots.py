@@ -35,7 +35,7 @@ def calm_plot(name: str, tip: str, left: str, bottom: str, left_width: int = 52)
 
 
 def theme_plots(plots: Iterable[Any], theme: Theme) -> None:
-    """Give plots the colours of a theme."""
+    """Apply the colours of a theme to plots."""
     for plot in plots:
         plot.setBackground(theme.base)
         for side in ("left", "bottom"):

@@ -1,4 +1,4 @@
-"""Tables that are read, not edited: how all of them look and answer to keys."""
+"""Read-only tables: their look and their keys."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
-#: Room between rows whose lines break, px: without it two rows read as one.
+#: Space between rows with wrapped lines, px: without it two rows look like one.
 ROOM_PX = 6
 
 
@@ -31,7 +31,7 @@ class _Roomy(QStyledItemDelegate):
 
 
 class ReadTable(QTableWidget):
-    """Whole rows are selected, Tab leaves the table, columns are as wide as what they hold."""
+    """Whole rows are selected, Tab leaves the table, columns are as wide as their contents."""
 
     def __init__(self, name: str, tip: str, heads: Sequence[str], rows: int = 0) -> None:
         super().__init__(rows, len(heads))
@@ -49,19 +49,19 @@ class ReadTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
 
     def wrap(self, column: int) -> None:
-        """Let a column take the room that the others leave, and break its lines."""
+        """Let a column take the remaining width, and wrap its lines."""
         self._wraps = True
         self.setItemDelegate(_Roomy(self))
         header = self.horizontalHeader()
         header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
-        # All columns change one after the other; the rows follow once.
+        # All columns are resized one after the other; the rows only once.
         self.fit_rows = QTimer(self)
         self.fit_rows.setSingleShot(True)
         self.fit_rows.timeout.connect(self.resizeRowsToContents)
         header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
 
     def show_rows(self, rows: Sequence[Sequence[QTableWidgetItem]]) -> None:
-        """Show other rows; columns and rows find their sizes once, not after every item."""
+        """Show other rows; columns and rows are resized once, not after every item."""
         self.setRowCount(len(rows))
         self.model().blockSignals(True)
         for number, row in enumerate(rows):
@@ -74,7 +74,7 @@ class ReadTable(QTableWidget):
 
 
 def cell(text: str, colour: str = "", side: Qt.AlignmentFlag = LEFT) -> QTableWidgetItem:
-    """An item that shows all of its text when the mouse rests on it."""
+    """An item with its whole text as tooltip."""
     item = QTableWidgetItem(text)
     if colour:
         item.setForeground(QColor(colour))

@@ -25,10 +25,10 @@ def split_by_share(mean: Floats, share: Floats | None) -> tuple[Floats, Floats]:
     if share is None:
         return values, np.full_like(values, np.nan)
     decided = ~(np.asarray(share) < DECIDED_FROM)
-    beside = ~decided
-    beside[1:] |= ~decided[:-1]
-    beside[:-1] |= ~decided[1:]
-    return np.where(decided, values, np.nan), np.where(beside, values, np.nan)
+    undecided = ~decided
+    undecided[1:] |= ~decided[:-1]
+    undecided[:-1] |= ~decided[1:]
+    return np.where(decided, values, np.nan), np.where(undecided, values, np.nan)
 
 
 class SpectrumCurve:
@@ -66,7 +66,7 @@ class SpectrumCurve:
         solid, dashed = split_by_share(spectrum.mean, spectrum.share)
         self.solid.setData(spectrum.nm, solid)
         self.dashed.setData(spectrum.nm, dashed)
-        # A path without points is no valid drawing in a figure.
+        # A path without points is not a valid drawing in a figure.
         self.dashed.setVisible(bool(np.isfinite(dashed).any()))
         if self.band is None:
             return
