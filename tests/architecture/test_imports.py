@@ -48,6 +48,20 @@ def test_no_module_imports_itself_in_a_circle() -> None:
         pytest.fail(" > ".join(error.args[1]))
 
 
+def test_modules_that_say_no_qt_import_none() -> None:
+    graph = grimp.build_graph("dsl_app", include_external_packages=True, cache_dir=None)
+    qt = {"PySide6", "pyqtgraph", "shiboken6", "superqt"} & graph.modules
+    folder = ROOT / "app"
+    found = []
+    for path in sorted(folder.rglob("*.py")):
+        module = ".".join(path.relative_to(folder).with_suffix("").parts)
+        docstring = path.read_text(encoding="utf-8").split('"""', 2)[1]
+        if "No Qt" in docstring and graph.find_upstream_modules(module) & qt:
+            found.append(module)
+    assert qt
+    assert found == []
+
+
 @pytest.mark.skipif(importlib.util.find_spec("dsl_core.cli") is None, reason="there is no command line yet")
 def test_the_command_line_starts_light() -> None:
     code = "import json, sys, dsl_core.cli; print(json.dumps(sorted(sys.modules)))"
