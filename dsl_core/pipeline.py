@@ -23,9 +23,8 @@ from dsl_core.progress import CancelToken, NoProgress, Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-    from dsl_core.capture.runner import Runner
+    from dsl_core.capture.runner import Runner, Status
     from dsl_core.capture.sink import Watch
-    from dsl_core.capture.status import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.evaluation.report.scan_report import ReportContent

@@ -10,16 +10,51 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.preflight import require_possible
-from dsl_core.capture.status import State, Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DslError
 from dsl_core.model.frames import FrameSink
 from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.progress import CancelToken, NoProgress, Progress
+
+
+class State(StrEnum):
+    """Where a scan stands; the last three are final."""
+
+    IDLE = "idle"
+    CHECKING = "checking"
+    RUNNING = "running"
+    PAUSED = "paused"
+    CANCELLING = "cancelling"
+    FINISHED = "finished"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+
+    @property
+    def is_final(self) -> bool:
+        """Whether nothing more will happen."""
+        return self in (State.FINISHED, State.CANCELLED, State.FAILED)
+
+
+@dataclass(frozen=True)
+class Status:
+    """A moment of a scan; ``done`` counts stored frames, those of earlier runs included.
+
+    ``elapsed_s`` is the time spent running, pauses left out; ``remaining_s`` is estimated from it.
+    """
+
+    state: State
+    shot: Shot | None = None
+    done: int = 0
+    total: int = 0
+    elapsed_s: float = 0.0
+    remaining_s: float = 0.0
+    message: str = ""
+
 
 Listener = Callable[[Status], None]
 _log = logging.getLogger(__name__)

@@ -40,8 +40,7 @@ def tradeoff(
     """Choose the plan that is most accurate in a budget of time, or quickest for an error; predicted."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
-    from dsl_core.planning.candidates import possible_plans
-    from dsl_core.planning.choice import choose, pareto, weigh
+    from dsl_core.planning.choice import choose, pareto, possible_plans, weigh
 
     output, budget_s = Output(json), None if budget is None else parse_seconds(budget)
     with open_rig(rig, parse_options(option)) as devices:
@@ -85,7 +84,7 @@ def design(
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
     from dsl_core.model.plan import CapturePlan, GrayCode
-    from dsl_core.planning.candidates import sized
+    from dsl_core.planning.choice import sized
     from dsl_core.planning.design import design as search
     from dsl_core.planning.designed import DesignedSet, packed, save_design
 

@@ -1,17 +1,40 @@
-"""The plan that answers a wish: the most accurate within a budget, or the quickest that is good enough."""
+"""The plan that answers a request: the most accurate within a budget, or the quickest that is good enough.
+
+Plans to choose from are pattern sets of every kind times exposures in whole LED cycles.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 
+from dsl_core.capture.preflight import find_obstacles
+from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import CapturePlan
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting, SpectralSet
 from dsl_core.model.rig import Rig
+from dsl_core.planning.designed import designed_sets
 from dsl_core.planning.prediction import Prediction, predict
 from dsl_core.planning.views import View, plane_view
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.front import front
+
+#: Width and step of single lines; width, step and period of combs, px; those whose two edges fall between
+#: different columns find the column best.
+LINES = ((5, 2), (5, 3), (5, 4), (8, 2))
+COMBS = (
+    (6, 4, 64), (5, 2, 64), (6, 4, 128), (5, 3, 96), (5, 2, 80), (9, 2, 64), (9, 2, 80), (4, 3, 192),
+)  # fmt: skip
+#: Cycles and levels of the settings of a bracket; a setting twice is a repeat.
+BRACKETS = (
+    ((10, 0.2), (20, 0.8)),
+    ((2, 0.2), (8, 0.8)),
+    ((4, 0.2), (12, 0.8)),
+    ((10, 0.2), (40, 0.8)),
+    ((10, 0.2), (20, 0.8), (20, 0.8), (20, 0.8)),
+    ((20, 0.4),),
+)
 
 
 @dataclass(frozen=True)
@@ -68,3 +91,60 @@ def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: flo
             f" {best.plan.name!r}, reaches {best.expected.pixel_rmse:.4f} in {best.expected.seconds:.0f} s."
         )
     return min(good, key=lambda each: each.expected.seconds)
+
+
+def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
+    """All combinations on a rig, the published plan first."""
+    yield sized(CapturePlan(name="published"), rig)
+    for (name, spectral), bracket in product(pattern_sets(rig).items(), BRACKETS):
+        settings = tuple(
+            Setting(exposure_ms=cycles * rig.frame_period_ms, level=level) for cycles, level in bracket
+        )
+        words = " + ".join(f"{cycles}@{level:g}" for cycles, level in bracket)
+        plan = CapturePlan(
+            name=f"{name}, {words} cycles",
+            code=GrayCode(rows=False),
+            spectral=spectral,
+            settings=settings,
+            code_settings=tuple(range(len(settings))),
+        )
+        yield sized(plan, rig)
+
+
+def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
+    """The combinations that devices of this calibration can capture; raises `PlanError` if there is none."""
+    # Whether the devices are still as they were calibrated is the scan's question, and can be mended.
+    bare = replace(devices, calibration=None)
+    found = [(plan, find_obstacles(bare, plan)) for plan in candidate_plans(rig)]
+    able = [plan for plan, obstacles in found if not obstacles]
+    if not able:
+        raise PlanError(
+            f"None of {len(found)} plans for the calibration {rig.name!r} is possible on the rig"
+            f" {devices.name!r}: {'; '.join(found[0][1])}. Name a rig and a calibration of one kind."
+        )
+    return able
+
+
+def sized(plan: CapturePlan, rig: Rig) -> CapturePlan:
+    """A plan for the image sizes of a calibrated rig."""
+    return plan.model_copy(
+        update={
+            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
+            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
+        }
+    )
+
+
+def pattern_sets(rig: Rig) -> dict[str, SpectralSet]:
+    """Pattern sets by name that fit a rig's projector."""
+    found: dict[str, SpectralSet] = {f"lines {w}x{s}": ScanLines(width_px=w, step_px=s) for w, s in LINES}
+    for w, s, p in COMBS:
+        found[f"comb {w}x{s}x{p}"] = LineComb(width_px=w, step_px=s, period_px=p)
+        third = round(p / 3)
+        found[f"colour comb {w}x{s}x{p}"] = LineComb(
+            width_px=w, step_px=s, period_px=p, shifts_px=(0, third, 2 * third)
+        )
+    width = rig.projector.width_px
+    return found | {
+        name: columns for name, columns in designed_sets().items() if len(columns.levels[0]) == width
+    }

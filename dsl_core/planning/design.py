@@ -1,13 +1,18 @@
 """Pattern sets by design: the lines and their order that a rig's own model expects the least error of.
 
-Candidates are lines of some widths and steps that take frames in an order of their own; a `Judge` says what
-is expected of each.
+Candidates are lines of some widths and steps that change frames in an order of their own; a `Judge` says what
+is expected of each. What combs light together, these lines keep apart: the frame is divided into slots
+``step_px`` apart, each lit by a line of one frame. A comb repeats its frames in the same order, so that two
+wavelengths a period apart overlap in all frames. Here every run of as many slots as there are frames holds
+each frame once, in an order drawn again for each run: two wavelengths meet in a few frames only. The lines
+are white, as the zero order of any LED spoils all channels.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import cast
 
 import numpy as np
@@ -19,8 +24,8 @@ from dsl_core.model.plan import CapturePlan, Columns, LineComb, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.planning.designed import columns_of
 from dsl_core.planning.judge import Judge
-from dsl_core.planning.mixed_lines import MixedLines
 from dsl_core.progress import NoProgress, Progress
 
 #: Runs of slots, as shares of the columns that a first order's spectrum covers, and widths of lines (px).
@@ -28,6 +33,60 @@ RUNS, WIDTHS_PX = (0.5, 0.62, 0.75), (5, 6, 7, 9, 11)
 SPECTRUM_NM = (430.0, 690.0)
 #: How many kinds of lines are tried in further orders.
 FINALISTS = 3
+#: Dark columns between the lines of a frame, at least: nearer ones act as one wide line.
+DARK_PX = 4
+#: Draws of an order before a run counts as impossible.
+TRIES = 2000
+
+
+@dataclass(frozen=True)
+class MixedLines:
+    """Lines ``width_px`` wide, ``step_px`` apart, in the order of a seed."""
+
+    frames: int
+    width_px: int
+    step_px: int
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """How people call it."""
+        return f"mixed lines {self.width_px}x{self.step_px}x{self.frames}, order {self.seed}"
+
+    def order(self, slots: int) -> NDArray[np.int64]:
+        """Frame of each slot; raises `PlanError` where the lines of a frame cannot keep apart."""
+        gap = ceil((self.width_px + DARK_PX) / self.step_px) - 1
+        random = np.random.Generator(np.random.PCG64(self.seed))
+        found: list[int] = []
+        while len(found) < slots:
+            found += self._run(found, gap, random)
+        return np.array(found[:slots])
+
+    def _run(self, before: list[int], gap: int, random: np.random.Generator) -> list[int]:
+        """Every frame once, none within ``gap`` slots of its last line."""
+        for _ in range(TRIES):
+            left, run = random.permutation(self.frames).tolist(), list[int]()
+            while left:
+                recent = set((before + run)[-gap:]) if gap else set()
+                free = [frame for frame in left if frame not in recent]
+                if not free:
+                    break
+                left.remove(free[0])
+                run.append(free[0])
+            if not left:
+                return run
+        raise PlanError(
+            f"Lines of {self.width_px} columns in steps of {self.step_px} do not keep apart in"
+            f" {self.frames} frames. Ask for more frames or narrower lines."
+        )
+
+    def levels(self, width_px: int) -> NDArray[np.uint8]:
+        """Drive levels (frames, width, 3) for a projector; raises `PlanError`."""
+        levels = np.zeros((self.frames, width_px, 3), np.uint8)
+        for slot, frame in enumerate(self.order(ceil(width_px / self.step_px))):
+            start = slot * self.step_px
+            levels[frame, start : start + self.width_px] = 255
+        return levels
 
 
 @dataclass(frozen=True)
@@ -44,12 +103,6 @@ class Design:
     def columns(self) -> Columns:
         """The set as it stands in a plan."""
         return columns_of(self.levels)
-
-
-def columns_of(levels: NDArray[np.uint8]) -> Columns:
-    """Drive levels (frames, width, 3), 0 to 255, as a pattern set."""
-    shares = np.round(levels / 255.0, 5)
-    return Columns(levels=tuple(tuple(tuple(rgb) for rgb in frame) for frame in shares.tolist()))
 
 
 def design(

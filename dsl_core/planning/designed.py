@@ -15,7 +15,6 @@ from dsl_core.errors import StoreError
 from dsl_core.io.staging import staged
 from dsl_core.model.base import Record
 from dsl_core.model.plan import Columns
-from dsl_core.planning.design import columns_of
 from dsl_core.resources import resource_path
 
 FOLDER = "patterns"
@@ -77,3 +76,9 @@ def designed_sets() -> dict[str, Columns]:
         return {}
     made = [load_design(path) for path in sorted(folder.glob("*.json"))]
     return {each.name: columns_of(each.array) for each in made}
+
+
+def columns_of(levels: NDArray[np.uint8]) -> Columns:
+    """Drive levels (frames, width, 3), 0 to 255, as a pattern set."""
+    shares = np.round(levels / 255.0, 5)
+    return Columns(levels=tuple(tuple(tuple(rgb) for rgb in frame) for frame in shares.tolist()))

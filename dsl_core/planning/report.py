@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import figure_uri
 from dsl_core.io.staging import staged
 from dsl_core.planning.choice import Weighed, pareto
 from dsl_core.solve.front import front
-
-if TYPE_CHECKING:
-    from dsl_core.planning.sweep import Point
 
 #: Width and height of the plot, inches at 100 dots.
 SIZE_IN = (8.0, 4.6)
@@ -24,7 +20,6 @@ def write_tradeoff_report(
     weighed: Sequence[Weighed],
     chosen: Weighed,
     path: Path,
-    measured: Sequence[Point] = (),
     overwrite: bool = False,
 ) -> Path:
     """Write the page, without references to other files; raises `StoreError`."""
@@ -34,15 +29,14 @@ def write_tradeoff_report(
         rows=sorted(weighed, key=lambda each: each.expected.seconds),
         front={each.plan.name for each in best},
         chosen=chosen,
-        plot=plot_uri(weighed, chosen, measured),
-        measured=[point for point in measured if point.pixel_rmse is not None],
+        plot=plot_uri(weighed, chosen),
     )
     with staged([path], overwrite=overwrite) as (draft,):
         draft.write_text(page, encoding="utf-8")
     return path
 
 
-def plot_uri(weighed: Sequence[Weighed], chosen: Weighed, measured: Sequence[Point] = ()) -> str:
+def plot_uri(weighed: Sequence[Weighed], chosen: Weighed) -> str:
     """Error of a pixel over seconds of capture, both logarithmic, as a PNG data URI."""
     from matplotlib.figure import Figure
 
@@ -53,10 +47,6 @@ def plot_uri(weighed: Sequence[Weighed], chosen: Weighed, measured: Sequence[Poi
     axes.scatter(seconds, errors, s=12, color=COLOURS["plan"], label="predicted")
     line = [points[i] for i in front(points)]
     axes.plot(*zip(*line, strict=True), color=COLOURS["front"], label="none is better in both")
-    found = [(p.seconds, p.pixel_rmse) for p in measured if p.pixel_rmse is not None]
-    if found:
-        seconds, errors = zip(*found, strict=True)
-        axes.scatter(seconds, errors, s=14, marker="x", color="black", label="measured on the twin")
     mark = chosen.expected
     axes.scatter([mark.seconds], [mark.pixel_rmse], s=80, marker="*", color=COLOURS["chosen"], label="chosen")
     axes.set(xscale="log", yscale="log", xlabel="capture, s", ylabel="reflectance error of a pixel (RMSE)")

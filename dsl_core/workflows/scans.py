@@ -19,7 +19,7 @@ from dsl_core.progress import Progress
 if TYPE_CHECKING:
     import xarray as xr
 
-    from dsl_core.capture.status import Status
+    from dsl_core.capture.runner import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.evaluation.summary import Truth
@@ -53,7 +53,7 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     The rig returned has the same devices and the scan's own calibration, whatever ``rig`` has, which stays as
     it is.
     """
-    from dsl_core.capture import drift
+    from dsl_core.capture.movement import check_movement, pick_reference_shots
     from dsl_core.io.scan.folder import ScanReader
     from dsl_core.patterns.images import pattern_image
 
@@ -62,7 +62,7 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
     done = [shot for shot in reader.plan.shots() if shot.index in sound]
     if check_drift and 0 < len(done) < reader.plan.shot_count:
-        report = drift.check_drift(rig, reader, drift.pick_reference_shots(done), pattern_image)
+        report = check_movement(rig, reader, pick_reference_shots(done), pattern_image)
         if not report.is_stable:
             raise DriftError(report.message)
     return rig, reader.plan

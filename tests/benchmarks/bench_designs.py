@@ -11,11 +11,11 @@ from pathlib import Path
 
 from dsl_core.model.plan import LineComb, SpectralSet
 from dsl_core.planning.designed import designed_sets
-from dsl_core.planning.sweep import Case, Point, run_sweep
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json
 from tests.benchmarks.front_cases import PUBLISHED, plan_of
+from tests.benchmarks.sweep import Case, Point, run_sweep
 
 PALETTES = ("chart", "filters", "unseen")
 #: Width, step and period of the combs that were best, or nearly, on one of the palettes at each count.

@@ -14,13 +14,13 @@ from pathlib import Path
 
 from dsl_core.io.staging import staged
 from dsl_core.model.rig import Rig
-from dsl_core.planning.measured import Comparison, Measured, plot_png, write_measured_report
-from dsl_core.planning.sweep import Case, run_sweep, stored
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.bench_tradeoff import cases
 from tests.benchmarks.common import options, print_table, write_json
 from tests.benchmarks.front_cases import PALETTES, front_cases
+from tests.benchmarks.measured_front import Comparison, Measured, plot_png, write_measured_report
+from tests.benchmarks.sweep import Case, run_sweep, stored
 
 #: Spectral frames that a named plan may take, and the reading of the published plan it is held against.
 LIMITS, AGAINST = (64, 32), ("published", "best")

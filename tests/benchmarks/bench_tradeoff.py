@@ -18,14 +18,13 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sett
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.planning.binning import binned
-from dsl_core.planning.prediction import Prediction, predict
-from dsl_core.planning.sweep import Case, Point, run_sweep, write_csv
-from dsl_core.planning.trial import trial_view
+from dsl_core.planning.prediction import Prediction, binned, predict
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json
 from tests.benchmarks.front_cases import front_cases
+from tests.benchmarks.sweep import Case, Point, run_sweep, write_csv
+from tests.cases.trial import trial_view
 
 PERIOD_MS = 1000 / 60
 CLOSE = 0.20

@@ -8,7 +8,7 @@ from itertools import product
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
-from dsl_core.planning.sweep import Case
+from tests.benchmarks.sweep import Case
 
 PALETTES = ("chart", "filters")
 PERIOD_MS = 1000 / 60

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.exposure import RetryPolicy
-from dsl_core.capture.runner import Runner
+from dsl_core.capture.runner import Runner, State, Status
 from dsl_core.capture.sink import MemorySink
-from dsl_core.capture.status import State, Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DeviceError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter

@@ -17,9 +17,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import PlanError, StoreError
 from dsl_core.io.plan_file import load_plan, save_plan
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
-from dsl_core.planning import sweep
-from dsl_core.planning.candidates import candidate_plans, possible_plans
-from dsl_core.planning.choice import Weighed, choose, pareto, weigh
+from dsl_core.planning.choice import Weighed, candidate_plans, choose, pareto, possible_plans, weigh
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
 from dsl_core.planning.prediction import Prediction
 from dsl_core.planning.report import write_tradeoff_report
@@ -74,27 +72,6 @@ def test_real_plans_are_weighed_and_written(tmp_path: Path) -> None:
     page = write_tradeoff_report(found, best, tmp_path / "page.html").read_text()
     assert best.plan.name in page
     assert "data:image/png" in page
-
-
-def test_a_sweep_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    measured: list[str] = []
-
-    def measure(rig: object, case: sweep.Case, latency_ms: float) -> sweep.Point:
-        measured.append(case.name)
-        if case.name == "b" and measured.count("b") == 1:
-            raise KeyboardInterrupt
-        return sweep.Point(name=case.name, frames=1, spectral_frames=1, seconds=2.0, raw_bytes=3)
-
-    monkeypatch.setattr(sweep, "measure", measure)
-    cases = [sweep.Case(name=name, plan=CapturePlan(name=name)) for name in "abc"]
-    with pytest.raises(KeyboardInterrupt):
-        sweep.run_sweep(published_rig(), cases, tmp_path, 50)
-    points = sweep.run_sweep(published_rig(), cases, tmp_path, 50)
-    assert measured == ["a", "b", "b", "c"]
-    assert [point.name for point in points] == ["a", "b", "c"]
-    table = sweep.write_csv(points, tmp_path / "points.csv").read_text().splitlines()
-    assert table[0].startswith("name,frames")
-    assert len(table) == 4
 
 
 def test_a_designed_set_survives_its_file(tmp_path: Path) -> None:

@@ -11,10 +11,9 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.multiplexed import profiles
 from dsl_core.planning import design as module
 from dsl_core.planning import judge as judging
-from dsl_core.planning.design import design
+from dsl_core.planning.design import DARK_PX, MixedLines, design
 from dsl_core.planning.designed import designed_sets, load_design
 from dsl_core.planning.judge import Judge, training_spectra
-from dsl_core.planning.mixed_lines import DARK_PX, MixedLines
 from dsl_core.resources import resource_path
 from dsl_core.simulation.published_rig import published_rig
 

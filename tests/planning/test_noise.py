@@ -8,8 +8,8 @@ import torch
 
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.optics.demosaic import demosaic_variance
-from dsl_core.planning.binning import binned
 from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel
+from dsl_core.planning.prediction import binned
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, setting_gains_ms
 from tests.cases.small_rig import small_rig
 

@@ -9,9 +9,9 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, NoCode, NoSpect
 from dsl_core.model.presets import PRESETS, Preset
 from dsl_core.planning import references
 from dsl_core.planning.prediction import Prediction, predict
-from dsl_core.planning.trial import run_trial, trial_view
 from dsl_core.planning.views import plane_view
 from dsl_core.simulation.published_rig import published_rig
+from tests.cases.trial import run_trial, trial_view
 
 BRIGHT = (Setting(exposure_ms=1000 / 6, level=0.2), Setting(exposure_ms=1000 / 3, level=0.8))
 

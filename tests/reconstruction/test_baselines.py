@@ -10,9 +10,9 @@ from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.planning.trial import PLACES, Trial, run_trial
 from dsl_core.reconstruction.spectral.nearest_line import basis_solution, chart_basis
 from dsl_core.simulation.published_rig import published_rig
+from tests.cases.trial import PLACES, Trial, run_trial
 
 PLAN = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(step_px=4))
 

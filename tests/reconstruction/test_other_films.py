@@ -6,8 +6,8 @@ import pytest
 
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
 from dsl_core.planning import references
-from dsl_core.planning.trial import PLACES, run_trial
 from dsl_core.simulation.published_rig import published_rig
+from tests.cases.trial import PLACES, run_trial
 
 PLAN = CapturePlan(
     code=GrayCode(rows=False),

@@ -16,7 +16,7 @@ from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase, ScanState
 
 from dsl_core.planning.designed import DesignedSet, packed, save_design
-from dsl_core.simulation.faults import FaultPlan, with_faults
+from tests.cases.faults import FaultPlan, with_faults
 from tests.screens.stage import CHART_RIG, Stage
 
 #: Takes as long as real devices would, so that a running scan can be looked at.

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dsl_core.capture.drift import pick_reference_shots
+from dsl_core.capture.movement import pick_reference_shots
 from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError

@@ -18,7 +18,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner, JobState
 from dsl_app.shared.known_files import Kind, kind_of
 from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.undo import UndoStack
-from dsl_core.capture.status import State, Status
+from dsl_core.capture.runner import State, Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError, DriftError, DslError
 from dsl_core.io.calibration_library import CalibrationLibrary

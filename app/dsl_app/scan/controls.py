@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
 from dsl_app.shared.notify import describe_seconds
-from dsl_core.capture.status import Status
+from dsl_core.capture.runner import Status
 
 _PHASE_ROLES = {Phase.LOST: "bad", Phase.DONE: "good", Phase.PAUSED: "warn", Phase.STOPPED: "warn"}
 RESUME = "Resume at the first missing frame, after checking whether anything has moved"

@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dsl_app.scan.state import LivePicture
-from dsl_core.capture.growth import IntensityGraph, IntensityGraphs
-from dsl_core.capture.preview import quick_picture
-from dsl_core.capture.runner import Runner
-from dsl_core.capture.status import Status
+from dsl_core.capture.preview import IntensityGraph, IntensityGraphs, quick_picture
+from dsl_core.capture.runner import Runner, Status
 from dsl_core.devices.base import CameraInfo, DeviceRig
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot

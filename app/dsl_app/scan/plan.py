@@ -289,8 +289,7 @@ def read_plan(path: Path, now: CapturePlan) -> CapturePlan:
 
     if kind_of(path) is not Kind.PATTERNS:
         return load_plan(path)
-    from dsl_core.planning.design import columns_of
-    from dsl_core.planning.designed import load_design
+    from dsl_core.planning.designed import columns_of, load_design
 
     made = load_design(path)
     width_px = now.projector_size_px[0]

@@ -21,7 +21,7 @@ from dsl_app.scan.controls import progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.widgets.forms import ChoiceBox, label, set_role
-from dsl_core.capture.status import Status
+from dsl_core.capture.runner import Status
 from dsl_core.model.plan import Columns
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Event, Value
-from dsl_core.capture.growth import IntensityGraph
-from dsl_core.capture.status import State, Status
+from dsl_core.capture.preview import IntensityGraph
+from dsl_core.capture.runner import State, Status
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.presets import PRESETS, Preset, on_cycles
 

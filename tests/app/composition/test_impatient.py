@@ -29,9 +29,9 @@ from shiboken6 import isValid
 
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.presets import PRESETS
-from dsl_core.simulation.faults import FaultPlan, with_faults
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.small_result import write_small_result
+from tests.cases.faults import FaultPlan, with_faults
 
 ROOT = Path(__file__).resolve().parents[3]
 _LEFT = Qt.MouseButton.LeftButton

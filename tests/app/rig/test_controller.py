@@ -3,6 +3,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.patterns.trial_pictures import PictureKind
+from dsl_core.progress import NoProgress
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 
@@ -90,6 +92,28 @@ def test_live_frames_arrive_until_the_view_stops(qtbot: QtBot, start: Start) -> 
     assert isinstance(frames[0], Frame)
     assert frames[0].pixels.dtype == np.uint16
     runner.shut_down()
+
+
+def test_only_frames_lost_in_a_row_lose_the_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    live, _ = controller()
+    good = Frame(np.zeros((4, 4), np.uint16), 1.0, 0.0, 1)
+    answers = [None, None, good, None, None, good, None, None, None, good]
+    monkeypatch.setattr("dsl_app.rig.controller.LIVE_PERIOD_S", 0.0)
+
+    class Camera:
+        def configure(self, exposure_ms: float) -> float:
+            return exposure_ms
+
+        def snap(self) -> Frame:
+            answer = answers.pop(0)
+            if answer is None:
+                raise DeviceError("No frame arrived.")
+            return answer
+
+    with pytest.raises(DeviceError, match="No frame arrived"):
+        live._look(SimpleNamespace(camera=Camera()), NoProgress())  # type: ignore[arg-type]
+    assert answers == [good]
+    assert live._counts == FrameCounts(shown=1, lost=7, skipped=1)
 
 
 def test_a_camera_that_goes_silent_is_lost_and_told(

@@ -13,7 +13,7 @@ from dsl_app.scan.plan import connect_first
 from dsl_app.scan.reconnect import ATTEMPTS, RETRY_S
 from dsl_app.scan.state import CalibrationChoice, Phase, Reconnection
 
-from dsl_core.capture.status import State, Status
+from dsl_core.capture.runner import State, Status
 from dsl_core.cli.options import PlanChoice
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DecodeError, DeviceError, DslError, StoreError

@@ -8,7 +8,7 @@ import pytest
 from dsl_app.scan.controls import RECONNECT, RESUME, banner_controls, progress_text, run_controls
 from dsl_app.scan.state import Facts, InterruptedScan, Phase, Reconnection
 
-from dsl_core.capture.status import State, Status
+from dsl_core.capture.runner import State, Status
 
 FREE = Facts(76, 12.0, 1000, 10**9)
 BLOCKED = Facts(76, 12.0, 1000, 10**9, obstacles=("No rig is connected.", "The disk is full."))

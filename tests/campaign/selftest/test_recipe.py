@@ -17,9 +17,9 @@ from dsl_core.errors import CalibrationError, Cancelled, DeviceError, StoreError
 from dsl_core.model.calibration.selftest import Measured, SelfTest
 from dsl_core.model.figure import Figure, failures
 from dsl_core.progress import CallbackProgress, CancelToken, NoProgress
-from dsl_core.simulation.faults import FaultPlan, with_faults
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import open_twin
+from tests.cases.faults import FaultPlan, with_faults
 from tests.cases.light_rig import LightWorld, light_rig
 
 RECIPE = SelfTestRecipe()

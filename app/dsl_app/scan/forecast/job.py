@@ -28,7 +28,7 @@ LOOK_S = 0.1
 
 def usual_candidates(rig: Rig) -> Iterable[CapturePlan]:
     """All plans that the planner considers."""
-    from dsl_core.planning.candidates import candidate_plans
+    from dsl_core.planning.choice import candidate_plans
 
     return candidate_plans(rig)
 

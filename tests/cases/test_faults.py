@@ -15,7 +15,7 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
-from dsl_core.simulation.faults import FaultPlan, with_faults
+from tests.cases.faults import FaultPlan, with_faults
 
 PLAN = CapturePlan(
     camera_size_px=(12, 8),

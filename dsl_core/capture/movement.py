@@ -13,12 +13,12 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import Shot
 
-#: Pixels are averaged over blocks of this many rows and columns, so that noise does not pass for drift.
+#: Pixels are averaged over blocks of this many rows and columns, so that noise does not pass for movement.
 BLOCK_PX = 8
 
 
 @dataclass(frozen=True)
-class DriftReport:
+class MovementReport:
     """How far two takes of the same shots differ.
 
     ``brightness_ratio`` is new over old light; ``change`` the root mean square difference of block means
@@ -32,7 +32,7 @@ class DriftReport:
 
     @property
     def is_stable(self) -> bool:
-        """Whether the scan may go on as one scan."""
+        """Whether the scan may continue as one scan."""
         return max(self.change, abs(self.brightness_ratio - 1.0)) <= self.limit
 
     @property
@@ -49,21 +49,21 @@ class DriftReport:
 
 
 def pick_reference_shots(done: Iterable[Shot]) -> list[Shot]:
-    """Two old shots that show most: a white one, if there is one, and the last of the code before it."""
+    """Two old shots that show most: a white one, if any, and the last of the code before it."""
     shots = list(done)
     white = [shot for shot in shots if shot.role == "white"][-1:]
     code = [shot for shot in shots if shot.role == "code"][-1:]
     return [*code, *white] or shots[-2:]
 
 
-def check_drift(
+def check_movement(
     rig: DeviceRig,
     source: FrameSource,
     shots: Iterable[Shot],
     pattern_image: PatternImage,
     limit: float = 0.03,
     policy: RetryPolicy | None = None,
-) -> DriftReport:
+) -> MovementReport:
     """Take ``shots`` again and compare them with the stored ones; nothing is stored.
 
     Raises `DeviceError` when the rig fails, `StoreError` when a stored frame is damaged, ``ValueError``
@@ -71,7 +71,7 @@ def check_drift(
     """
     chosen = list(shots)
     if not chosen:
-        raise ValueError("a drift check needs at least one shot that was taken before")
+        raise ValueError("a check for movement needs at least one shot that was taken before")
     taker = ShotTaker(rig, source.plan, pattern_image, policy or RetryPolicy())
     black_dn = rig.calibration.sensor.black_level_dn if rig.calibration else 0.0
     try:
@@ -85,7 +85,7 @@ def check_drift(
     new_light = sum(float(new.sum()) for _, new in pairs)
     ratio = new_light / old_light if old_light > 0 else float("inf")
     change = max(_change(old * ratio, new) for old, new in pairs) if np.isfinite(ratio) else float("inf")
-    return DriftReport(tuple(shot.index for shot in chosen), ratio, change, limit)
+    return MovementReport(tuple(shot.index for shot in chosen), ratio, change, limit)
 
 
 def _blocks(pixels: NDArray[np.uint16]) -> NDArray[np.float64]:

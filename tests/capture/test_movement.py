@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.drift import check_drift, pick_reference_shots
+from dsl_core.capture.movement import check_movement, pick_reference_shots
 from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import replay_rig
@@ -52,9 +52,9 @@ def test_reference_shots_are_white_and_the_finest_code() -> None:
     assert pick_reference_shots(first_two) == [first_two[1]]
 
 
-def test_noise_is_no_drift() -> None:
+def test_noise_is_not_movement() -> None:
     shots = pick_reference_shots(PLAN.shots())
-    report = check_drift(_rig(lambda scene: scene), _scan(1), shots, pattern_image)
+    report = check_movement(_rig(lambda scene: scene), _scan(1), shots, pattern_image)
     assert report.is_stable
     assert report.shots == tuple(shot.index for shot in shots)
     assert "Nothing moved" in report.message
@@ -65,7 +65,7 @@ def test_noise_is_no_drift() -> None:
     [(lambda scene: 0.9 * scene, 0.9), (lambda scene: np.roll(scene, 2, axis=1), 1.0)],
 )
 def test_fading_and_motion_are_found(change: Change, brightness_ratio: float) -> None:
-    report = check_drift(_rig(change), _scan(1), pick_reference_shots(PLAN.shots()), pattern_image)
+    report = check_movement(_rig(change), _scan(1), pick_reference_shots(PLAN.shots()), pattern_image)
     assert not report.is_stable
     assert report.brightness_ratio == pytest.approx(brightness_ratio, abs=0.01)
     assert "Start a new scan" in report.message
@@ -80,10 +80,10 @@ def test_the_black_level_is_no_light() -> None:
 
     rig = replace(_rig(above(0.9)), calibration=published_rig())
     assert published_rig().sensor.black_level_dn == black
-    report = check_drift(rig, _scan(1, above(1.0)), pick_reference_shots(PLAN.shots()), pattern_image)
+    report = check_movement(rig, _scan(1, above(1.0)), pick_reference_shots(PLAN.shots()), pattern_image)
     assert report.brightness_ratio == pytest.approx(0.9, abs=0.005)
 
 
 def test_without_shots_there_is_nothing_to_compare() -> None:
     with pytest.raises(ValueError, match="at least one shot"):
-        check_drift(_rig(lambda scene: scene), _scan(1), [], pattern_image)
+        check_movement(_rig(lambda scene: scene), _scan(1), [], pattern_image)

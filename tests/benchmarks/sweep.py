@@ -1,4 +1,4 @@
-"""Many plans measured with the twin: one file a point, so that a sweep that stops goes on where it was."""
+"""Many plans measured with the twin: one file a point, so that a sweep that stops resumes where it was."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import asdict
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 from pydantic import ValidationError
 
 from dsl_core import pipeline
@@ -19,17 +20,52 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.planning.binning import binned
-from dsl_core.planning.trial import run_trial
+from dsl_core.planning.prediction import binned
 from dsl_core.progress import NoProgress, Progress
+from tests.cases.trial import run_trial
 
-#: Part of every key: points measured by another method than today's are measured anew.
+#: Part of every key: points measured by another method than today's are measured again.
 METHOD = 5
+
+
+def filters() -> references.References:
+    """The nine filters of the twin's scene of that name, 450 to 650 nm every 25."""
+    return references.peaks(tuple(float(nm) for nm in range(450, 651, 25)))
+
+
+def unseen() -> references.References:
+    """Twenty-four spectra that no design and no prior was made with: steps, bumps, wiggles, greys.
+
+    Sigmoid edges, Gaussian bands, double bands and slow oscillations, drawn once; pigments, dyes and greys
+    look so.
+    """
+    rng = np.random.Generator(np.random.PCG64(2024))
+    rows, names = [], []
+    x = references.FINE_NM
+    for i in range(24):
+        kind = ("edge", "band", "two bands", "wave")[i % 4]
+        low, high = rng.uniform(0.03, 0.2), rng.uniform(0.4, 0.9)
+        centre, width = rng.uniform(440, 650), rng.uniform(12, 45)
+        if kind == "edge":
+            shape = 1 / (1 + np.exp(-(x - centre) / width * rng.choice([-2, 2])))
+        elif kind == "band":
+            shape = np.exp(-0.5 * ((x - centre) / width) ** 2)
+        elif kind == "two bands":
+            other = centre + rng.choice([-1, 1]) * rng.uniform(50, 100)
+            shape = np.exp(-0.5 * ((x - centre) / width) ** 2)
+            shape = np.maximum(shape, rng.uniform(0.4, 1) * np.exp(-0.5 * ((x - other) / width) ** 2))
+        else:
+            shape = 0.5 + 0.5 * np.sin(2 * np.pi * (x - centre) / rng.uniform(60, 200))
+        rows.append(low + (high - low) * shape)
+        names.append(f"{kind} {i}")
+    return references.References(tuple(names), np.stack(rows))
+
+
 PALETTES: dict[str, Callable[[], references.References]] = {
     "chart": references.chart,
     "peaks": references.peaks,
-    "filters": references.filters,
-    "unseen": references.unseen,
+    "filters": filters,
+    "unseen": unseen,
 }
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.growth import IntensityGraphs, line_positions
+from dsl_core.capture.preview import IntensityGraphs, line_positions
 from dsl_core.capture.sink import MemorySink, WatchedSink
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines, Setting, Shot

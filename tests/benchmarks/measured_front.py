@@ -9,11 +9,13 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import jinja2
+
 from dsl_core.errors import StoreError
-from dsl_core.evaluation.report.pages import render_page
 from dsl_core.io.staging import staged
-from dsl_core.planning.sweep import Case, Point
+from dsl_core.resources import resource_path
 from dsl_core.solve.front import front
+from tests.benchmarks.sweep import Case, Point
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -77,7 +79,16 @@ def write_measured_report(found: Sequence[Comparison], path: Path, overwrite: bo
         "data:image/png;base64," + base64.b64encode(plot_png(each)).decode("ascii") if each.best else ""
         for each in found
     ]
-    page = render_page("measured.html.j2", found=list(zip(found, plots, strict=True)))
+    templates = jinja2.FileSystemLoader([Path(__file__).parent, resource_path("report")])
+    environment = jinja2.Environment(
+        loader=templates,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    template = environment.get_template("measured_front.html.j2")
+    page = template.render(found=list(zip(found, plots, strict=True)))
     with staged([path], overwrite=overwrite) as (draft,):
         draft.write_text(page, encoding="utf-8")
     return path

@@ -8,9 +8,9 @@ import pytest
 
 from dsl_core.errors import StoreError
 from dsl_core.model.plan import CapturePlan
-from dsl_core.planning.measured import Comparison, Measured, plot_png, write_measured_report
-from dsl_core.planning.sweep import Case, Point, stored
 from dsl_core.simulation.published_rig import published_rig
+from tests.benchmarks.measured_front import Comparison, Measured, plot_png, write_measured_report
+from tests.benchmarks.sweep import Case, Point, stored
 
 
 def measured(
