@@ -219,7 +219,7 @@ class DriftWindow(QDialog):
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setWindowTitle(f"Drift check of {verdict.name}")
         self.resize(860, 420)
-        add_help_key(self, "calibrating#what-the-quick-check-sees")
+        add_help_key(self, "calibrating#what-the-drift-check-measures")
         self.table = FiguresTable("Figures of the drift check")
         self.table.apply_theme(theme)
         self.table.show_figures(verdict.figures)

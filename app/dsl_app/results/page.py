@@ -69,7 +69,7 @@ class ResultsPage(PageWidget):
         self.bar = ViewBar(state, commands)
         set_help(self.bar, "numbers#views")
         self._image = Deferred(self._make_image)
-        set_help(self._image, "numbers#under-the-picture")
+        set_help(self._image, "numbers#below-the-picture")
         self.scene = ScenePanel(state, runner)
         self.readout = Readout(state)
         set_help(self.readout, "hard-cases")
@@ -79,7 +79,7 @@ class ResultsPage(PageWidget):
         self.marks = MarksPanel(state, commands.marks)
         set_help(self.marks, "numbers#pins-regions-references")
         self.search = SearchPanel(state, commands)
-        set_help(self.search, "numbers#look-for")
+        set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
         self._theme = DARK
         self._panels = (self.bar, self._image, self.scene, self._spectra, self.marks)

@@ -39,6 +39,7 @@ ORDER = (
     "exporting",
     "importing",
     "how-it-measures",
+    "glossary",
 )
 _PROPERTY = "help"
 
