@@ -186,7 +186,7 @@ class RandomPerson:
         left = set(actions) - {*NEVER, "live_demo", "calibrate_everything"}
         results = self.window.page_of("results")
         assert isinstance(results, ResultsPage)
-        results._commands.point_at((20, 20))
+        results._control.point_at((20, 20))
         for page in PAGES:
             for key in sorted(left):
                 self.window.open_page(page)
@@ -196,7 +196,7 @@ class RandomPerson:
                     actions[key].trigger()
                     self._live(0.3)
                     if key == "view_cloud":
-                        self._wait(lambda: results.scene.scene is not None)
+                        self._wait(lambda: results.cloud.view is not None)
                     self.rest()
         for room in self.window.findChildren(Deferred):
             _ = room.content
@@ -210,9 +210,9 @@ class RandomPerson:
         assert result is not None
         self.done.append("first comparison")
         for second in (False, True):
-            page._commands.open_side(result.path, second)
+            page._control.open_side(result.path, second)
             self._wait(lambda: not page.pair._state.busy.value)
-        self._wait(lambda: len(page.pair.view.bars) == 2)
+        self._wait(lambda: len(page.pair.pictures.bars) == 2)
 
     def _busy_all_workers(self) -> None:
         """Let each worker calculate once: the last of them, and its own helpers, else come after hours."""

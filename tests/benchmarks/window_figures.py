@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from dsl_app.results.cloud.scene import TurnedScene
+from dsl_app.results.cloud.views import InteractiveCloud
 from dsl_app.results.page import ResultsPage
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
@@ -73,14 +73,14 @@ def result_figures(stage: Stage, count: int = 40) -> dict[str, tuple[float, floa
     """Milliseconds (clock, computing) of what a mouse does on a result that is open; medians."""
     page = stage.window.open_page("results")
     assert isinstance(page, ResultsPage)
-    state, commands = page._state, page._commands
+    state, control = page._state, page._control
     assert state.result.value is not None
     rows, columns = state.result.value.shape
     stage.window.do("view_colour")
     stage.settle()
     rng = np.random.default_rng(0)
     spots = [(int(rng.integers(columns)), int(rng.integers(rows // 10, rows))) for _ in range(count)]
-    figures = {"cursor to spectrum": _timed([partial(commands.point_at, at) for at in spots])}
+    figures = {"cursor to spectrum": _timed([partial(control.point_at, at) for at in spots])}
     stage.window.do("view_band")
     stage.settle()
     last = len(state.result.value.wavelengths_nm)
@@ -94,24 +94,24 @@ def turn_cloud(stage: Stage, seconds: float = 2.0) -> tuple[float, float, float]
     assert isinstance(page, ResultsPage)
     stage.window.do("view_cloud")
     stage.idle()
-    scene = page.scene.scene
-    assert isinstance(scene, TurnedScene), "nothing draws in 3D here"
-    stage.wait(lambda: scene.is_at_rest)
-    widget, at = scene.widget, scene.widget.rect().center()
-    _mouse(widget, QEvent.Type.MouseButtonPress, at)
+    view = page.cloud.view
+    assert isinstance(view, InteractiveCloud), "nothing draws in 3D here"
+    stage.wait(lambda: view.renderer.is_at_rest)
+    at = view.rect().center()
+    _mouse(view, QEvent.Type.MouseButtonPress, at)
     seen, begun = [time.perf_counter()], time.perf_counter()
-    shown = widget.projection
+    shown = view.projection()
     while time.perf_counter() < begun + seconds:
         at += QPoint(3 if len(seen) % 20 < 10 else -3, 1)
-        _mouse(widget, QEvent.Type.MouseMove, at)
+        _mouse(view, QEvent.Type.MouseMove, at)
         QApplication.processEvents()
         time.sleep(MOUSE_S)
-        if widget.projection is not shown:
-            shown = widget.projection
+        if view.projection() is not shown:
+            shown = view.projection()
             seen.append(time.perf_counter())
     left = time.perf_counter()
-    _mouse(widget, QEvent.Type.MouseButtonRelease, at)
-    stage.wait(lambda: scene.is_at_rest)
+    _mouse(view, QEvent.Type.MouseButtonRelease, at)
+    stage.wait(lambda: view.renderer.is_at_rest)
     return len(seen) / seconds, 1000 * float(np.diff(seen).max()), 1000 * (time.perf_counter() - left)
 
 

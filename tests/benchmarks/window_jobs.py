@@ -182,17 +182,17 @@ class WindowJobs:
     def _reconstruct(self, session: Path) -> None:
         page = self.stage.window.open_page("results")
         assert isinstance(page, ResultsPage)
-        commands, state = page._commands, page._state
+        control, state = page._control, page._state
         state.result.set(None)
         self.stage.window.open_path(session)
         self._wait(lambda: state.offer.value is not None)
-        commands.reconstruct()
+        control.reconstruct()
         with self._job("reconstruct, its beginning"):
             self._wait(lambda: any(job.progress.done > 0 for job in self.stage.window.parts.runner.active))
         cancel = self.stage.window.parts.runner.cancel_all
         self._cancel("reconstruct", cancel, lambda: not state.busy.value)
         with self._job("reconstruct"):
-            commands.reconstruct()
+            control.reconstruct()
             self._wait(lambda: state.result.value is not None)
             self.stage.idle()
 
@@ -259,31 +259,31 @@ class WindowJobs:
         with self._job("3D cloud, 500,000 points"):
             self.stage.window.do("view_cloud")
             self.stage.idle()
-            self._wait(lambda: page.scene.scene is not None)
+            self._wait(lambda: page.cloud.view is not None)
             self._live_for(GROW_S)
         with self._job("relight"):
-            page._commands.relight("A", False)
+            page._control.relight("A", False)
             self.stage.idle()
             self._live_for(GROW_S)
         with self._job("look for a spectrum"):
-            page._commands.point_at((400, 300))
-            page._commands.search(page.search.what.itemData(0))
+            page._control.point_at((400, 300))
+            page._control.search.start(page.search.mode.itemData(0))
             self.stage.idle()
             self._live_for(GROW_S)
-        page._commands.end_search()
+        page._control.search.clear()
         self.stage.window.do("view_colour")
 
     def _export(self) -> None:
         page = self.stage.window.open_page("results")
         assert isinstance(page, ResultsPage)
         with self._job("export"):
-            page._commands.export(
+            page._control.export.write(
                 {form: self.stage.folder / f"out.{ENDINGS[form]}" for form in ENDINGS}, True
             )
             self.stage.idle()
         runner = self.stage.window.parts.runner
         for form, ending in ENDINGS.items():
-            page._commands.export({form: self.stage.folder / f"out.{ending}"}, True)
+            page._control.export.write({form: self.stage.folder / f"out.{ending}"}, True)
             self._live_for(EXPORT_S)
             if runner.active:
                 self._cancel(f"export {form}", runner.cancel_all, lambda: not runner.active)
@@ -293,11 +293,11 @@ class WindowJobs:
         assert isinstance(page, ComparePage)
         with self._job("compare"):
             for name, second in (("chart.zarr", False), ("chart-again.zarr", True)):
-                page._commands.open_side(self.stage.material.scans / name, second=second)
+                page._control.open_side(self.stage.material.scans / name, second=second)
                 self.stage.idle()
             self._wait(lambda: page.pair._state.pair.value is not None)
         with self._job("compare with truth"):
-            page._commands.use_truth()
+            page._control.use_truth()
             self.stage.idle()
 
 

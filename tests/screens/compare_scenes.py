@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 from dsl_app.compare.page import ComparePage
-from dsl_app.compare.pair.state import Shown
-from dsl_app.compare.series.state import Kind
+from dsl_app.compare.pair.state import PairQuantity
+from dsl_app.compare.series.state import SeriesKind
 
 from tests.cases.stage_series import write_stage, write_sweep
 from tests.screens.stage import Stage
@@ -21,7 +21,7 @@ def compared(stage: Stage) -> ComparePage:
     stage.open()
     page = stage.window.open_page("compare")
     assert isinstance(page, ComparePage)
-    page._commands.open_side(stage.material.scans / "chart.zarr", second=False)
+    page._control.open_side(stage.material.scans / "chart.zarr", second=False)
     stage.idle()
     return page
 
@@ -37,20 +37,20 @@ def truth(stage: Stage) -> None:
     """A result against what the twin knows."""
     page = compared(stage)
     stage.shoot("one")
-    page._commands.use_truth()
+    page._control.use_truth()
     stage.wait(lambda: page.pair._state.pair.value is not None)
-    page._commands.point_at((60, 40))
+    page._control.point_at((60, 40))
     stage.shoot()
 
 
 def two(stage: Stage) -> None:
     """Two results, by depth and by band."""
     page = compared(stage)
-    page._commands.open_side(stage.material.scans / "chart-again.zarr", second=True)
+    page._control.open_side(stage.material.scans / "chart-again.zarr", second=True)
     stage.wait(lambda: page.pair._state.pair.value is not None)
-    page._commands.point_at((60, 40))
+    page._control.point_at((60, 40))
     stage.shoot()
-    page._commands.show(Shown.BAND)
+    page._control.show(PairQuantity.BAND)
     stage.shoot("band")
 
 
@@ -69,7 +69,7 @@ def series(stage: Stage) -> None:
     stage.shoot("empty")
     for i, position in enumerate(POSITIONS_MM):
         write_stage(stage.folder, round(position, 1), seed=i, bend_mm=0.02 * (-1) ** i)
-    page._series_commands.add([stage.folder])
+    page._series_control.add([stage.folder])
     stage.wait(lambda: page.series._state.test.value is not None and not page.series._state.busy.value)
     stage.shoot()
     stage.press("Region")
@@ -81,9 +81,9 @@ def sweep(stage: Stage) -> None:
     """Scans of one scene against the longest one."""
     page = series_page(stage)
     reference, *_ = write_sweep(stage.folder)
-    page._series_commands.ask(Kind.SWEEP)
-    page._series_commands.compare_with(reference)
-    page._series_commands.add([stage.folder])
+    page._series_control.ask(SeriesKind.SWEEP)
+    page._series_control.compare_with(reference)
+    page._series_control.add([stage.folder])
     stage.wait(lambda: len(page.series._state.points) == 3 and not page.series._state.busy.value)
     stage.shoot()
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from dsl_app.results.again.dialog import AgainDialog
-from dsl_app.results.cloud.scene import TurnedScene
-from dsl_app.results.export_dialog import ExportDialog
-from dsl_app.results.library_dialog import LibraryDialog
+from dsl_app.results.cloud.views import InteractiveCloud
+from dsl_app.results.export.dialog import ExportDialog
+from dsl_app.results.marks.library_dialog import LibraryDialog
 from dsl_app.results.page import ResultsPage
-from dsl_app.results.state import Quality, ResultsState, Seek, View
+from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog
+from dsl_app.results.state import QualityMap, ResultsState, ResultView, SearchMode
 from PySide6.QtWidgets import QDialog, QTabWidget
 
 from tests.io.spectra.test_reference_file import write_library
@@ -34,13 +34,13 @@ def opened(stage: Stage) -> tuple[ResultsPage, ResultsState]:
 def marked(stage: Stage) -> tuple[ResultsPage, ResultsState]:
     """The page with pins, a region and a reference."""
     page, state = opened(stage)
-    commands = page._commands
+    control = page._control
     for pixel in ((40, 40), (60, 40), (80, 60)):
-        commands.point_at(pixel)
-        commands.marks.pin(pixel)
-    commands.marks.add_outline(((90.0, 35.0), (104.0, 35.0), (104.0, 47.0), (90.0, 47.0)))
+        control.point_at(pixel)
+        control.marks.pin(pixel)
+    control.marks.add_outline(((90.0, 35.0), (104.0, 35.0), (104.0, 47.0), (90.0, 47.0)))
     stage.idle()
-    commands.marks.add_reference(write_reference(stage.folder / "spectroradiometer.csv", state))
+    control.marks.add_reference(write_reference(stage.folder / "spectroradiometer.csv", state))
     stage.idle()
     return page, state
 
@@ -69,27 +69,27 @@ def nothing(stage: Stage) -> None:
 def views(stage: Stage) -> None:
     """The five views of a result."""
     page, state = opened(stage)
-    page._commands.point_at((60, 40))
-    for view in View:
+    page._control.point_at((60, 40))
+    for view in ResultView:
         stage.window.do(view.value)
         stage.idle()
-        if view is View.CLOUD:
+        if view is ResultView.CLOUD:
             _wait_for_cloud(stage, page)
         stage.shoot(view.value.removeprefix("view_"))
     stage.window.do("view_quality")
-    for quality in Quality:
+    for quality in QualityMap:
         state.quality.set(quality)
         stage.shoot(f"quality-{quality.name.lower().replace('_', '-')}")
 
 
 def _wait_for_cloud(stage: Stage, page: ResultsPage) -> None:
     """The cloud is drawn in a thread of its own."""
-    stage.wait(lambda: page.scene.scene is not None)
-    scene = page.scene.scene
-    assert isinstance(scene, TurnedScene)
+    stage.wait(lambda: page.cloud.view is not None)
+    view = page.cloud.view
+    assert isinstance(view, InteractiveCloud)
     # It is filled one turn later.
     stage.settle()
-    stage.wait(lambda: scene.is_at_rest)
+    stage.wait(lambda: view.renderer.is_at_rest)
 
 
 def marks(stage: Stage) -> None:
@@ -108,7 +108,7 @@ def marks(stage: Stage) -> None:
 def library(stage: Stage) -> None:
     """Which spectra of a library to compare with."""
     page, _ = opened(stage)
-    page._commands.point_at((60, 40))
+    page._control.point_at((60, 40))
     stage.window.open_path(write_library(stage.folder / "plants.sli"))
     stage.idle()
     dialog = stage.dialog(LibraryDialog)
@@ -127,8 +127,8 @@ def limits(stage: Stage) -> None:
     page.bar.far.setValue(high)
     stage.shoot("picture")
     stage.window.do("view_cloud")
-    state.cloud_by.set(View.QUALITY)
-    state.quality.set(Quality.SHARE)
+    state.cloud_by.set(ResultView.QUALITY)
+    state.quality.set(QualityMap.SHARE)
     _wait_for_cloud(stage, page)
     stage.shoot("cloud")
 
@@ -136,7 +136,7 @@ def limits(stage: Stage) -> None:
 def light(stage: Stage) -> None:
     """The colours under another light."""
     page, _ = opened(stage)
-    page._commands.relight("A", False)
+    page._control.relight("A", False)
     stage.idle()
     stage.shoot()
 
@@ -144,7 +144,7 @@ def light(stage: Stage) -> None:
 def graph(stage: Stage) -> None:
     """What a pixel saw line by line."""
     page, _ = opened(stage)
-    page._commands.point_at((60, 40))
+    page._control.point_at((60, 40))
     stage.window.do("intensity_graph")
     stage.wait(page.graph.isVisible)
     stage.shoot()
@@ -157,11 +157,11 @@ def search(stage: Stage) -> None:
     tabs = page.findChild(QTabWidget)
     assert tabs is not None
     tabs.setCurrentWidget(page.search)
-    for seek in Seek:
-        page.search.what.setCurrentIndex(page.search.what.findData(seek))
-        stage.press("Look", page)
+    for mode in SearchMode:
+        page.search.mode.setCurrentIndex(page.search.mode.findData(mode))
+        stage.press("Search", page)
         stage.idle()
-        stage.shoot(seek.name.lower())
+        stage.shoot(mode.name.lower())
 
 
 def export(stage: Stage) -> None:
@@ -181,7 +181,7 @@ def again(stage: Stage) -> None:
     """Reconstruct again: the dialog, a bad order, the work, and the offer to compare."""
     opened(stage)
     stage.window.do("reconstruct_again")
-    dialog = stage.dialog(AgainDialog)
+    dialog = stage.dialog(ReconstructionDialog)
     stage.shoot()
     dialog.step.setValue(7)
     stage.shoot("refused")

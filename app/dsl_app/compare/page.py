@@ -1,4 +1,4 @@
-"""The Compare page: two results beside each other, or several as a series."""
+"""The Compare page: two results side by side, or several as a series."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QTabWidget, QVBoxLayout
 
-from dsl_app.compare.commands import CompareCommands
-from dsl_app.compare.pair.panel import ComparePair
-from dsl_app.compare.pair.state import CompareState
-from dsl_app.compare.series.commands import SeriesCommands
+from dsl_app.compare.pair.controller import PairController
+from dsl_app.compare.pair.panel import PairPanel
+from dsl_app.compare.pair.state import PairState
+from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.panel import SeriesPanel
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.shared.theme import Theme
@@ -20,38 +20,38 @@ from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 
 
 class ComparePage(PageWidget):
-    """Two tabs; what is opened or dropped goes to the one that is seen."""
+    """Two tabs; what is opened or dropped goes to the visible one."""
 
     def __init__(
         self,
-        state: CompareState,
-        commands: CompareCommands,
+        state: PairState,
+        control: PairController,
         series_state: SeriesState,
-        series_commands: SeriesCommands,
+        series_control: SeriesController,
     ) -> None:
         super().__init__()
-        self._commands, self._series_commands = commands, series_commands
+        self._control, self._series_control = control, series_control
         self.setAcceptDrops(True)
-        self.pair = ComparePair(state, commands)
-        self._series = Deferred(lambda: SeriesPanel(series_state, series_commands))
+        self.pair = PairPanel(state, control)
+        self._series = Deferred(lambda: SeriesPanel(series_state, series_control))
         self.tabs = QTabWidget()
         self.tabs.setDocumentMode(True)
         self.tabs.tabBar().setDrawBase(False)
         self.tabs.tabBar().setAccessibleName("Two results or a series")
         for tab, title, tip in (
-            (self.pair, "T&wo results", "Two results, or one against the truth, pixel by pixel"),
-            (self._series, "S&eries", "Depth over positions of a stage, or accuracy over time"),
+            (self.pair, "T&wo results", "Compare two results, or one with its ground truth, pixel by pixel"),
+            (self._series, "S&eries", "Depth over stage positions, or accuracy over time"),
         ):
             self.tabs.setTabToolTip(self.tabs.addTab(tab, title), tip)
         QVBoxLayout(self).addWidget(self.tabs)
 
     @property
     def series(self) -> SeriesPanel:
-        """The series, made when somebody looks."""
+        """The series panel, made on first use."""
         return self._series.content
 
     def show_series(self) -> None:
-        """Show the tab of several results."""
+        """Show the Series tab."""
         self.tabs.setCurrentWidget(self._series)
 
     @property
@@ -59,7 +59,7 @@ class ComparePage(PageWidget):
         return self.tabs.currentWidget() is self._series
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
-        """Actions of the table that this page does."""
+        """Actions that this page handles."""
         return {"series_add": self._add_to_series}
 
     def _add_to_series(self) -> None:
@@ -67,35 +67,35 @@ class ComparePage(PageWidget):
         self.series.choose()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
-        """Take folders."""
+        """Accept folders."""
         if dropped_paths(event.mimeData()):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Add to the series, or put what is dropped on a free side."""
+        """Add to the series, or open what is dropped on a free side."""
         paths = dropped_paths(event.mimeData())
         if self._shows_series:
-            self._series_commands.add(paths)
+            self._series_control.add(paths)
             return
         for path in paths:
-            if not self._commands.open(path):
-                self._commands.open_side(path, second=False)
+            if not self._control.open(path):
+                self._control.open_side(path, second=False)
 
     def compare(self, first: Path, second: Path) -> None:
-        """Compare two results, where one sees it."""
+        """Compare two results on the first tab."""
         self.tabs.setCurrentWidget(self.pair)
-        self._commands.open_both(first, second)
+        self._control.open_both(first, second)
 
     def open_path(self, path: Path) -> bool:
-        """Take a result: for the series, or on a free side."""
-        if self._shows_series and self._series_commands.knows(path):
-            self._series_commands.add([path])
+        """Open a result: in the series, or on a free side."""
+        if self._shows_series and self._series_control.knows(path):
+            self._series_control.add([path])
             return True
-        return self._commands.open(path)
+        return self._control.open(path)
 
     def command_line(self) -> str:
-        """The command that does what the tab shows."""
-        return (self._series_commands if self._shows_series else self._commands).command_line()
+        """The command that does what the visible tab shows."""
+        return (self._series_control if self._shows_series else self._control).command_line()
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
@@ -103,7 +103,7 @@ class ComparePage(PageWidget):
         self._series.apply_theme(theme)
 
     def release(self) -> None:
-        """Follow nothing more."""
+        """Stop following the states."""
         self.pair.release()
         if self._series.made is not None:
             self._series.made.release()

@@ -15,8 +15,8 @@ from dsl_app.shell.main_window import MainWindow
 if TYPE_CHECKING:
     from dsl_app.importing.controller import ImportController
     from dsl_app.importing.dialog import ImportDialog
-    from dsl_app.results.again.controller import AgainController
-    from dsl_app.results.again.state import AgainDone
+    from dsl_app.results.reconstruct_again.controller import ReconstructionController
+    from dsl_app.results.reconstruct_again.state import Reconstructed
 
 #: Pages that the new result replaces; on other pages it is offered instead.
 REPLACED_PAGES = ("results", "scan")
@@ -78,12 +78,14 @@ class ReconstructAgainAction:
         self._window = window
 
     @cached_property
-    def control(self) -> AgainController:
+    def control(self) -> ReconstructionController:
         """The controller, made when it is first needed."""
-        from dsl_app.results.again.controller import AgainController
-        from dsl_app.results.again.state import AgainState
+        from dsl_app.results.reconstruct_again.controller import ReconstructionController
+        from dsl_app.results.reconstruct_again.state import ReconstructionState
 
-        control = AgainController(AgainState(), self._window.parts.runner, self._window.toasts)
+        control = ReconstructionController(
+            ReconstructionState(), self._window.parts.runner, self._window.toasts
+        )
         control.state.ready.connect(lambda _: self._ask())
         control.state.done.connect(self._show)
         return control
@@ -103,13 +105,13 @@ class ReconstructAgainAction:
         return Path(name) if name else None
 
     def _ask(self) -> None:
-        from dsl_app.results.again.dialog import AgainDialog
+        from dsl_app.results.reconstruct_again.dialog import ReconstructionDialog
 
-        dialog = AgainDialog(self.control.state, self.control, self._window)
+        dialog = ReconstructionDialog(self.control.state, self.control, self._window)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.open()
 
-    def _show(self, done: AgainDone) -> None:
+    def _show(self, done: Reconstructed) -> None:
         window, replaces = self._window, self._window.page in REPLACED_PAGES
         window.page_of("results").open_path(done.result)
         window.parts.recent.add(done.result)

@@ -316,19 +316,19 @@ class Composition(QObject):
         self.session.serve_results(controller)
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)
-        page.again_wanted.connect(lambda: window.do("reconstruct_again"))
+        page.reconstruct_again_requested.connect(lambda: window.do("reconstruct_again"))
         return page
 
     def _compare_page(self) -> PageWidget:
         from dsl_app.compare.page import ComparePage
-        from dsl_app.compare.pair.controller import CompareController
-        from dsl_app.compare.pair.state import CompareState
+        from dsl_app.compare.pair.controller import PairController
+        from dsl_app.compare.pair.state import PairState
         from dsl_app.compare.series.controller import SeriesController
         from dsl_app.compare.series.state import SeriesState
 
         parts, toasts = self.window.parts, self.window.toasts
-        state, series_state = CompareState(), SeriesState()
-        controller = CompareController(state, parts.runner, toasts)
+        state, series_state = PairState(), SeriesState()
+        controller = PairController(state, parts.runner, toasts)
         series = SeriesController(series_state, parts.runner, toasts, parts.undo)
         self.session.serve_comparison(controller, series)
         return ComparePage(state, controller, series_state, series)

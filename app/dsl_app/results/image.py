@@ -1,4 +1,4 @@
-"""The picture of a result: views 1 to 4, the cursor, marks, and outlines drawn with the mouse."""
+"""The picture of a result: the first four views, the cursor, marks, and outlines drawn with the mouse."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.pictures import arrow_step, colour_map
 
-#: Moves of the mouse are looked at no more often than this, Hz.
+#: Mouse moves are handled at most this often, Hz.
 CURSOR_HZ = 60
-# pyqtgraph's own limit drops moves, so that the cursor would stay behind where the mouse comes to rest.
+# pyqtgraph's own limit drops the last move, so the cursor would stop short of where the mouse rests.
 pg.setConfigOption("mouseRateLimit", -1)
 
 
 class _Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
-    """The graphics view, which hands keys to the picture around it."""
+    """The graphics view, which passes keys on to the picture."""
 
     key = Signal(QKeyEvent)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Arrows, Enter, Escape and Delete are the picture's."""
+        """Offer the key to the picture first."""
         event.ignore()
         self.key.emit(event)
         if not event.isAccepted():
@@ -37,7 +37,7 @@ class _Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
 
 class ResultImage(QWidget):
-    """Paints the result of a state; tells what the mouse and keys want."""
+    """Paints the result of a state; signals report what the mouse and keys ask for."""
 
     pointed = Signal(object)
     pinned = Signal(object)
@@ -140,7 +140,7 @@ class ResultImage(QWidget):
             elif self._state.cursor.value is not None:
                 self.pinned.emit(self._state.cursor.value)
         elif key == Qt.Key.Key_Escape and self.box.is_drawing:
-            self.box.give_up()
+            self.box.cancel_outline()
         elif key == Qt.Key.Key_Delete:
             self.deleted.emit()
         elif key == Qt.Key.Key_F:

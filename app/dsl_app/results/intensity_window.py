@@ -1,4 +1,4 @@
-"""A window with the intensity graph of a pixel: three colours over the lines, against the model."""
+"""A window with the intensity graph of a pixel: its three colours in every frame, against the model."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QDialog, QVBoxLayout, QWidget
 
 from dsl_app.results.state import ResultsState
-from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import add_help_key
-from dsl_app.shared.widgets.plots import RGB_COLOURS
+from dsl_app.shared.widgets.plots import RGB_COLOURS, calm_plot, theme_plots
 from dsl_core.workflows.inspection import IntensityGraph
 
 CHANNELS = ("R", "G", "B")
@@ -22,28 +22,24 @@ ORDER_NAMES = {1: "+1", -1: "−1"}
 
 
 class IntensityWindow(QDialog):
-    """Follows the graph of a state; stays open beside the picture."""
+    """Follows the graph of a state; can stay open next to the picture."""
 
     def __init__(self, state: ResultsState, parent: QWidget) -> None:
         super().__init__(parent)
-        self._theme, self._graph = DARK, state.graph.value
+        self._graph = state.graph.value
         self.setWindowTitle("Intensity graph")
         self.resize(860, 440)
         add_help_key(self, "reading-an-intensity-graph")
-        self.plot = pg.PlotWidget(enableMenu=False)
-        self.plot.setAccessibleName("Intensity graph")
-        self.plot.setToolTip(
-            "Points are measured, lines are the model of the reconstructed spectrum. The dashed line is the"
-            " zero order; wavelengths of the first orders stand above."
+        self.plot = calm_plot(
+            "Intensity graph",
+            "Points are measured; lines are modelled from the reconstructed spectrum. The dashed line marks"
+            " the zero order; the upper axis shows the wavelengths of the first orders.",
+            "Signal (DN/ms)",
+            "Frame of the line set",
         )
         self.item = self.plot.getPlotItem()
-        self.item.hideButtons()
-        self.item.setLabel("bottom", "Frame of the line set")
-        self.item.setLabel("left", "Signal (DN/ms)")
         self.item.showAxis("top")
-        self.item.showGrid(x=True, y=True, alpha=0.18)
-        for side in ("bottom", "left", "top"):
-            self.item.getAxis(side).enableAutoSIPrefix(False)
+        self.item.getAxis("top").enableAutoSIPrefix(False)
         self.item.addLegend(offset=(-10, 10))
         self.zero = pg.InfiniteLine(angle=90, movable=False)
         self.item.addItem(self.zero, ignoreBounds=True)
@@ -68,7 +64,7 @@ class IntensityWindow(QDialog):
         ]
         self.faint = QCheckBox("Scale to the first orders")
         self.faint.setToolTip(
-            "The zero order is far brighter and leaves the window; without this all is shown"
+            "The zero order is far brighter and extends beyond the plot; clear this to show all of it"
         )
         self.faint.setChecked(True)
         self.faint.toggled.connect(lambda _: self._scale())
@@ -102,7 +98,7 @@ class IntensityWindow(QDialog):
                 span.setRegion((float(reached.min()), float(reached.max())))
         self.item.getAxis("top").setTicks([ticks(graph)])
         self._scale()
-        self.text.setText(describe(graph))
+        self.text.setText(graph_text(graph))
 
     def _scale(self) -> None:
         graph = self._graph
@@ -116,14 +112,9 @@ class IntensityWindow(QDialog):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        self._theme = theme
-        self.plot.setBackground(theme.base)
-        for side in ("left", "bottom", "top"):
-            axis = self.item.getAxis(side)
-            axis.setPen(theme.line)
-            axis.setTextPen(theme.muted)
-            axis.labelStyle["color"] = theme.muted
-            axis.setLabel(axis.labelText)
+        theme_plots((self.plot,), theme)
+        self.item.getAxis("top").setPen(theme.line)
+        self.item.getAxis("top").setTextPen(theme.muted)
         self.item.legend.setLabelTextColor(theme.text)
         self.zero.setPen(pg.mkPen(theme.text, width=1, style=Qt.PenStyle.DashLine))
         for span in self.spans.values():
@@ -147,7 +138,7 @@ def faint_top(graph: IntensityGraph) -> float:
 
 
 def ticks(graph: IntensityGraph) -> list[tuple[float, str]]:
-    """Places and names of the second axis: round wavelengths of the first orders, and the zero order."""
+    """Ticks of the upper axis: round wavelengths of the first orders, and the zero order."""
     found = []
     for frames in graph.orders.values():
         round_nm = np.isclose(graph.wavelengths_nm % LABELLED_NM, 0)
@@ -159,8 +150,8 @@ def ticks(graph: IntensityGraph) -> list[tuple[float, str]]:
     return found
 
 
-def describe(graph: IntensityGraph) -> str:
-    """What the graph says in a sentence or two."""
+def graph_text(graph: IntensityGraph) -> str:
+    """The graph in a sentence or two."""
     reached = [name for order, name in ORDER_NAMES.items() if known(graph.orders.get(order)).size]
     parts = []
     if graph.zero is not None:

@@ -1,4 +1,4 @@
-"""What each view of a result paints: values, levels, colours and the words of its colour bar."""
+"""What each view of a result paints: values, levels, colours and the label of its colour bar."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_app.results.state import Limits, Quality, ResultsState, View
+from dsl_app.results.state import Limits, QualityMap, ResultsState, ResultView
 from dsl_app.shared.widgets.pictures import DEPTH, GREY, SHARE, colour_map, spread_of
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.result import FLAG_COLOURS, FLAG_NAMES, gravest_flag
 
 #: Which light measured a band: orders +1, -1, both, or only the zero order (with the prior).
-ORDER_NAMES = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}
+ORDER_TEXTS = {1: "order +1", 2: "order −1", 3: "both first orders", 4: "zero order only"}
 ORDER_COLOURS = {1: "#4477aa", 2: "#ee6677", 3: "#228833", 4: "#ccbb44"}
 NOTHING = "#8a8f98"
 
@@ -32,7 +32,7 @@ class Layer:
 
 
 def within(depth_mm: NDArray[Any], limits: Limits | None) -> NDArray[np.bool_]:
-    """Where there is a depth that is shown; without limits all that is known."""
+    """Where there is a depth within the limits; without limits, where there is one at all."""
     shown: NDArray[np.bool_] = np.isfinite(depth_mm)
     if limits is not None:
         shown &= (depth_mm >= limits[0]) & (depth_mm <= limits[1])
@@ -40,20 +40,20 @@ def within(depth_mm: NDArray[Any], limits: Limits | None) -> NDArray[np.bool_]:
 
 
 class Layers:
-    """Makes the layers of one result; what costs time is made once."""
+    """Makes the layers of one result; what is slow to compute is kept."""
 
     def __init__(self, result: ResultArrays) -> None:
         self.result = result
         self._known: dict[str, Any] = {}
 
     def layer(self, state: ResultsState) -> Layer | None:
-        """The layer of the view at hand; None where the result has nothing to show."""
-        view = state.view.value if state.view.value is not View.CLOUD else state.cloud_by.value
-        if view is View.BAND and self.result.has_spectra:
+        """The layer of the current view; None where the result has nothing to show."""
+        view = state.view.value if state.view.value is not ResultView.CLOUD else state.cloud_by.value
+        if view is ResultView.BAND and self.result.has_spectra:
             return self._band(state.band.value)
-        if view is View.DEPTH:
+        if view is ResultView.DEPTH:
             return self._depth(state.depth_limits.value)
-        if view is View.QUALITY:
+        if view is ResultView.QUALITY:
             return self._quality(state.quality.value, state.band.value)
         picture = state.picture.value
         return Layer(picture) if picture is not None else self._depth(state.depth_limits.value)
@@ -73,29 +73,29 @@ class Layers:
         return Layer(values, self._once(name, lambda: spread_of(values)), colours, label=label)
 
     def _depth(self, limits: Limits | None) -> Layer:
-        whole = self._map("depth_mm", DEPTH, "Depth, mm")
+        whole = self._map("depth_mm", DEPTH, "Depth (mm)")
         if limits is None:
             return whole
         shown = np.where(within(whole.image, limits), whole.image, np.float32(np.nan))
         return Layer(shown, limits, DEPTH, label=whole.label)
 
-    def _quality(self, what: Quality, band: int) -> Layer | None:
+    def _quality(self, what: QualityMap, band: int) -> Layer | None:
         names = {
-            Quality.SHARE: ("data_share", "Share decided by data"),
-            Quality.SPREAD: ("reflectance_std", "Standard deviation of reflectance"),
+            QualityMap.SHARE: ("data_share", "Data share"),
+            QualityMap.SPREAD: ("reflectance_std", "Standard deviation of reflectance"),
         }
-        if what is Quality.DEPTH_SPREAD:
-            return self._map("depth_std_mm", DEPTH, "Standard deviation of depth, mm")
-        if what is Quality.FLAGS or not self.result.has_spectra:
+        if what is QualityMap.DEPTH_SPREAD:
+            return self._map("depth_std_mm", DEPTH, "Standard deviation of depth (mm)")
+        if what is QualityMap.FLAGS or not self.result.has_spectra:
             layer: Layer = self._once("flags", self._flags)
             return layer
-        if what is Quality.ORDERS:
+        if what is QualityMap.ORDERS:
             return self._orders(band)
         name, label = names[what]
         cube = self.result[name]
         high = (
             1.0
-            if what is Quality.SHARE
+            if what is QualityMap.SHARE
             else self._once(name, lambda: spread_of(cube[:: len(cube) // 6 or 1])[1])
         )
         return Layer(cube[band], (0.0, high), SHARE, label=label)
@@ -103,17 +103,17 @@ class Layers:
     def _flags(self) -> Layer:
         classes = gravest_flag(self.result["flags"])
         colours = ["", *FLAG_COLOURS.values()]
-        names = ["nothing to remark", *FLAG_NAMES.values()]
+        names = ["no flags", *FLAG_NAMES.values()]
         return _classes(classes, names, [NOTHING, *colours[1:]])
 
     def _orders(self, band: int) -> Layer:
         reach = self.result["reach"][band]
-        names = ["no spectrum", *(ORDER_NAMES.get(i, "") for i in range(1, 5))]
+        names = ["no spectrum", *(ORDER_TEXTS.get(i, "") for i in range(1, 5))]
         colours = [NOTHING, *(ORDER_COLOURS.get(i, NOTHING) for i in range(1, 5))]
         return _classes(np.minimum(reach, 4).astype(np.uint8), names, colours)
 
 
-#: How much of the colour of what is nothing to see is painted, of 255.
+#: Opacity of pixels with nothing to show, of 255.
 FAINT = 40
 
 

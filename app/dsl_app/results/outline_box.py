@@ -1,4 +1,4 @@
-"""A view box on which outlines are drawn: rectangles, ellipses, lassos by dragging, polygons by clicks."""
+"""A view box to draw outlines on: rectangles, ellipses and lassos by dragging, polygons by clicking."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 
-#: A lasso takes a corner whenever the mouse has moved this far, screen px.
+#: A lasso gets a corner whenever the mouse has moved this far, screen px.
 LASSO_STEP_PX = 3.0
-#: Corners of an ellipse: less than a thousandth of its radius is cut off.
+#: Corners of an ellipse: the polygon cuts off less than a thousandth of its radius.
 ELLIPSE_CORNERS = 90
 
 Corners = tuple[tuple[float, float], ...]
 
 
 class OutlineBox(pg.ViewBox):  # type: ignore[misc]
-    """Emits ``clicked`` with image coordinates, or ``drawn`` with a closed outline; Escape gives up.
+    """Emits ``clicked`` with image coordinates, or ``drawn`` with a closed outline.
 
     ``tool`` is empty (clicks only; dragging pans), ``rectangle``, ``ellipse``, ``polygon`` or ``lasso``.
     """
@@ -35,33 +35,33 @@ class OutlineBox(pg.ViewBox):  # type: ignore[misc]
         self.addItem(self._preview, ignoreBounds=True)
 
     def set_tool(self, tool: str) -> None:
-        """Draw with another tool; what was begun is given up."""
+        """Draw with another tool; cancels an outline that is being drawn."""
         self.tool = tool
-        self.give_up()
+        self.cancel_outline()
 
     def set_colour(self, colour: str) -> None:
-        """The colour of an outline while it is drawn."""
+        """Set the colour of outlines while they are drawn."""
         self._preview.setPen(pg.mkPen(colour, width=1.5, style=Qt.PenStyle.DashLine))
 
     @property
     def is_drawing(self) -> bool:
-        """Whether an outline is begun and not closed."""
+        """Whether an outline has been started and not closed."""
         return bool(self._corners)
 
-    def give_up(self) -> None:
-        """Forget the outline that was begun."""
+    def cancel_outline(self) -> None:
+        """Discard the outline that is being drawn."""
         self._corners = []
         self._preview.setData([], [])
 
     def close_outline(self) -> None:
-        """End the outline that was begun; nothing happens with fewer than three corners."""
+        """Close the outline; one with fewer than three corners is discarded."""
         corners = tuple(self._corners)
-        self.give_up()
+        self.cancel_outline()
         if len(corners) >= 3:
             self.drawn.emit(corners)
 
     def mouseClickEvent(self, event: Any) -> None:
-        """A click, or a polygon's corner; a second click on the same place, or a right one, closes it."""
+        """Report a click, or add a corner to a polygon; a double or right click closes it."""
         at = self.mapSceneToView(event.scenePos())
         if self.tool != "polygon":
             if event.button() == Qt.MouseButton.LeftButton:
@@ -76,7 +76,7 @@ class OutlineBox(pg.ViewBox):  # type: ignore[misc]
             self.close_outline()
 
     def mouseDragEvent(self, event: Any, axis: Any = None) -> None:
-        """Draw with the left button where the tool wants it; else pan as usual."""
+        """Draw with the left button if the tool does; otherwise pan as usual."""
         if self.tool not in (*_BETWEEN, "lasso") or event.button() != Qt.MouseButton.LeftButton:
             super().mouseDragEvent(event, axis)
             return
@@ -123,5 +123,5 @@ def ellipse(a: tuple[float, float], b: tuple[float, float]) -> Corners:
     )
 
 
-#: What is drawn between the two ends of a drag.
+#: Outlines by the two ends of a drag.
 _BETWEEN = {"rectangle": rectangle, "ellipse": ellipse}

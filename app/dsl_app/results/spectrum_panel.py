@@ -1,4 +1,4 @@
-"""Spectra of the result: live under the cursor, of every pin and region, and references."""
+"""Spectra: under the cursor, of every pin and region, and references."""
 
 from __future__ import annotations
 
@@ -12,32 +12,28 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.pictures import spread_of
+from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
-#: Higher values are wrong or gloss: they are there for who zooms out.
+#: Higher reflectances are errors or gloss; zooming out shows them.
 TOP = 1.08
 
 
 class SpectrumPanel(QWidget):
-    """Follows the cursor and the marks of a state; dragging its band line changes the band."""
+    """Follows the cursor and marks of a state; dragging the band line changes the band."""
 
     def __init__(self, state: ResultsState) -> None:
         super().__init__()
         self._state, self._theme = state, DARK
-        self.plot = pg.PlotWidget(enableMenu=False)
-        self.plot.setAccessibleName("Spectra")
-        self.plot.setToolTip(
-            "Reflectance with its 95 % band; dashed where the prior and not the data decides."
-            " Regions show the mean and one deviation of their pixels. Drag the line to change the band."
+        self.plot = calm_plot(
+            "Spectra",
+            "Reflectance with its 95 % band; dashed where the prior decides and not the data. Regions show"
+            " the mean and one standard deviation of their pixels. Drag the line to change the band.",
+            "Reflectance",
+            "Wavelength (nm)",
+            left_width=48,
         )
         self.item = self.plot.getPlotItem()
-        self.item.hideButtons()
-        self.item.setLabel("bottom", "Wavelength (nm)")
-        self.item.setLabel("left", "Reflectance")
-        self.item.getAxis("bottom").enableAutoSIPrefix(False)
-        self.item.getAxis("left").enableAutoSIPrefix(False)
-        self.item.getAxis("left").setWidth(48)
-        self.item.showGrid(x=True, y=True, alpha=0.18)
         self.item.setYRange(0, 1, padding=0.02)
         self.band_line = pg.InfiniteLine(angle=90, movable=True)
         self.item.addItem(self.band_line, ignoreBounds=True)
@@ -83,12 +79,12 @@ class SpectrumPanel(QWidget):
             self._show_band()
 
     def _show_marks(self, marks: tuple[Mark, ...]) -> None:
-        wanted = {mark.key: mark for mark in marks}
+        by_key = {mark.key: mark for mark in marks}
         for key, (mark, curve) in list(self._curves.items()):
-            if wanted.get(key) is not mark:
+            if by_key.get(key) is not mark:
                 curve.remove()
                 del self._curves[key]
-        for key, mark in wanted.items():
+        for key, mark in by_key.items():
             if key not in self._curves and mark.shown and not mark.trouble:
                 curve = SpectrumCurve(self.item, with_band=mark.kind != "reference")
                 self._colour(curve, mark)
@@ -101,19 +97,13 @@ class SpectrumPanel(QWidget):
 
     @property
     def named_curves(self) -> tuple[tuple[Any, str], ...]:
-        """The curves of what is shown, each with its name."""
+        """The curves shown for marks, each with its name."""
         return tuple((curve.solid, mark.name) for mark, curve in self._curves.values())
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
-        self.plot.setBackground(theme.base)
-        for side in ("left", "bottom"):
-            axis = self.item.getAxis(side)
-            axis.setPen(theme.line)
-            axis.setTextPen(theme.muted)
-            axis.labelStyle["color"] = theme.muted
-            axis.setLabel(axis.labelText)
+        theme_plots((self.plot,), theme)
         self.band_line.setPen(pg.mkPen(theme.accent, width=1, style=Qt.PenStyle.DashLine))
         self.band_line.setHoverPen(pg.mkPen(theme.accent, width=3))
         self.live.set_colour(theme.text, width=2)

@@ -1,4 +1,4 @@
-"""The result that is open, how it is looked at, and what was marked on it."""
+"""The open result, how it is viewed, and what is marked on it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ from dsl_core.io.spectra.reference_file import ReferenceFile
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.workflows.inspection import IntensityGraph
 
-#: The nearest and the farthest of something, mm.
+#: A nearest and a farthest depth, mm.
 Limits = tuple[float, float]
+#: The light that colours are first shown under.
+DAYLIGHT = "D65"
 _keys = itertools.count(1)
 
 
-class View(Enum):
-    """The five ways to look at a result, on keys 1 to 5; the value is the key of the action."""
+class ResultView(Enum):
+    """The five views of a result, on keys 1 to 5; the value is the key of the action."""
 
     COLOUR = "view_colour"
     BAND = "view_band"
@@ -44,7 +46,7 @@ class Tool(Enum):
     LASSO = "lasso"
 
 
-class Quality(Enum):
+class QualityMap(Enum):
     """What the quality view shows."""
 
     FLAGS = "reasons"
@@ -54,16 +56,16 @@ class Quality(Enum):
     DEPTH_SPREAD = "deviation of depth"
 
 
-# Equal only to itself: arrays of spectra have no single truth of equality, nor need tuples of marks one.
+# Equal only to itself: comparing arrays of spectra gives no single truth value.
 @dataclass(frozen=True, eq=False)
 class Mark:
     """A pin, a region or a reference: anything with a name, a colour and a spectrum.
 
-    ``colour`` counts through the theme's colours of pins. A region has an outline, or runs of pixels (row,
-    first column, columns) where it was marked in 3D; ``pixels`` lie in it, ``used`` have a spectrum, and
-    ``pixel_std`` is the mean uncertainty that is stated for one of them. A reference has a ``file``, and is
-    called ``entry`` there where the file holds several. ``trouble`` says why a mark that was kept has no
-    spectrum now; empty when it has one.
+    ``colour`` is an index into the theme's pin colours. A region has an outline, or runs of pixels (row,
+    first column, columns) when it was marked in 3D; of its ``pixels``, ``used`` have a spectrum, and
+    ``pixel_std`` is the mean uncertainty stated for one of them. A reference has a ``file``, in which
+    ``entry`` names it if there are several. ``trouble`` says why a saved mark has no spectrum now; empty when
+    it has one.
     """
 
     kind: Literal["pin", "region", "reference"]
@@ -86,17 +88,17 @@ class Mark:
 
 @dataclass(frozen=True)
 class Library:
-    """A file with several reference spectra, of which some are to be chosen."""
+    """A file with several reference spectra to choose from."""
 
     path: Path
     content: ReferenceFile
 
 
-class Seek(Enum):
-    """What is looked for in the whole picture."""
+class SearchMode(Enum):
+    """What to search the picture for."""
 
     SPECTRUM = "same spectrum"
-    METAMERS = "same colour, other spectrum"
+    METAMERS = "same colour, different spectrum"
 
 
 @dataclass(frozen=True)
@@ -105,57 +107,58 @@ class Search:
 
     name: str
     likeness: Likeness
-    seek: Seek = Seek.SPECTRUM
+    mode: SearchMode = SearchMode.SPECTRUM
     within_rad: float = 0.05
     within_delta_e: float = 2.0
 
     @property
     def found(self) -> NDArray[np.bool_]:
-        """Pixels that the limits let through."""
-        if self.seek is Seek.SPECTRUM:
+        """Pixels within the limits."""
+        if self.mode is SearchMode.SPECTRUM:
             return self.likeness.same_spectrum(self.within_rad)
         return self.likeness.metamers(self.within_delta_e, self.within_rad)
 
     @property
     def share(self) -> float | None:
-        """Share of the pixels with a spectrum that are found; None where no pixel has one."""
+        """Share found of the pixels that have a spectrum; None where no pixel has one."""
         known = int(np.isfinite(self.likeness.angle_rad).sum())
         return int(self.found.sum()) / known if known else None
 
 
 class ResultsState:
-    """Values that the results' controllers set and the page follows.
+    """Values that the controllers of results set and the page follows.
 
-    ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes;
-    it follows ``light`` and ``adapted`` once it is computed. ``cloud_by`` is the view that colours the cloud;
-    ``busy`` says in words what is being opened (empty: nothing). ``graph`` is what the pixel saw that was
-    last inspected; ``library`` waits for somebody to choose of it. ``depth_limits`` are the depths that are
-    shown, mm; None for all.
+    ``offer`` is a complete scan that could be reconstructed. ``picture`` is the colour image as RGBA bytes,
+    computed for ``picture_light``, which follows the chosen ``light`` and ``adapted`` with a delay.
+    ``cloud_by`` is the view that colours the cloud; ``busy`` says what is being opened (empty: nothing).
+    ``graph`` is the intensity graph of the pixel inspected last; ``library`` is a file whose spectra the user
+    has to choose from. ``depth_limits`` are the depths shown, mm; None for all.
     """
 
     def __init__(self) -> None:
         self.result: Value[ResultArrays | None] = Value(None)
         self.offer: Value[Path | None] = Value(None)
         self.busy = Value("")
-        self.view = Value(View.COLOUR)
-        self.cloud_by = Value(View.COLOUR)
+        self.view = Value(ResultView.COLOUR)
+        self.cloud_by = Value(ResultView.COLOUR)
         self.tool = Value(Tool.PIN)
         self.band = Value(0)
-        self.quality = Value(Quality.FLAGS)
+        self.quality = Value(QualityMap.FLAGS)
         self.depth_limits: Value[Limits | None] = Value(None)
         self.cursor: Value[Pixel | None] = Value(None)
         self.marks: Value[tuple[Mark, ...]] = Value(())
         self.selected = Value(0)
         self.picture: Value[NDArray[np.uint8] | None] = Value(None)
-        self.light = Value("D65")
+        self.light = Value(DAYLIGHT)
         self.adapted = Value(True)
+        self.picture_light = Value((DAYLIGHT, True))
         self.search: Value[Search | None] = Value(None)
         self.graph: Value[IntensityGraph | None] = Value(None)
         self.library: Value[Library | None] = Value(None)
 
     @property
     def selected_mark(self) -> Mark | None:
-        """The mark that is selected."""
+        """The selected mark."""
         return next((mark for mark in self.marks.value if mark.key == self.selected.value), None)
 
     def spectrum_at(self, pixel: Pixel) -> Spectrum | None:

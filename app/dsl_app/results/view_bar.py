@@ -1,6 +1,8 @@
-"""What is shown and how: the five views, the tools, and the controls of the view at hand."""
+"""The bar above the picture: the five views, the tools, and the controls of the current view."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
@@ -15,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.results.commands import ResultCommands
-from dsl_app.results.state import Quality, ResultsState, Tool, View
+from dsl_app.results.controller import ResultsController
+from dsl_app.results.state import QualityMap, ResultsState, ResultView, Tool
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_app.shared.widgets.icons import icon
@@ -24,85 +26,95 @@ from dsl_app.shared.widgets.pictures import spread_of
 from dsl_core.optics.relighting import LIGHTS
 
 VIEWS = (
-    (View.COLOUR, "sRGB", "Colours as the eye sees them under a light"),
-    (View.BAND, "Band", "Reflectance of one band"),
-    (View.DEPTH, "Depth", "Depth along the camera axis"),
-    (View.QUALITY, "Quality", "Why pixels are limited, which order measured a band, and deviations"),
-    (View.CLOUD, "3D cloud", "The points in space; drag to turn, wheel to zoom"),
+    (ResultView.COLOUR, "sRGB", "Colours as the eye sees them under a light source"),
+    (ResultView.BAND, "Band", "Reflectance of one band"),
+    (ResultView.DEPTH, "Depth", "Depth along the camera axis"),
+    (
+        ResultView.QUALITY,
+        "Quality",
+        "Why pixels are limited, the orders that measured a band, and deviations",
+    ),
+    (ResultView.CLOUD, "3D cloud", "The points in space; drag to rotate, wheel to zoom"),
 )
 TOOLS = (
     (Tool.PIN, "Pin", "Click to pin the spectrum of a pixel; drag to pan"),
-    (Tool.RECTANGLE, "Rectangle", "Drag a rectangle: mean and deviation of its pixels"),
-    (Tool.ELLIPSE, "Ellipse", "Drag the box around an ellipse: mean and deviation of its pixels"),
+    (Tool.RECTANGLE, "Rectangle", "Drag a rectangle: mean and standard deviation of its pixels"),
+    (
+        Tool.ELLIPSE,
+        "Ellipse",
+        "Drag a box for an ellipse: mean and standard deviation of its pixels",
+    ),
     (
         Tool.POLYGON,
         "Polygon",
-        "Click the corners; double click, Enter or a right click closes, Escape gives up",
+        "Click the corners; double-click, right-click or Enter to close, Escape to cancel",
     ),
-    (Tool.LASSO, "Lasso", "Draw around pixels, in the picture or in the cloud"),
+    (Tool.LASSO, "Lasso", "Draw around pixels in the picture or the cloud"),
 )
-#: What the cloud can be coloured by.
-CLOUD_COLOURS = ((View.COLOUR, "sRGB"), (View.BAND, "Band"), (View.DEPTH, "Depth"), (View.QUALITY, "Quality"))
-#: Sides of the tools' icons, and how narrow a choice may become, px.
+#: Views that can colour the cloud.
+CLOUD_COLOURS = tuple((view, text) for view, text, _ in VIEWS if view is not ResultView.CLOUD)
+#: Size of the tools' icons, and the smallest width of a choice, px.
 ICON_PX, CHOICE_PX = 18, 110
-_NEEDS_BAND = (Quality.ORDERS, Quality.SHARE, Quality.SPREAD)
+_NEEDS_BAND = (QualityMap.ORDERS, QualityMap.SHARE, QualityMap.SPREAD)
 
 
 class ViewBar(QWidget):
-    """Follows a state and asks a controller."""
+    """Follows a state and asks its controller."""
 
-    def __init__(self, state: ResultsState, commands: ResultCommands) -> None:
+    def __init__(self, state: ResultsState, control: ResultsController) -> None:
         super().__init__()
-        self._state, self._commands = state, commands
+        self._state, self._control = state, control
         self.views = {
             view: self._button(text, f"{tip} ({i})") for i, (view, text, tip) in enumerate(VIEWS, 1)
         }
-        # Drawn and not written, as the smallest window has no room for the words.
+        # Icons, as the smallest window has no room for text.
         self.tools = {tool: self._button(text, f"{text}. {tip}") for tool, text, tip in TOOLS}
         for view, text, _ in VIEWS:
             self.views[view].setText(text)
         self._groups = [self._group(list(each.values())) for each in (self.views, self.tools)]
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName("Band")
-        self.slider.setToolTip("Wavelength of the band (comma and full stop step it)")
+        self.slider.setToolTip("Wavelength of the band (comma and full stop change it)")
         self.slider.setMinimumWidth(64)
         self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.nm = label("")
         self.nm.setMinimumWidth(self.nm.fontMetrics().horizontalAdvance("000.0 nm"))
-        self.light = ChoiceBox("Light", "The light under which the colours are computed")
+        self.light = ChoiceBox("Light", "The light source that colours are computed for")
         for key, text in LIGHTS.items():
             self.light.addItem(text, key)
-        self.adapted = QCheckBox("adapted eyes")
-        self.adapted.setToolTip("White stays white, as to eyes used to the light; else as beside daylight")
+        self.adapted = QCheckBox("Adapted eyes")
+        self.adapted.setToolTip(
+            "White stays white under any light; if not ticked, colours look as next to daylight"
+        )
         self.quality = ChoiceBox("Quality", "What the quality view shows")
-        for each in Quality:
+        for each in QualityMap:
             self.quality.addItem(each.value[0].upper() + each.value[1:], each)
         self.cloud_by = ChoiceBox("Colour of the cloud", "What the points are coloured by")
         for view, text in CLOUD_COLOURS:
             self.cloud_by.addItem(text, view)
-        hides = "what lies {} is hidden in the depth image and the cloud, whatever colours it"
+        hides = "points {} are hidden in the depth image and in the cloud"
         self.near, self.far = (
             NumberBox(f"{name} depth", 0.0, 1e5, 0.0, "mm", 1, f"{name} depth shown; {hides.format(beyond)}")
-            for name, beyond in (("Nearest", "before it"), ("Farthest", "behind it"))
+            for name, beyond in (("Nearest", "in front of it"), ("Farthest", "behind it"))
         )
         for box in (self.near, self.far):
-            # Narrow, with the choice of a colour beside them: arrow keys step as well as buttons would.
+            # Narrow, as the colour choice is in the same row; arrow keys replace the buttons.
             box.setButtonSymbols(NumberBox.ButtonSymbols.NoButtons)
             box.setFixedWidth(box.fontMetrics().horizontalAdvance("00000.0 mm") + 16)
-        self.automatic = QCheckBox("auto")
-        self.automatic.setAccessibleName("Automatic limits of depth")
+        self.automatic = QCheckBox("Auto")
+        self.automatic.setAccessibleName("Automatic depth limits")
         self.automatic.setToolTip(
-            "Show all depths; colours cover nearly all pixels, and outliers take the ends"
+            "Show all depths; the colours cover nearly all pixels, outliers get the end colours"
         )
         for choice in (self.light, self.quality):
-            # They may be narrower than their longest words; the list that opens is not.
+            # They may be narrower than their longest entry; the list that opens is not.
             choice.setMinimumWidth(CHOICE_PX)
             choice.view().setMinimumWidth(choice.sizeHint().width())
         self._lay_out()
         self._connect()
 
     def apply_theme(self, theme: Theme) -> None:
-        """Draw the tools in the colours of a theme."""
+        """Draw the icons in the colours of a theme."""
         for tool, button in self.tools.items():
             button.setIcon(icon(tool.value, theme.text, theme.on_accent))
             button.setIconSize(QSize(ICON_PX, ICON_PX))
@@ -152,7 +164,7 @@ class ViewBar(QWidget):
             if holder is colours:
                 row.addWidget(self.slider, 1000)
             row.addStretch(1)
-            # Both have one height, so that the picture does not jump between views.
+            # Both have the same height, so that the picture does not move between views.
             row.addStrut(self.light.sizeHint().height())
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -169,8 +181,8 @@ class ViewBar(QWidget):
         self.slider.valueChanged.connect(state.band.set)
         self.light.activated.connect(lambda _: self._relight())
         self.adapted.clicked.connect(lambda _: self._relight())
-        self.quality.activated.connect(lambda _: state.quality.set(Quality(self.quality.currentData())))
-        self.cloud_by.activated.connect(lambda _: state.cloud_by.set(View(self.cloud_by.currentData())))
+        self.quality.activated.connect(lambda _: state.quality.set(QualityMap(self.quality.currentData())))
+        self.cloud_by.activated.connect(lambda _: state.cloud_by.set(ResultView(self.cloud_by.currentData())))
         for box in (self.near, self.far):
             box.valueChanged.connect(lambda _: self._limit_depth())
         self.automatic.clicked.connect(self._limit_automatically)
@@ -184,26 +196,26 @@ class ViewBar(QWidget):
             value.changed.connect(lambda _: self._show_controls())
         self._show_controls()
 
-    def _show_view(self, view: View) -> None:
-        self._commands.show(view)
+    def _show_view(self, view: ResultView) -> None:
+        self._control.show(view)
         self.views[self._state.view.value].setChecked(True)
 
     def _relight(self) -> None:
-        self._commands.relight(self.light.currentData(), self.adapted.isChecked())
+        self._control.relight(self.light.currentData(), self.adapted.isChecked())
 
     def _limit_automatically(self, automatic: bool) -> None:
         if automatic:
-            self._commands.limit_depth(None)
+            self._control.limit_depth(None)
         else:
             self._limit_depth()
 
     def _limit_depth(self) -> None:
-        self._commands.limit_depth((self.near.value(), self.far.value()))
-        # Limits that were refused go back.
+        self._control.limit_depth((self.near.value(), self.far.value()))
+        # The controller may have refused the limits.
         self._show_limits()
 
     def _show_limits(self) -> None:
-        """Show the limits of the state; without any, those of the colours."""
+        """Show the limits of the state, or those of the colours if there are none."""
         result, limits = self._state.result.value, self._state.depth_limits.value
         self.automatic.setChecked(limits is None)
         if limits is None and result is not None:
@@ -230,21 +242,43 @@ class ViewBar(QWidget):
     def _show_controls(self) -> None:
         state = self._state
         self.views[state.view.value].setChecked(True)
-        cloud = state.view.value is View.CLOUD
-        shown = state.cloud_by.value if cloud else state.view.value
+        needed = controls_for(state.view.value, state.cloud_by.value, state.quality.value)
         self.cloud_by.setCurrentIndex(self.cloud_by.findData(state.cloud_by.value))
         self.quality.setCurrentIndex(self.quality.findData(state.quality.value))
         for widgets, visible in (
-            ((self._light_label, self.light, self.adapted), shown is View.COLOUR),
-            ((self._quality_label, self.quality), shown is View.QUALITY),
-            ((self._cloud_label, self.cloud_by), cloud),
-            (
-                (self.nm, self.slider),
-                shown is View.BAND or (shown is View.QUALITY and state.quality.value in _NEEDS_BAND),
-            ),
+            ((self._light_label, self.light, self.adapted), needed.light),
+            ((self._quality_label, self.quality), needed.quality),
+            ((self._cloud_label, self.cloud_by), needed.cloud),
+            ((self.nm, self.slider), needed.band),
+            (self._rows[:1], needed.depth_row),
+            (self._rows[1:], needed.colour_row),
         ):
             for widget in widgets:
                 widget.setVisible(visible)
-        depth, colours = self._rows
-        depth.setVisible(cloud or shown is View.DEPTH)
-        colours.setVisible(shown is not View.DEPTH)
+
+
+@dataclass(frozen=True)
+class ViewControls:
+    """Which controls a view needs, and which of the two rows they are in."""
+
+    light: bool
+    quality: bool
+    band: bool
+    cloud: bool
+    depth_row: bool
+    colour_row: bool
+
+
+def controls_for(view: ResultView, cloud_by: ResultView, quality: QualityMap) -> ViewControls:
+    """The controls of a view; the cloud has those of the view that colours it as well."""
+    cloud = view is ResultView.CLOUD
+    shown = cloud_by if cloud else view
+    by_quality = shown is ResultView.QUALITY
+    return ViewControls(
+        light=shown is ResultView.COLOUR,
+        quality=by_quality,
+        band=shown is ResultView.BAND or (by_quality and quality in _NEEDS_BAND),
+        cloud=cloud,
+        depth_row=cloud or shown is ResultView.DEPTH,
+        colour_row=shown is not ResultView.DEPTH,
+    )

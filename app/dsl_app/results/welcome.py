@@ -1,4 +1,4 @@
-"""What a page shows while nothing is open: what to open, the demo, and what was opened last."""
+"""What the page shows in place of a result: what to open, recent files, or a scan to reconstruct."""
 
 from __future__ import annotations
 
@@ -7,35 +7,33 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QListWidget, QListWidgetItem, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 
 from dsl_app.shared.settings import RecentFiles, entry_text
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import label, push_button
 
 WIDTH_PX = 560
 HINT = (
     "Open a result (a folder NAME.zarr) or a finished scan (NAME.dsl), or drop one on the window. The demo is"
-    " a scan of a Color Checker on the simulated rig; it is made once, in about a minute."
+    " a scan of a Color Checker with the simulated rig; making it takes about a minute, the first time only."
 )
 
 
 class Welcome(QWidget):
-    """Follows the recent files; ``open_path`` opens one, ``demo`` the demo. ``choose`` asks for a folder."""
+    """Lists recent files; ``open_path`` opens one, ``demo`` the demo; the button ``choose`` asks for one."""
 
     def __init__(
         self, recent: RecentFiles, open_path: Callable[[Path], object], demo: Callable[[], object]
     ) -> None:
         super().__init__()
         self._recent, self._open_path = recent, open_path
-        self.choose = QPushButton("Open…")
+        self.choose = push_button("Open…", "Choose the folder of a result or of a finished scan")
         self.choose.setProperty("role", "primary")
-        self.choose.setToolTip("Choose the folder of a result or of a finished scan")
-        self.demo = QPushButton("Show the demo")
-        self.demo.setToolTip("A finished scan of the simulated rig")
+        self.demo = push_button("Show the demo", "Open a finished scan of the simulated rig")
         self.demo.clicked.connect(lambda: demo())
         self.files = QListWidget()
         self.files.setAccessibleName("Recent files")
-        self.files.setToolTip("Double click or press Enter to open")
+        self.files.setToolTip("Double-click or press Enter to open")
         self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.files.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -76,10 +74,40 @@ class Welcome(QWidget):
         self._open_path(Path(item.data(Qt.ItemDataRole.UserRole)))
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Files come and go while nobody looks."""
+        """Update the list, as files may have come or gone."""
         super().showEvent(event)
         self._fill()
 
     def release(self) -> None:
-        """Follow nothing more."""
+        """Stop following the recent files."""
         self._stop()
+
+
+class Offer(QWidget):
+    """A message in place of a result, with buttons to reconstruct a scan that has none."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.message = label("", "muted")
+        self.message.setWordWrap(True)
+        self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.reconstruct = push_button(
+            "Reconstruct", "Compute depth and spectra from the frames; the result is saved next to the scan"
+        )
+        self.reconstruct.setProperty("role", "primary")
+        self.otherwise = push_button(
+            "With other parameters…", "Choose bands, solver, calibration and name first (Ctrl+R)"
+        )
+        column = QVBoxLayout(self)
+        column.addStretch(1)
+        column.addWidget(self.message)
+        column.addSpacing(8)
+        for button in (self.reconstruct, self.otherwise):
+            column.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
+        column.addStretch(2)
+
+    def show_offer(self, message: str, can_reconstruct: bool) -> None:
+        """Show a message; the buttons only where a scan can be reconstructed."""
+        self.message.setText(message)
+        for button in (self.reconstruct, self.otherwise):
+            button.setVisible(can_reconstruct)

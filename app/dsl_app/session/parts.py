@@ -7,13 +7,12 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeVar
 
-from dsl_app.compare.pair.controller import CompareController
-from dsl_app.compare.pair.state import CompareState, Side
+from dsl_app.compare.pair.controller import PairController
+from dsl_app.compare.pair.state import PairState, Side
 from dsl_app.compare.series.controller import SeriesController
-from dsl_app.compare.series.state import Kind, SeriesState
-from dsl_app.results.controller import ResultsController
-from dsl_app.results.files import is_complete
-from dsl_app.results.state import Quality, ResultsState, View
+from dsl_app.compare.series.state import SeriesKind, SeriesState
+from dsl_app.results.controller import ResultsController, is_complete
+from dsl_app.results.state import QualityMap, ResultsState, ResultView
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import CalibrationChoice, ScanState, preset_of
 from dsl_app.session.records import ComparePart, ResultsPart, ScanPart, SeriesPart
@@ -56,10 +55,10 @@ def restore_result(part: ResultsPart, control: ResultsController) -> None:
             control.point_at(part.cursor)
         if result.has_spectra:
             control.step_band(part.band - state.band.value)
-        _set_named(state.cloud_by, View, part.cloud_by)
-        _set_named(state.quality, Quality, part.quality)
+        _set_named(state.cloud_by, ResultView, part.cloud_by)
+        _set_named(state.quality, QualityMap, part.quality)
         state.depth_limits.set(part.depth_limits)
-        view = _named(View, part.view)
+        view = _named(ResultView, part.view)
         if view is not None:
             control.show(view)
         if (part.light, part.adapted) != (state.light.value, state.adapted.value):
@@ -99,7 +98,7 @@ def restore_scan(part: ScanPart, control: ScanController) -> None:
         control.plans.choose_calibration(CalibrationChoice(part.calibration, part.calibration))
 
 
-def compare_part(state: CompareState) -> ComparePart | None:
+def compare_part(state: PairState) -> ComparePart | None:
     """The two sides."""
     first, second = state.first.value, state.second.value
     if first is None and second is None:
@@ -108,7 +107,7 @@ def compare_part(state: CompareState) -> ComparePart | None:
     return ComparePart(first=_path(first), second=None if truth else _path(second), with_truth=truth)
 
 
-def restore_comparison(part: ComparePart, control: CompareController) -> None:
+def restore_comparison(part: ComparePart, control: PairController) -> None:
     """Open A, then B or the truth of A."""
 
     def then(_: Side | None) -> None:
@@ -142,7 +141,7 @@ def series_part(state: SeriesState) -> SeriesPart | None:
 def restore_series(part: SeriesPart, control: SeriesController) -> None:
     """Compare the same results in the same way."""
     state = control.state
-    _set_named(state.kind, Kind, part.kind)
+    _set_named(state.kind, SeriesKind, part.kind)
     for figure in FIGURES:
         if figure.field == part.figure:
             state.figure.set(figure)

@@ -11,7 +11,7 @@ from dsl_app.session.store import SessionStore
 from dsl_app.shell.main_window import MainWindow
 
 if TYPE_CHECKING:
-    from dsl_app.compare.pair.controller import CompareController
+    from dsl_app.compare.pair.controller import PairController
     from dsl_app.compare.series.controller import SeriesController
     from dsl_app.results.controller import ResultsController
     from dsl_app.scan.controller import ScanController
@@ -28,7 +28,7 @@ class SessionRestore(QObject):
         self._window = window
         self._results: ResultsController | None = None
         self._scans: ScanController | None = None
-        self._compare: CompareController | None = None
+        self._compare: PairController | None = None
         self._series: SeriesController | None = None
         self.store = SessionStore(window.parts.settings_path.parent / "sessions", self.collect)
         self._timer = QTimer(self)
@@ -64,7 +64,7 @@ class SessionRestore(QObject):
             state.calibration,
         )
 
-    def serve_comparison(self, control: CompareController, series: SeriesController) -> None:
+    def serve_comparison(self, control: PairController, series: SeriesController) -> None:
         """Save what the Compare page compares: two results, and a series."""
         self._compare, self._series = control, series
         several = series.state

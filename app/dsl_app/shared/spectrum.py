@@ -1,4 +1,4 @@
-"""The spectrum of a pixel as something to draw."""
+"""The spectrum of a pixel as something to draw, and values as text."""
 
 from __future__ import annotations
 
@@ -42,3 +42,12 @@ def spectrum_of_pixel(result: ResultArrays, pixel: Pixel) -> Spectrum | None:
         for name in ("reflectance_std", "data_share")
     )
     return Spectrum(result.wavelengths_nm, mean, std, share)
+
+
+def number_text(value: float, decimals: int) -> str:
+    """A number with a typographic minus; a dash for NaN and infinity.
+
+    >>> number_text(-1.25, 1), number_text(np.nan, 1)
+    ('−1.2', '–')
+    """
+    return f"{value:.{decimals}f}".replace("-", "−") if np.isfinite(value) else "–"

@@ -20,9 +20,9 @@ from dsl_app.calibrate.wizard.state import Doing
 from dsl_app.calibrate.wizard.window import CalibrationWizard
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link
-from dsl_app.results.export_dialog import ExportDialog
+from dsl_app.results.export.dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
-from dsl_app.results.state import ResultsState, View
+from dsl_app.results.state import ResultsState, ResultView
 from dsl_app.rig.page import RigPage
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
@@ -256,7 +256,7 @@ class Session:
         assert isinstance(page, ResultsPage)
         self.close_toasts()
         click(page.title)
-        for view, digit in zip(reversed(View), "54321", strict=True):
+        for view, digit in zip(reversed(ResultView), "54321", strict=True):
             type_letter(self.window, digit)
             wait(lambda view=view: state.view.value is view, f"the view {view.value}")  # type: ignore[misc]
             self.idle()

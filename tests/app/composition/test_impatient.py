@@ -14,7 +14,7 @@ import pytest
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.results.page import ResultsPage
-from dsl_app.results.state import View
+from dsl_app.results.state import ResultView
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase
 from dsl_app.shell.actions import PAGES
@@ -199,10 +199,10 @@ def test_every_page_fits_the_smallest_window(bench: Bench, tmp_path: Path) -> No
         least = shown.minimumSizeHint()
         assert least.width() <= room.width(), f"{page.key}: {least} in {room}"
         if isinstance(shown, ResultsPage):
-            for view in View:
+            for view in ResultView:
                 shown._state.view.set(view)
                 assert shown.minimumSizeHint().width() <= room.width(), view
-            shown._state.view.set(View.COLOUR)
+            shown._state.view.set(ResultView.COLOUR)
             bench.live(0.05)
         for button in _buttons(shown):
             if button.isVisible():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from dsl_app.calibrate.campaign_box import NewCampaignDialog
 from dsl_app.composition.window import Composition, StartOptions
-from dsl_app.results.export_dialog import ExportDialog
+from dsl_app.results.export.dialog import ExportDialog
 from dsl_app.results.page import ResultsPage
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shell.actions import PAGES

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 from dsl_app.compare.page import ComparePage
-from dsl_app.compare.pair.controller import CompareController
-from dsl_app.compare.pair.state import CompareState
+from dsl_app.compare.pair.controller import PairController
+from dsl_app.compare.pair.state import PairState
 from dsl_app.compare.series.controller import SeriesController
-from dsl_app.compare.series.state import Kind, SeriesState
+from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.state import Quality, ResultsState, View
+from dsl_app.results.state import QualityMap, ResultsState, ResultView
 from dsl_app.session.parts import (
     compare_part,
     restore_comparison,
@@ -118,8 +118,8 @@ def test_a_result_is_looked_at_as_before(tmp_path: Path) -> None:
     first.step_band(-5)
     first.point_at((7, 8))
     first.marks.pin((7, 8))
-    first.show(View.QUALITY)
-    first.state.quality.set(Quality.SHARE)
+    first.show(ResultView.QUALITY)
+    first.state.quality.set(QualityMap.SHARE)
     first.limit_depth((705.0, 710.0))
     first.relight("A", adapted=False)
     part = results_part(first.state)
@@ -173,8 +173,8 @@ def test_a_comparison_comes_back(tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     a, b = write_small_result(tmp_path), write_small_result(tmp_path / "b")
 
-    def compared() -> CompareController:
-        return CompareController(CompareState(), InlineRunner(), RecordingNotifier())
+    def compared() -> PairController:
+        return PairController(PairState(), InlineRunner(), RecordingNotifier())
 
     first = compared()
     assert compare_part(first.state) is None
@@ -212,7 +212,7 @@ def test_a_depth_test_comes_back_with_its_positions_and_region(tmp_path: Path) -
 def test_a_sweep_comes_back_without_what_is_gone(tmp_path: Path) -> None:
     reference, *scans = write_sweep(tmp_path)
     first = several()
-    first.ask(Kind.SWEEP)
+    first.ask(SeriesKind.SWEEP)
     first.add([reference, *scans])
     first.compare_with(reference)
     first.show_figure(FIGURES[1])

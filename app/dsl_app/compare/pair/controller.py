@@ -1,4 +1,4 @@
-"""What the Compare page decides: which results, against what, their figures and the report. No Qt."""
+"""Two results: reads them, compares them and writes their report. No Qt."""
 
 from __future__ import annotations
 
@@ -10,36 +10,35 @@ from typing import TypeVar
 
 import numpy as np
 
-from dsl_app.compare.pair.state import CompareState, Pair, Shown, Side
+from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, Side
 from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier
+from dsl_app.shared.known_files import RESULT_NAME
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.spectrum import Pixel
-from dsl_core.errors import DslError
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.result.result_arrays import ResultArrays, load_arrays
 from dsl_core.progress import Progress
 
 T = TypeVar("T")
-RESULT = "zarr.json"
 
 
-class CompareController:
-    """Fills the two sides of a `CompareState` and compares them."""
+class PairController:
+    """Sets the two sides of a `PairState` and compares them."""
 
-    def __init__(self, state: CompareState, runner: JobRunner, notifier: Notifier) -> None:
+    def __init__(self, state: PairState, runner: JobRunner, notifier: Notifier) -> None:
         self.state, self._runner, self._notifier = state, runner, notifier
-        #: Results that were opened while another one was being read.
+        #: Results opened while another one was being read.
         self._waiting: deque[Path] = deque()
 
     # Sides -----------------------------------------------------------------------------------------
 
     def open(self, path: Path) -> bool:
-        """Put a result on the first side that is free, else in place of B; False for anything else.
+        """Open a result as A if A is free, else as B; False for anything else.
 
-        Results that are opened together follow one after the other.
+        Results opened together are read one after the other.
         """
-        if not (path / RESULT).is_file():
+        if not (path / RESULT_NAME).is_file():
             return False
         self._waiting.append(path)
         self._open_next()
@@ -51,8 +50,8 @@ class CompareController:
 
     def open_side(self, path: Path, second: bool) -> None:
         """Read a result as A, or as B."""
-        if not (path / RESULT).is_file():
-            self._notifier.tell("warning", f"{path.name} is no result. Choose a folder NAME.zarr.")
+        if not (path / RESULT_NAME).is_file():
+            self._notifier.tell("warning", f"{path.name} is not a result. Choose a folder NAME.zarr.")
             return
         side = self.state.second if second else self.state.first
         self._start(
@@ -68,7 +67,7 @@ class CompareController:
             return [Side(path.stem, load_arrays(path, progress)) for path in (first, second)]
 
         def done(sides: list[Side]) -> None:
-            # Each alone would be compared with what was there before.
+            # One at a time, each would be compared with what was open before.
             self.state.first.set(sides[0])
             self.state.second.set(sides[1])
             self._compare()
@@ -76,24 +75,24 @@ class CompareController:
         self._start(f"Open {first.name} and {second.name}", work, done)
 
     def use_truth(self) -> None:
-        """Take what the twin knows of the scene of A as B."""
+        """Use the ground truth of A's simulated scene as B."""
         first = self.state.first.value
         if first is None:
-            self._notifier.tell("info", "Open a result as A first; its truth then becomes B.")
+            self._notifier.tell("info", "Open a result as A first; its ground truth then becomes B.")
             return
 
         def work(progress: Progress) -> Side:
             from dsl_core.io.result.result_file import load_result
             from dsl_core.workflows.scans import truth_of
 
-            progress.report("ask the twin", 0, 1)
+            progress.report("read the ground truth", 0, 1)
             truth = truth_of(load_result(first.arrays.path))
             return Side(f"truth of {first.name}", truth_arrays(first.arrays, truth), truth)
 
-        self._start("Ask the twin for its truth", work, lambda side: self._take(self.state.second, side))
+        self._start("Read the ground truth", work, lambda side: self._take(self.state.second, side))
 
     def swap(self) -> None:
-        """Let A and B change places; truth stays B."""
+        """Swap A and B; the ground truth stays B."""
         first, second = self.state.first.value, self.state.second.value
         if first is not None and second is not None and second.truth is None:
             self.state.first.set(second)
@@ -103,14 +102,14 @@ class CompareController:
     def _take(self, place: Value[Side | None], side: Side) -> None:
         second = self.state.second.value
         if place is self.state.first and second is not None and second.truth is not None:
-            # Truth belongs to the result that it was asked for.
+            # The ground truth belongs to the result it was read for.
             self.state.second.set(None)
         place.set(side)
         self._compare()
 
     def _start(self, title: str, work: Callable[[Progress], T], done: Callable[[T], None]) -> None:
         if self.state.busy.value:
-            self._notifier.tell("info", f"{self.state.busy.value} is not finished. Wait for it or cancel.")
+            self._notifier.tell("info", f"{self.state.busy.value} is not finished. Wait for it or cancel it.")
             return
         self.state.busy.set(title)
 
@@ -127,9 +126,8 @@ class CompareController:
 
     def _failed(self, error: Exception) -> None:
         self.state.busy.set("")
-        text = str(error) if isinstance(error, DslError) else f"{type(error).__name__}: {error}"
-        self.state.trouble.set(text)
-        self._notifier.tell("error", text)
+        self.state.trouble.set(sentence_of(error))
+        self._notifier.tell("error", sentence_of(error))
         self._open_next()
 
     # Compare ---------------------------------------------------------------------------------------
@@ -145,29 +143,29 @@ class CompareController:
 
     def _compared(self, pair: Pair) -> None:
         if not pair.bands:
-            self.state.shown.set(Shown.DEPTH)
+            self.state.shown.set(PairQuantity.DEPTH)
         self.state.band.set(len(pair.bands) // 2)
         self.state.cursor.set(None)
         self.state.pair.set(pair)
 
     # Look ------------------------------------------------------------------------------------------
 
-    def show(self, shown: Shown) -> None:
+    def show(self, shown: PairQuantity) -> None:
         """Show depth, or a band."""
         pair = self.state.pair.value
-        if shown is Shown.BAND and pair is not None and not pair.bands:
-            self._notifier.tell("info", "The two have no band in common; only their depth can be compared.")
+        if shown is PairQuantity.BAND and pair is not None and not pair.bands:
+            self._notifier.tell("info", "The results have no band in common; only depth can be compared.")
             return
         self.state.shown.set(shown)
 
     def set_band(self, band: int) -> None:
-        """Show a common band by its number."""
+        """Show one of the common bands, by index."""
         pair = self.state.pair.value
         if pair is not None and 0 <= band < len(pair.bands):
             self.state.band.set(band)
 
     def point_at(self, pixel: Pixel) -> None:
-        """Put the cursor on a pixel, in all pictures."""
+        """Put the cursor on a pixel in all pictures."""
         pair = self.state.pair.value
         if pair is not None and pair.first.arrays.holds(pixel):
             self.state.cursor.set(pixel)
@@ -175,10 +173,13 @@ class CompareController:
     # Report ----------------------------------------------------------------------------------------
 
     def write_report(self, target: Path) -> None:
-        """Write the report of A against its truth as an HTML page."""
+        """Write the report of A against its ground truth as an HTML page."""
         pair = self.state.pair.value
         if pair is None or pair.second.truth is None:
-            self._notifier.tell("info", "A report needs the truth: compare a result of the twin with it.")
+            self._notifier.tell(
+                "info",
+                "A report needs the ground truth. Choose Truth as B first.",
+            )
             return
         first, truth = pair.first, pair.second.truth
 
@@ -195,11 +196,11 @@ class CompareController:
         self._start(
             "Write the report",
             work,
-            lambda path: self._notifier.tell("info", f"The report lies in {path}."),
+            lambda path: self._notifier.tell("info", f"Saved the report as {path}."),
         )
 
     def command_line(self) -> str:
-        """The command that compares A with its truth, or with B; empty while one of them is missing."""
+        """The command for the same comparison; empty while a side is missing."""
         pair = self.state.pair.value
         if pair is None:
             return ""
@@ -210,7 +211,7 @@ class CompareController:
 
 
 def make_pair(first: Side, second: Side, progress: Progress) -> Pair:
-    """Two sides with their figures; raises `DecodeError` when they do not fit."""
+    """Compare two sides; raises `DecodeError` when their sizes differ."""
     from dsl_core.evaluation.difference import (
         compare_results,
         difference_table,
@@ -227,26 +228,26 @@ def make_pair(first: Side, second: Side, progress: Progress) -> Pair:
         from dsl_core.evaluation.verdict import verdicts
         from dsl_core.io.result.result_file import load_result
 
-        progress.report("compare with the truth", 0, 1)
+        progress.report("compare with the ground truth", 0, 1)
         return Pair(
             first, second, tuple(bands), verdicts(pipeline.evaluate(load_result(a.path), second.truth))
         )
     cube_a, cube_b = (side["reflectance"] if both else None for side in (a, b))
     turned = [(k, i) for i, k in bands]
-    # A minus B: B is what A is measured against.
+    # A minus B: B is the reference.
     found = compare_results(b["depth_mm"], a["depth_mm"], cube_b, cube_a, turned, progress)
     return Pair(first, second, tuple(bands), difference_table(found))
 
 
 def truth_arrays(result: ResultArrays, truth: Truth) -> ResultArrays:
-    """What is known of a scene in the form of a result with the bands of another; NaN where nothing is."""
+    """The ground truth of a scene as arrays with the bands of a result; NaN where nothing is known."""
     arrays = {}
     if truth.depth_mm is not None:
         arrays["depth_mm"] = np.asarray(truth.depth_mm, np.float32)
     else:
         arrays["depth_mm"] = np.full(result.shape, np.nan, np.float32)
     if truth.material is not None and truth.spectra is not None and result.has_spectra:
-        # One row more, for pixels without a material: index -1 finds it.
+        # One extra row for pixels without a material, whose index is -1.
         spectra = np.vstack([truth.spectra, np.full((1, truth.spectra.shape[1]), np.nan)]).astype(np.float32)
         arrays["reflectance"] = np.ascontiguousarray(spectra.T)[:, truth.material]
     return ResultArrays(result.path, result.wavelengths_nm, arrays)

@@ -1,4 +1,4 @@
-"""Two results, or one and its truth: pictures and difference above, spectra and figures below."""
+"""Two results, or one and its ground truth: pictures and difference above, spectra and figures below."""
 
 from __future__ import annotations
 
@@ -9,58 +9,56 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
-from dsl_app.compare.commands import CompareCommands
-from dsl_app.compare.pair.bar import CompareBar
-from dsl_app.compare.pair.figures import CompareFigures
-from dsl_app.compare.pair.state import CompareState, Pair, Side
-from dsl_app.compare.view import CompareView
+from dsl_app.compare.pair.controller import PairController
+from dsl_app.compare.pair.pictures import PairControls, PairPictures
+from dsl_app.compare.pair.state import Pair, PairState, pair_display
+from dsl_app.compare.verdict_table import VerdictTable
+from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark
-
-NOTHING = (
-    "Open a result as A, then another one as B, or take the truth of its twin as B."
-    " Results (folders NAME.zarr) can be dropped here."
-)
+from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 
-class ComparePair(QWidget):
-    """Follows a `CompareState` and asks a controller."""
+class PairPanel(QWidget):
+    """Follows a `PairState` and asks its controller."""
 
-    def __init__(self, state: CompareState, commands: CompareCommands) -> None:
+    def __init__(self, state: PairState, control: PairController) -> None:
         super().__init__()
-        self._state, self._commands = state, commands
-        self.names = [label("A: –", "heading"), label("B: –", "heading")]
-        self.open_first = push_button("Open &A…", "Choose the result to look at")
-        self.open_second = push_button("Open &B…", "Choose the result to compare it with")
+        self._state, self._control = state, control
+        self.names = [label("", "heading"), label("", "heading")]
+        self.open_first = push_button("Open &A…", "Choose a result as A")
+        self.open_second = push_button("Open &B…", "Choose a result to compare A with")
         self.truth = push_button(
-            "&Truth as B", "Take what the twin knows of the scene of A, where a twin took it"
+            "&Truth as B", "Use the ground truth of A's scene as B; only for scans of the simulated rig"
         )
-        self.swap = push_button("&Swap", "Let A and B change places")
+        self.swap = push_button("&Swap", "Swap A and B")
         self.report = push_button(
-            "Write &report…", "Figures and pictures of A against the truth as an HTML page"
+            "Write &report…", "Save figures and pictures of A against the ground truth as an HTML page"
         )
         self.hint = remark_line()
-        self._view = Deferred(self._make_view)
-        self.bar = CompareBar(state, commands)
-        self._figures = Deferred(lambda: CompareFigures(state))
+        self._pictures = Deferred(self._make_pictures)
+        self.bar = PairControls(state, control)
+        self._figures = Deferred(lambda: PairFigures(state))
         self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
 
     @property
-    def view(self) -> CompareView:
-        """The three pictures, made when somebody looks."""
-        return self._view.content
+    def pictures(self) -> PairPictures:
+        """The three pictures, made on first use."""
+        return self._pictures.content
 
     @property
-    def figures(self) -> CompareFigures:
-        """Spectra and figures, made when somebody looks."""
+    def figures(self) -> PairFigures:
+        """Spectra and figures, made on first use."""
         return self._figures.content
 
-    def _make_view(self) -> CompareView:
-        made = CompareView(self._state)
-        made.pointed.connect(self._commands.point_at)
+    def _make_pictures(self) -> PairPictures:
+        made = PairPictures(self._state)
+        made.pointed.connect(self._control.point_at)
         return made
 
     def _lay_out(self) -> None:
@@ -77,7 +75,7 @@ class ComparePair(QWidget):
         above = QWidget()
         upper = QVBoxLayout(above)
         upper.setContentsMargins(0, 0, 0, 0)
-        upper.addWidget(self._view, 1)
+        upper.addWidget(self._pictures, 1)
         upper.addWidget(self.bar)
         self.parts = QSplitter(Qt.Orientation.Vertical)
         self.parts.setChildrenCollapsible(False)
@@ -91,27 +89,26 @@ class ComparePair(QWidget):
         column.addWidget(self.parts, 1)
 
     def _connect(self) -> None:
-        state, commands = self._state, self._commands
+        state, control = self._state, self._control
         self.open_first.clicked.connect(lambda: self._choose(second=False))
         self.open_second.clicked.connect(lambda: self._choose(second=True))
-        self.truth.clicked.connect(commands.use_truth)
-        self.swap.clicked.connect(commands.swap)
+        self.truth.clicked.connect(control.use_truth)
+        self.swap.clicked.connect(control.swap)
         self.report.clicked.connect(self._choose_report)
         self._stops = [
             *self.bar.stops,
-            state.first.follow(lambda side: self._show_side(0, side)),
-            state.second.follow(lambda side: self._show_side(1, side)),
-            state.pair.follow(self._show_pair),
-            state.busy.follow(lambda _: self._show_hint()),
-            state.trouble.follow(lambda _: self._show_hint()),
+            state.pair.follow(lambda pair: self.parts.setEnabled(pair is not None)),
+            *(
+                value.changed.connect(lambda _: self._show())
+                for value in (state.first, state.second, state.pair, state.busy, state.trouble)
+            ),
         ]
-
-    # Ask -------------------------------------------------------------------------------------------
+        self._show()
 
     def _choose(self, second: bool) -> None:
         name = QFileDialog.getExistingDirectory(self, f"Open a result as {'B' if second else 'A'}")
         if name:
-            self._commands.open_side(Path(name), second)
+            self._control.open_side(Path(name), second)
 
     def _choose_report(self) -> None:
         pair = self._state.pair.value
@@ -120,41 +117,74 @@ class ComparePair(QWidget):
         start = pair.first.arrays.path.with_suffix(".html")
         name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
         if name:
-            self._commands.write_report(Path(name))
+            self._control.write_report(Path(name))
 
-    # Show ------------------------------------------------------------------------------------------
-
-    def _show_side(self, i: int, side: Side | None) -> None:
-        self.names[i].setText(f"{'AB'[i]}: {'–' if side is None else side.name}")
-        self._show_hint()
-
-    def _show_hint(self) -> None:
-        state = self._state
-        pair = state.pair.value
-        text = state.trouble.value or (f"{state.busy.value}…" if state.busy.value else "")
-        if not text and pair is None:
-            text = NOTHING
-        show_remark(self.hint, text)
-        set_role(self.hint, "bad" if state.trouble.value else "muted")
-        idle = not state.busy.value
-        truth = state.second.value is not None and state.second.value.truth is not None
-        for button in (self.open_first, self.open_second):
-            button.setEnabled(idle)
-        self.truth.setEnabled(idle and state.first.value is not None)
-        self.swap.setEnabled(idle and pair is not None and not truth)
-        self.report.setEnabled(idle and pair is not None and truth)
-
-    def _show_pair(self, pair: Pair | None) -> None:
-        self.parts.setEnabled(pair is not None)
-        self._show_hint()
+    def _show(self) -> None:
+        display = pair_display(self._state)
+        for text, name in zip(self.names, display.names, strict=True):
+            text.setText(name)
+        show_remark(self.hint, display.remark)
+        set_role(self.hint, "bad" if display.is_error else "muted")
+        for button, is_enabled in (
+            (self.open_first, display.can_open),
+            (self.open_second, display.can_open),
+            (self.truth, display.can_use_truth),
+            (self.swap, display.can_swap),
+            (self.report, display.can_report),
+        ):
+            button.setEnabled(is_enabled)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        self._view.apply_theme(theme)
+        self._pictures.apply_theme(theme)
         self._figures.apply_theme(theme)
 
     def release(self) -> None:
-        """Follow nothing more."""
-        late = [part.stops for part in (self._view.made, self._figures.made) if part is not None]
+        """Stop following the state."""
+        late = [part.stops for part in (self._pictures.made, self._figures.made) if part is not None]
         for stop in (*self._stops, *chain.from_iterable(late)):
             stop()
+
+
+class PairFigures(QSplitter):
+    """Both spectra under the cursor, and the figures of A against B."""
+
+    def __init__(self, state: PairState) -> None:
+        super().__init__(Qt.Orientation.Horizontal)
+        self._state = state
+        self.plot = calm_plot(
+            "Spectra of A and B", "Reflectance under the cursor: A solid with its 95 % band, B dotted",
+            "Reflectance", "Wavelength (nm)",
+        )  # fmt: skip
+        self.plot.setXRange(430, 660, padding=0.02)
+        self.plot.setYRange(0, 1, padding=0.02)
+        self.curves = [SpectrumCurve(self.plot.getPlotItem(), with_band=i == 0) for i in range(2)]
+        self.table = VerdictTable("Figures of the comparison", "Differences are A minus B")
+        self.table.wrap(0)
+        set_help(self.table, "comparing#figures")
+        self.setChildrenCollapsible(False)
+        self.addWidget(self.plot)
+        self.addWidget(self.table)
+        self.setStretchFactor(0, 1)
+        self.stops: list[Callable[[], None]] = [
+            state.pair.follow(self._show_pair),
+            state.cursor.follow(lambda _: self._show_cursor()),
+        ]
+
+    def _show_pair(self, pair: Pair | None) -> None:
+        self.table.show_verdicts(() if pair is None else pair.rows)
+        self._show_cursor()
+
+    def _show_cursor(self) -> None:
+        pair, pixel = self._state.pair.value, self._state.cursor.value
+        for i, curve in enumerate(self.curves):
+            side = None if pair is None else (pair.first, pair.second)[i]
+            curve.set_spectrum(
+                None if side is None or pixel is None else spectrum_of_pixel(side.arrays, pixel)
+            )
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Take the colours of a theme."""
+        theme_plots((self.plot,), theme)
+        self.curves[0].set_colour(theme.pins[0], width=2)
+        self.curves[1].set_colour(theme.pins[1], width=2, dashed=True)

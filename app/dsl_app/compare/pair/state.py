@@ -1,4 +1,4 @@
-"""Two results, or a result and its truth, side by side."""
+"""Two results, or a result and its ground truth, side by side."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Value
-from dsl_app.shared.spectrum import Pixel
+from dsl_app.shared.spectrum import Pixel, number_text
 from dsl_core.evaluation.summary import Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -18,7 +18,14 @@ from dsl_core.io.result.result_arrays import ResultArrays
 Floats = NDArray[np.floating[Any]]
 
 
-class Shown(Enum):
+#: What the page says while there is nothing to compare.
+NOTHING = (
+    "Open a result as A, then another as B; or, for a scan of the simulated rig, use its ground truth as B."
+    " You can drop results (folders NAME.zarr) here."
+)
+
+
+class PairQuantity(Enum):
     """What the three pictures show."""
 
     DEPTH = "Depth"
@@ -27,7 +34,7 @@ class Shown(Enum):
 
 @dataclass(frozen=True)
 class Side:
-    """A result with a name; ``truth`` is there where it is what a twin knows of its scene."""
+    """A result with a name; ``truth`` is set when this side is the ground truth of a simulated scene."""
 
     name: str
     arrays: ResultArrays
@@ -36,9 +43,9 @@ class Side:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two sides that fit each other; differences are A minus B.
+    """Two sides of one size; differences are A minus B.
 
-    ``bands`` pairs the bands of A and B that lie at the same wavelength; ``rows`` are the figures.
+    ``bands`` pairs the bands of A and B that have the same wavelength; ``rows`` are the figures.
     """
 
     first: Side
@@ -46,9 +53,9 @@ class Pair:
     bands: tuple[tuple[int, int], ...]
     rows: tuple[Verdict, ...]
 
-    def images(self, shown: Shown, band: int) -> tuple[Floats, Floats] | None:
-        """A and B as images (h, w); None where they have nothing of that kind in common."""
-        if shown is Shown.DEPTH:
+    def images(self, shown: PairQuantity, band: int) -> tuple[Floats, Floats] | None:
+        """A and B as images (h, w); None where one of them lacks the quantity."""
+        if shown is PairQuantity.DEPTH:
             return self.first.arrays["depth_mm"], self.second.arrays["depth_mm"]
         if not 0 <= band < len(self.bands):
             return None
@@ -60,19 +67,66 @@ class Pair:
         return float(self.first.arrays.wavelengths_nm[self.bands[band][0]])
 
 
-class CompareState:
-    """Values that the comparison's controller sets and the page follows.
+class PairState:
+    """Values that `PairController` sets and the page follows.
 
-    ``busy`` says in words what is being read or compared (empty: nothing); ``trouble`` why two sides cannot
-    be compared.
+    ``busy`` says what is being read or compared (empty: nothing), ``trouble`` why two sides cannot be
+    compared.
     """
 
     def __init__(self) -> None:
         self.first: Value[Side | None] = Value(None)
         self.second: Value[Side | None] = Value(None)
         self.pair: Value[Pair | None] = Value(None)
-        self.shown = Value(Shown.DEPTH)
+        self.shown = Value(PairQuantity.DEPTH)
         self.band = Value(0)
         self.cursor: Value[Pixel | None] = Value(None)
         self.busy = Value("")
         self.trouble = Value("")
+
+
+@dataclass(frozen=True)
+class PairDisplay:
+    """What the panel of a pair shows: a remark (an error or not) and which buttons can be used."""
+
+    names: tuple[str, str]
+    remark: str
+    is_error: bool
+    can_open: bool
+    can_use_truth: bool
+    can_swap: bool
+    can_report: bool
+
+
+def pair_display(state: PairState) -> PairDisplay:
+    """What to show for a state."""
+    first, second = state.first.value, state.second.value
+    pair, busy = state.pair.value, state.busy.value
+    name_a, name_b = ("–" if side is None else side.name for side in (first, second))
+    idle, has_truth = not busy, second is not None and second.truth is not None
+    return PairDisplay(
+        names=(f"A: {name_a}", f"B: {name_b}"),
+        remark=state.trouble.value or (f"{busy}…" if busy else NOTHING if pair is None else ""),
+        is_error=bool(state.trouble.value),
+        can_open=idle,
+        can_use_truth=idle and first is not None,
+        can_swap=idle and pair is not None and not has_truth,
+        can_report=idle and pair is not None and has_truth,
+    )
+
+
+def cursor_text(state: PairState) -> str:
+    """The values of both sides under the cursor, and their difference."""
+    pair, pixel = state.pair.value, state.cursor.value
+    images = None if pair is None else pair.images(state.shown.value, state.band.value)
+    if images is None:
+        return ""
+    if pixel is None:
+        return "Point at a picture to compare values."
+    a, b = (float(image[pixel[1], pixel[0]]) for image in images)
+    decimals, unit = (2, " mm") if state.shown.value is PairQuantity.DEPTH else (3, "")
+    values = "   ".join(
+        f"{name} {number_text(value, decimals)}{unit}"
+        for name, value in (("A", a), ("B", b), ("A − B", a - b))
+    )
+    return f"column {pixel[0]}, row {pixel[1]}:   {values}"

@@ -1,4 +1,4 @@
-"""What a series of results decides: which ones, where the stage stood, what they say together. No Qt."""
+"""A series of results: reads them, keeps their stage positions and judges them together. No Qt."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_app.compare.series.state import Kind, Row, SeriesState
+from dsl_app.compare.series.state import SeriesKind, SeriesRow, SeriesState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME
 from dsl_app.shared.notify import Notifier
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class SeriesController:
-    """Fills a `SeriesState`; results are read by one job after the other."""
+    """Fills a `SeriesState`; results are read one after the other."""
 
     def __init__(self, state: SeriesState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
@@ -33,32 +33,33 @@ class SeriesController:
     # Rows ------------------------------------------------------------------------------------------
 
     def knows(self, path: Path) -> bool:
-        """Whether a path is a result, or a folder with some."""
+        """Whether a path is a result, or a folder that contains results."""
         return bool(results_in(path))
 
     def add(self, paths: Iterable[Path]) -> None:
-        """Take results, or all results of folders."""
+        """Add results, or all results in folders."""
         known = {row.path for row in self.state.rows.value}
         found = [result for path in paths for result in results_in(path)]
-        new = [Row(path) for path in dict.fromkeys(found) if path not in known]
+        new = [SeriesRow(path) for path in dict.fromkeys(found) if path not in known]
         if not found:
             self._notifier.tell(
-                "warning", "There is no result. Choose folders NAME.zarr, or one with several."
+                "warning", "There is no result here. Choose a folder NAME.zarr, or one that contains several."
             )
         elif not new:
-            self._notifier.tell("info", "All of these results are in the series already.")
+            self._notifier.tell("info", "All of these results are already in the series.")
         else:
             self._set_rows((*self.state.rows.value, *new))
 
     def restore(
         self, rows: Sequence[tuple[Path, float | None]], against: Path | None, region: Region | None
     ) -> None:
-        """Take results with their positions, and ask the same of them again; what is gone is told."""
-        here = tuple(Row(path, position_mm) for path, position_mm in rows if results_in(path))
+        """Restore results with their positions and settings; warns about missing ones."""
+        here = tuple(SeriesRow(path, position_mm) for path, position_mm in rows if results_in(path))
         gone = [path.name for path, _ in rows if not results_in(path)]
         if gone:
             self._notifier.tell(
-                "warning", f"The series has lost {', '.join(gone)}. Add the results from where they are now."
+                "warning",
+                f"The results {', '.join(gone)} are missing. Add them again if they were moved.",
             )
         self._reference = None
         self.state.against.set(against if against is not None and results_in(against) else None)
@@ -66,11 +67,11 @@ class SeriesController:
         self._set_rows(here)
 
     def remove(self, path: Path) -> None:
-        """Take a result out of the series."""
+        """Remove a result from the series."""
         rows = self.state.rows.value
         at = next((i for i, row in enumerate(rows) if row.path == path), None)
         if at is None:
-            self._notifier.tell("info", "Select the row of a result first.")
+            self._notifier.tell("info", "Select a row first.")
             return
         gone = rows[at]
 
@@ -87,7 +88,7 @@ class SeriesController:
         )
 
     def set_position(self, path: Path, position_mm: float) -> None:
-        """Say where the stage stood for a result."""
+        """Set the stage position of a result."""
         row = next(row for row in self.state.rows.value if row.path == path)
         if row.position_mm == position_mm:
             return
@@ -104,33 +105,33 @@ class SeriesController:
         rows = self.state.rows.value
         self._set_rows(tuple(replace(row, **fields) if row.path == path else row for row in rows))  # type: ignore[arg-type]
 
-    def _set_rows(self, rows: tuple[Row, ...]) -> None:
+    def _set_rows(self, rows: tuple[SeriesRow, ...]) -> None:
         if not rows:
             # The next results may show another scene.
             self._reference = None
-        # What was said of the old rows is not about the new ones.
+        # The test was of the old rows.
         self.state.test.set(None)
         self.state.rows.set(rows)
         self._judge()
         self._read()
 
     def select(self, path: Path | None) -> None:
-        """Look at a row."""
+        """Select a row."""
         self.state.selected.set(path)
 
     # Questions -------------------------------------------------------------------------------------
 
-    def ask(self, kind: Kind) -> None:
-        """Ask for depth over positions, or for accuracy over time."""
+    def ask(self, kind: SeriesKind) -> None:
+        """Switch between depth over positions and accuracy over time."""
         self.state.kind.set(kind)
         self._set_rows(self.state.rows.value)
 
     def show_figure(self, figure: SweepFigure) -> None:
-        """Show an error over seconds."""
+        """Choose the error that the plot shows."""
         self.state.figure.set(figure)
 
     def compare_with(self, path: Path | None) -> None:
-        """Compare the scans of a sweep with one of them, or with the truth."""
+        """Compare the scans of a sweep with one of them, or with the ground truth."""
         if path == self.state.against.value:
             return
         self.state.against.set(path)
@@ -138,7 +139,7 @@ class SeriesController:
         self._set_rows(tuple(replace(row, point=None, point_trouble="") for row in self.state.rows.value))
 
     def set_region(self, region: Region | None) -> None:
-        """Count only a part of the picture, or all of it."""
+        """Use only a part of the picture, or all of it."""
         before = self.state.region.value
         if region != before:
             self._undo.push(Change("region", lambda: self._look_at(region), lambda: self._look_at(before)))
@@ -150,17 +151,19 @@ class SeriesController:
     # Read ------------------------------------------------------------------------------------------
 
     def _read(self) -> None:
-        """Read the next result that is not read yet; those that follow are read when it has ended."""
+        """Read the next result that has not been read; the others follow one by one."""
         state = self.state
         kind, asked = state.kind.value, (state.region.value, state.against.value)
         row = next((row for row in state.rows.value if not row.is_read(kind)), None)
         if row is None or state.busy.value:
             return
 
-        def work(progress: Progress) -> Row:
-            return read_plane(row, asked[0], progress) if kind is Kind.STAGE else self._compare(row, progress)
+        def work(progress: Progress) -> SeriesRow:
+            if kind is SeriesKind.STAGE:
+                return read_plane(row, asked[0], progress)
+            return self._compare(row, progress)
 
-        def done(read: Row) -> None:
+        def done(read: SeriesRow) -> None:
             state.busy.set("")
             if asked == (state.region.value, state.against.value):
                 self._take(kind, read)
@@ -174,15 +177,15 @@ class SeriesController:
         state.busy.set(f"Read {row.name}")
         self._runner.submit(Job(f"Read {row.name}", work, done, failed, lambda: self._cancelled(kind)))
 
-    def _take(self, kind: Kind, read: Row) -> None:
-        """Keep what was read of a row, and a position that was typed meanwhile."""
+    def _take(self, kind: SeriesKind, read: SeriesRow) -> None:
+        """Keep what was read, but prefer a position typed in the meantime."""
         if self.state.selected_row is None:
             self.select(read.path)
-        if kind is Kind.SWEEP:
+        if kind is SeriesKind.SWEEP:
             self._change(read.path, point=read.point, point_trouble=read.point_trouble)
             return
         read = self._of_one_size(read)
-        known = self._position(read.path)
+        known = next(row.position_mm for row in self.state.rows.value if row.path == read.path)
         self._change(
             read.path,
             position_mm=read.position_mm if known is None else known,
@@ -190,31 +193,27 @@ class SeriesController:
             target_trouble=read.target_trouble,
         )
 
-    def _of_one_size(self, read: Row) -> Row:
+    def _of_one_size(self, read: SeriesRow) -> SeriesRow:
         first = next((row.target for row in self.state.rows.value if row.target is not None), read.target)
         if read.target is None or first is None or first.shape == read.target.shape:
             return read
         sizes = [f"{width} × {height}" for height, width in (read.target.shape, first.shape)]
-        return _without(read, Kind.STAGE, f"It has {sizes[0]} pixels, the first result {sizes[1]}.")
+        return _without(read, SeriesKind.STAGE, f"It has {sizes[0]} pixels, the first result {sizes[1]}.")
 
-    def _cancelled(self, kind: Kind) -> None:
-        why = "Not read, as the work was cancelled. Remove it and add it again."
+    def _cancelled(self, kind: SeriesKind) -> None:
+        why = "Not read because the job was cancelled. Remove it and add it again."
         self.state.busy.set("")
         self._set_rows(
             tuple(row if row.is_read(kind) else _without(row, kind, why) for row in self.state.rows.value)
         )
 
-    def _position(self, path: Path) -> float | None:
-        """What was typed while the result was being read."""
-        return next((row.position_mm for row in self.state.rows.value if row.path == path), None)
-
-    def _compare(self, row: Row, progress: Progress) -> Row:
-        """The row with its errors; the reference is read with the first one."""
+    def _compare(self, row: SeriesRow, progress: Progress) -> SeriesRow:
+        """The row with its errors; the reference is read with the first row."""
         from dsl_core.workflows.series import ResultReference, TruthReference
 
         against = self.state.against.value
         if against == row.path:
-            return _without(row, Kind.SWEEP, "The others are compared with it.")
+            return _without(row, SeriesKind.SWEEP, "This is the reference.")
         try:
             if self._reference is None:
                 self._reference = TruthReference() if against is None else ResultReference(against, progress)
@@ -222,7 +221,7 @@ class SeriesController:
         except Cancelled:
             raise
         except DslError as error:
-            return _without(row, Kind.SWEEP, str(error))
+            return _without(row, SeriesKind.SWEEP, str(error))
 
     # Judge -----------------------------------------------------------------------------------------
 
@@ -230,7 +229,7 @@ class SeriesController:
         state = self.state
         counted = state.counted
         try:
-            if state.kind.value is Kind.STAGE:
+            if state.kind.value is SeriesKind.STAGE:
                 targets = [row.target for row in counted if row.target is not None]
                 positions = [row.position_mm for row in counted if row.position_mm is not None]
                 state.test.set(stage_test(positions, targets))
@@ -248,7 +247,7 @@ class SeriesController:
         counted, test, kind = state.counted, state.test.value, state.kind.value
         if state.advice.value or not counted or state.busy.value:
             self._notifier.tell(
-                "info", state.advice.value or "Add results first, and wait until they are read."
+                "info", state.advice.value or "Add results first, and wait until they have been read."
             )
             return
         names = [row.name for row in counted]
@@ -261,7 +260,7 @@ class SeriesController:
             from dsl_core.io.staging import write_text
 
             progress.report("write the report", 0, 1)
-            if kind is Kind.STAGE and test is not None:
+            if kind is SeriesKind.STAGE and test is not None:
                 return write_text(target, lambda: stage_page(names, targets, test), overwrite=True)
             return write_text(target, lambda: sweep_page(points, reference), overwrite=True)
 
@@ -269,18 +268,18 @@ class SeriesController:
             self._notifier.tell("error", str(error))
 
         def done(path: Path) -> None:
-            self._notifier.tell("info", f"The report lies in {path}.")
+            self._notifier.tell("info", f"Saved the report as {path}.")
 
         self._runner.submit(Job("Write the report", work, done, failed))
 
     def command_line(self) -> str:
-        """The command that does the same; empty while nothing can be said."""
+        """The command that does the same; empty while there is no answer."""
         state = self.state
         counted = state.counted
         if state.advice.value or not counted:
             return ""
         paths = " ".join(shlex.quote(str(row.path)) for row in counted)
-        if state.kind.value is Kind.SWEEP:
+        if state.kind.value is SeriesKind.SWEEP:
             against = state.against.value
             return f"dsl-scan sweep {paths}" + (f" --against {shlex.quote(str(against))}" if against else "")
         positions = ",".join(f"{row.position_mm:.10g}" for row in counted)
@@ -290,26 +289,26 @@ class SeriesController:
 
 
 def results_in(path: Path) -> list[Path]:
-    """A result, or all results in a folder."""
+    """A result itself, or all results in a folder."""
     if (path / RESULT_NAME).is_file():
         return [path]
     return sorted(each.parent for each in path.glob(f"*/{RESULT_NAME}")) if path.is_dir() else []
 
 
-def read_plane(row: Row, region: Region | None, progress: Progress) -> Row:
-    """The row with its flat target, or with the reason why there is none."""
+def read_plane(row: SeriesRow, region: Region | None, progress: Progress) -> SeriesRow:
+    """The row with its flat target, or with the reason there is none."""
     from dsl_core.workflows.series import read_target
 
     progress.report("find the plane", 0, 1)
     try:
         target, position = read_target(row.path, region)
     except DslError as error:
-        return _without(row, Kind.STAGE, str(error))
+        return _without(row, SeriesKind.STAGE, str(error))
     return replace(row, target=target, position_mm=position)
 
 
-def _without(row: Row, kind: Kind, why: str) -> Row:
-    """The row without what is asked for, and the reason."""
-    if kind is Kind.STAGE:
+def _without(row: SeriesRow, kind: SeriesKind, why: str) -> SeriesRow:
+    """The row without a target or point, and the reason."""
+    if kind is SeriesKind.STAGE:
         return replace(row, target=None, target_trouble=why)
     return replace(row, point=None, point_trouble=why)

@@ -17,63 +17,46 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.compare.series.commands import SeriesCommands
+from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.picture import SeriesPicture
 from dsl_app.compare.series.plot import SeriesPlot
-from dsl_app.compare.series.state import Kind, SeriesState
+from dsl_app.compare.series.state import SeriesKind, SeriesState, series_display
 from dsl_app.compare.series.table import SeriesTable
+from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
 
-NOTHING = {
-    Kind.STAGE: (
-        "Add results of one flat target at three or more positions of a stage: choose a folder with all of"
-        " them, or drop them here. Positions come from names like “stage 695.2 mm.zarr”, or are typed into"
-        " the table."
-    ),
-    Kind.SWEEP: (
-        "Add results of one scene that was scanned by several plans: choose a folder with all of them, or"
-        " drop them here. They are compared with the truth of the twin, or with one of them."
-    ),
-}
-#: Room for the longest figure's name.
-FIGURES_PX = 400
-
 
 class SeriesPanel(QWidget):
-    """Follows a `SeriesState` and asks a controller."""
+    """Follows a `SeriesState` and asks its controller."""
 
-    def __init__(self, state: SeriesState, commands: SeriesCommands) -> None:
+    def __init__(self, state: SeriesState, control: SeriesController) -> None:
         super().__init__()
-        self._state, self._commands = state, commands
-        self.kind = ChoiceBox("Question", "What the results are asked together")
-        for kind in Kind:
+        self._state, self._control = state, control
+        self.kind = ChoiceBox("Series", "What to measure with the results")
+        for kind in SeriesKind:
             self.kind.addItem(kind.value, kind)
-        self.add = push_button("&Add results…", "Choose a result, or a folder that holds several")
+        self.add = push_button("&Add results…", "Choose a result, or a folder that contains several")
         self.remove = push_button(
-            "Re&move", "Take the selected result out of the series (Delete); undo brings it back"
+            "Re&move", "Remove the selected result from the series (Delete); can be undone"
         )
         self.against = ChoiceBox("Compare with", "What the scans are compared with")
         self.figure = ChoiceBox("Error", "The error that the plot shows")
         for figure in FIGURES:
             self.figure.addItem(figure.words, figure)
-        self.report = push_button("Write &report…", "Table, figures, plot and pictures as an HTML page")
+        self.report = push_button("Write &report…", "Save table, figures, plot and pictures as an HTML page")
         self.hint = remark_line()
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
-        self.table = SeriesTable(state, commands)
-        self.figures = ReadTable(
-            "Figures of the series", "What all positions say together", ("Figure", "Value", "Unit")
-        )
-        self.figures.setMinimumWidth(FIGURES_PX)
+        self.table = SeriesTable(state, control)
+        self.figures = VerdictTable("Figures of the series", "The figures of all positions together")
         self.figures.verticalHeader().setDefaultSectionSize(24)
         self.figures.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         self._plot = Deferred(lambda: SeriesPlot(state))
-        self._picture = Deferred(lambda: SeriesPicture(state, commands))
+        self._picture = Deferred(lambda: SeriesPicture(state, control))
         set_help(self, "comparing#a-series")
         set_help(self.figures, "comparing#depth-over-stage-positions")
         self._stops: list[Callable[[], None]] = []
@@ -82,12 +65,12 @@ class SeriesPanel(QWidget):
 
     @property
     def plot(self) -> SeriesPlot:
-        """The plot, made when somebody looks."""
+        """The plot, made on first use."""
         return self._plot.content
 
     @property
     def picture(self) -> SeriesPicture:
-        """The plane of the selected row, made when somebody looks."""
+        """The plane of the selected row, made on first use."""
         return self._picture.content
 
     def _lay_out(self) -> None:
@@ -106,39 +89,38 @@ class SeriesPanel(QWidget):
         column.addWidget(self.parts, 1)
 
     def _connect(self) -> None:
-        state, commands = self._state, self._commands
-        self.kind.activated.connect(lambda _: commands.ask(self.kind.currentData()))
+        state, control = self._state, self._control
+        self.kind.activated.connect(lambda _: control.ask(self.kind.currentData()))
         self.add.clicked.connect(self.choose)
         self.remove.clicked.connect(self._remove)
         delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.table)
         delete.setContext(Qt.ShortcutContext.WidgetShortcut)
         delete.activated.connect(self._remove)
-        self.against.activated.connect(lambda _: commands.compare_with(self.against.currentData()))
-        self.figure.activated.connect(lambda _: commands.show_figure(self.figure.currentData()))
+        self.against.activated.connect(lambda _: control.compare_with(self.against.currentData()))
+        self.figure.activated.connect(lambda _: control.show_figure(self.figure.currentData()))
         self.report.clicked.connect(self._choose_report)
         self._stops = [
             *self.table.stops,
-            state.kind.follow(lambda _: self._show()),
-            state.rows.follow(lambda _: self._show()),
-            state.test.follow(lambda _: self._show()),
-            state.advice.follow(lambda _: self._show()),
-            state.busy.follow(lambda _: self._show()),
-            state.against.follow(lambda _: self._show()),
-            state.selected.follow(lambda _: self._show()),
+            *(
+                value.changed.connect(lambda _: self._show())
+                for value in (state.kind, state.rows, state.advice, state.busy, state.against, state.selected)
+            ),
+            state.test.follow(
+                lambda test: self.figures.show_verdicts(() if test is None else stage_table(test))
+            ),
             state.figure.follow(lambda _: self.table.show_series()),
         ]
-
-    # Ask -------------------------------------------------------------------------------------------
+        self._show()
 
     def choose(self) -> None:
-        """Choose results."""
-        name = QFileDialog.getExistingDirectory(self, "Add a result, or a folder with several")
+        """Ask for a result or a folder of results."""
+        name = QFileDialog.getExistingDirectory(self, "Add a result, or a folder that contains several")
         if name:
-            self._commands.add([Path(name)])
+            self._control.add([Path(name)])
 
     def _remove(self) -> None:
         if self._state.selected.value is not None:
-            self._commands.remove(self._state.selected.value)
+            self._control.remove(self._state.selected.value)
 
     def _choose_report(self) -> None:
         rows = self._state.rows.value
@@ -147,51 +129,28 @@ class SeriesPanel(QWidget):
         start = rows[0].path.parent / "series.html"
         name, _ = QFileDialog.getSaveFileName(self, "Write the report", str(start), "Web page (*.html)")
         if name:
-            self._commands.write_report(Path(name))
-
-    # Show ------------------------------------------------------------------------------------------
+            self._control.write_report(Path(name))
 
     def _show(self) -> None:
-        state = self._state
-        kind, rows = state.kind.value, state.rows.value
-        is_stage, is_answered = kind is Kind.STAGE, bool(rows) and not state.advice.value
-        text = f"{state.busy.value}…" if state.busy.value else state.advice.value
-        show_remark(self.hint, text if rows else NOTHING[kind])
-        self.kind.setCurrentIndex(self.kind.findData(kind))
-        self.parts.setVisible(bool(rows))
-        self.remove.setEnabled(state.selected_row is not None)
-        self.report.setEnabled(is_answered and not state.busy.value)
+        display = series_display(self._state)
+        show_remark(self.hint, display.remark)
+        self.kind.setCurrentIndex(self.kind.findData(self._state.kind.value))
+        self.parts.setVisible(display.has_rows)
+        self.remove.setEnabled(display.can_remove)
+        self.report.setEnabled(display.can_report)
         for widget, is_seen in (
-            (self.against, not is_stage),
-            (self.figure, not is_stage),
-            (self.figures, is_stage),
-            (self._picture, is_stage),
+            (self.against, not display.is_stage),
+            (self.figure, not display.is_stage),
+            (self.figures, display.is_stage),
+            (self._picture, display.is_stage),
         ):
             widget.setVisible(is_seen)
-        self._show_choices()
-        self._show_figures()
-
-    def _show_choices(self) -> None:
-        paths, against = [row.path for row in self._state.rows.value], self._state.against.value
-        # Its row may have been removed; it is compared with all the same.
-        others = [] if against is None or against in paths else [against]
-        wanted = [("Truth of the twin", None), *((path.stem, path) for path in (*paths, *others))]
         box = self.against
-        if wanted != [(box.itemText(i), box.itemData(i)) for i in range(box.count())]:
+        if list(display.references) != [(box.itemText(i), box.itemData(i)) for i in range(box.count())]:
             box.clear()
-            for text, path in wanted:
+            for text, path in display.references:
                 box.addItem(text, path)
-        box.setCurrentIndex([path for _, path in wanted].index(against))
-
-    def _show_figures(self) -> None:
-        test = self._state.test.value
-        rows = () if test is None else stage_table(test)
-        self.figures.show_rows(
-            [
-                (cell(row.figure), cell(row.words.replace("-", "−"), side=RIGHT), cell(row.unit))
-                for row in rows
-            ]
-        )
+        box.setCurrentIndex([path for _, path in display.references].index(self._state.against.value))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
@@ -200,7 +159,7 @@ class SeriesPanel(QWidget):
         self._picture.apply_theme(theme)
 
     def release(self) -> None:
-        """Follow nothing more."""
+        """Stop following the state."""
         late = [part.stops for part in (self._plot.made, self._picture.made) if part is not None]
         for stop in (*self._stops, *chain.from_iterable(late)):
             stop()

@@ -1,4 +1,4 @@
-"""How far the pixels of the selected result lie off their plane, and the region that counts."""
+"""How far the pixels of the selected result are off their plane, and the region that counts."""
 
 from __future__ import annotations
 
@@ -8,29 +8,28 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from dsl_app.compare.series.commands import SeriesCommands
+from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesState
-from dsl_app.compare.view import DIFFERENCE
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.pictures import RegionBox, colour_map, spread_of
+from dsl_app.shared.widgets.pictures import DIFFERENCE, RegionBox, colour_map, spread_of
 
 
 class SeriesPicture(QWidget):
-    """Follows a `SeriesState`; the rectangle asks for another region."""
+    """Follows a `SeriesState`; dragging the rectangle sets the region."""
 
-    def __init__(self, state: SeriesState, commands: SeriesCommands) -> None:
+    def __init__(self, state: SeriesState, control: SeriesController) -> None:
         super().__init__()
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._control, self._theme = state, control, DARK
         self.title = label("", "heading")
         self.part = QPushButton("Re&gion")
         self.part.setCheckable(True)
-        self.part.setToolTip("Count only what lies in a rectangle, which can be dragged on the picture")
+        self.part.setToolTip("Use only the pixels in a rectangle, which you can drag on the picture")
         self.canvas = pg.GraphicsLayoutWidget()
         self.canvas.setAccessibleName("Residuals of the plane")
         self.canvas.setToolTip(
-            "How far each pixel lies behind (red) or before (blue) the plane of the target; empty where it is"
-            " not counted."
+            "How far each pixel is behind (red) or in front of (blue) the plane of the target; empty where it"
+            " is not counted."
         )
         self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
         self.image = pg.ImageItem(axisOrder="row-major")
@@ -66,7 +65,7 @@ class SeriesPicture(QWidget):
         return None if row is None or row.target is None else row.target.shape
 
     def show_row(self) -> None:
-        """Show the row that is selected."""
+        """Show the selected row."""
         row, region = self._state.selected_row, self._state.region.value
         target = None if row is None else row.target
         self.part.setChecked(region is not None)
@@ -99,14 +98,14 @@ class SeriesPicture(QWidget):
             self.rectangle.blockSignals(True)
             self.rectangle.put_in_middle(shape[1], shape[0])
             self.rectangle.blockSignals(False)
-            self._commands.set_region(self.rectangle.region(shape[1], shape[0]))
+            self._control.set_region(self.rectangle.region(shape[1], shape[0]))
         else:
-            self._commands.set_region(None)
+            self._control.set_region(None)
 
     def _dragged(self, _: Any) -> None:
         shape = self._shape
         if shape is not None and self.rectangle.isVisible():
-            self._commands.set_region(self.rectangle.region(shape[1], shape[0]))
+            self._control.set_region(self.rectangle.region(shape[1], shape[0]))
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

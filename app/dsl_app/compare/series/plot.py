@@ -1,4 +1,4 @@
-"""The series as a plot: deviations over positions of the stage, or an error over seconds, with error bars."""
+"""The series as a plot: deviations over stage positions, or an error over capture time, with error bars."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from dsl_app.compare.series.state import Kind, SeriesState
+from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks
@@ -30,8 +30,8 @@ class SeriesPlot(QWidget):
         self._state, self._theme = state, DARK
         self.plot = calm_plot(
             "Series",
-            "Depth: distance minus the line over positions, with 95 % bars. Time: an error over the seconds"
-            " of the capture, both in decades; below and left is better.",
+            "Depth: distance minus the fitted line over positions, with 95 % bars. Time: an error over the"
+            " capture time, both logarithmic; lower and further left is better.",
             "", "", left_width=60,
         )  # fmt: skip
         self.plot.setMouseEnabled(False, False)
@@ -49,16 +49,16 @@ class SeriesPlot(QWidget):
         self.draw()
 
     def draw(self) -> None:
-        """Draw what the state holds."""
+        """Draw the state."""
         item = self.plot.getPlotItem()
         item.clear()
         self.legend.setText("")
         test, points = self._state.test.value, self._state.points
-        if self._state.kind.value is Kind.SWEEP:
-            item.setLabel("bottom", "Capture (s)")
+        if self._state.kind.value is SeriesKind.SWEEP:
+            item.setLabel("bottom", "Capture time (s)")
             self._draw_sweep(points)
             return
-        item.setLabel("bottom", "Position of the stage (mm)")
+        item.setLabel("bottom", "Stage position (mm)")
         item.setLabel("left", "Distance − line (mm)")
         for side in ("bottom", "left"):
             item.getAxis(side).setTicks(None if test is not None else [[]])
@@ -80,7 +80,7 @@ class SeriesPlot(QWidget):
             self.plot.addItem(pg.ScatterPlotItem(x=at, y=off, size=8, symbol=symbol, brush=colour, pen=None))
         self.legend.setText(
             f"{_key('●', theme.pins[0])} slope free, {_straight(test.free)} &nbsp; "
-            f"{_key('■', theme.pins[1])} slope 1, {_straight(test.fixed)} &nbsp; bars hold 95 %"
+            f"{_key('■', theme.pins[1])} slope 1, {_straight(test.fixed)} &nbsp; bars: 95 %"
         )
         self.plot.setXRange(float(at[0]), float(at[-1]), padding=0.06)
         reach = max(reach, 1e-4) * (1 + ROOM)
@@ -109,7 +109,7 @@ class SeriesPlot(QWidget):
         self.plot.addItem(pg.PlotCurveItem([x for x, _ in best], [y for _, y in best], pen=pen))
         ends = [self._draw_point(points[i], at, at in best) for i, at in seen.items()]
         self._set_ranges([x for x, _ in seen.values()], [y for pair in ends for y in pair])
-        self.legend.setText(f"{_key('━', theme.accent)} no quicker one is better")
+        self.legend.setText(f"{_key('━', theme.accent)} no faster one is better")
 
     def _draw_point(self, point: SweepPoint, at: tuple[float, float], is_best: bool) -> tuple[float, float]:
         """Draw a point with its name and bar; returns the ends of the bar."""

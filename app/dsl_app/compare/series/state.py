@@ -1,4 +1,4 @@
-"""Several results together: a flat target at stage positions, or scans of one scene over their seconds."""
+"""Several results together: a flat target at stage positions, or scans of one scene by capture time."""
 
 from __future__ import annotations
 
@@ -12,18 +12,32 @@ from dsl_core.evaluation.stage_test import StageTest
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint
 
 
-class Kind(Enum):
-    """What a series is asked."""
+class SeriesKind(Enum):
+    """What a series measures."""
 
     STAGE = "Depth over stage positions"
     SWEEP = "Accuracy over time"
 
 
-@dataclass(frozen=True)
-class Row:
-    """A result of the series; ``position_mm`` is None while nobody has said where the stage stood.
+#: What an empty series says.
+NOTHING = {
+    SeriesKind.STAGE: (
+        "Add results of one flat target at three or more stage positions: choose a folder that holds them, or"
+        " drop them here. Positions are read from names such as “stage 695.2 mm.zarr”, or typed into the"
+        " table."
+    ),
+    SeriesKind.SWEEP: (
+        "Add results of one scene scanned with different plans: choose a folder that holds them, or drop them"
+        " here. They are compared with the ground truth of the simulated rig, or with one of the results."
+    ),
+}
 
-    What has not been read yet has neither a target (or point) nor a trouble, which says why there is none.
+
+@dataclass(frozen=True)
+class SeriesRow:
+    """A result of the series; ``position_mm`` is None while the stage position is unknown.
+
+    A row that has not been read has neither a target (or point) nor a trouble, which says why there is none.
     """
 
     path: Path
@@ -35,39 +49,39 @@ class Row:
 
     @property
     def name(self) -> str:
-        """What the result is called."""
+        """The name of the result."""
         return self.path.stem
 
-    def is_read(self, kind: Kind) -> bool:
-        """Whether nothing is to be read for what is asked."""
-        if kind is Kind.STAGE:
+    def is_read(self, kind: SeriesKind) -> bool:
+        """Whether the row has been read for a kind of series."""
+        if kind is SeriesKind.STAGE:
             return self.target is not None or bool(self.target_trouble)
         return self.point is not None or bool(self.point_trouble)
 
-    def trouble(self, kind: Kind) -> str:
-        """Why the result does not count; empty where it does, or is not read yet."""
-        if kind is Kind.SWEEP:
+    def trouble(self, kind: SeriesKind) -> str:
+        """Why the result does not count; empty when it does or has not been read."""
+        if kind is SeriesKind.SWEEP:
             return self.point_trouble
         if self.target is not None and self.position_mm is None:
-            return "Type the position of the stage."
+            return "Type the stage position."
         return self.target_trouble
 
-    def counts(self, kind: Kind) -> bool:
-        """Whether the result is part of the answer."""
+    def counts(self, kind: SeriesKind) -> bool:
+        """Whether the result contributes to the figures."""
         return self.is_read(kind) and not self.trouble(kind)
 
 
 class SeriesState:
-    """Values that the controller of a series sets and its panel follows.
+    """Values that `SeriesController` sets and the panel follows.
 
-    ``test`` is what the rows say of depth, ``advice`` what is missing for it. ``against`` is the result that
-    a sweep compares with, None for the truth. ``selected`` is the path of a row, ``region`` the part of the
-    picture that the target fills (None: all of it), ``busy`` what is being done (empty: nothing).
+    ``test`` is the depth test of the rows, ``advice`` what is missing for one. ``against`` is the result that
+    a sweep compares with, None for the ground truth. ``selected`` is the path of a row, ``region`` the part
+    of the picture that the target fills (None: all of it), ``busy`` what is being done (empty: nothing).
     """
 
     def __init__(self) -> None:
-        self.kind = Value(Kind.STAGE)
-        self.rows: Value[tuple[Row, ...]] = Value(())
+        self.kind = Value(SeriesKind.STAGE)
+        self.rows: Value[tuple[SeriesRow, ...]] = Value(())
         self.test: Value[StageTest | None] = Value(None)
         self.advice = Value("")
         self.against: Value[Path | None] = Value(None)
@@ -77,8 +91,8 @@ class SeriesState:
         self.busy = Value("")
 
     @property
-    def counted(self) -> tuple[Row, ...]:
-        """Rows that are part of the answer."""
+    def counted(self) -> tuple[SeriesRow, ...]:
+        """Rows that contribute to the figures."""
         return tuple(row for row in self.rows.value if row.counts(self.kind.value))
 
     @property
@@ -87,6 +101,35 @@ class SeriesState:
         return tuple(row.point for row in self.rows.value if row.point is not None)
 
     @property
-    def selected_row(self) -> Row | None:
-        """The row that is looked at."""
+    def selected_row(self) -> SeriesRow | None:
+        """The selected row."""
         return next((row for row in self.rows.value if row.path == self.selected.value), None)
+
+
+@dataclass(frozen=True)
+class SeriesDisplay:
+    """What the panel of a series shows; ``references`` are the names and paths to compare with."""
+
+    remark: str
+    has_rows: bool
+    is_stage: bool
+    can_remove: bool
+    can_report: bool
+    references: tuple[tuple[str, Path | None], ...]
+
+
+def series_display(state: SeriesState) -> SeriesDisplay:
+    """What to show for a state."""
+    rows, against, busy = state.rows.value, state.against.value, state.busy.value
+    kind, paths = state.kind.value, [row.path for row in rows]
+    # The reference stays, even when its row is removed.
+    others = [] if against is None or against in paths else [against]
+    remark = f"{busy}…" if busy else state.advice.value
+    return SeriesDisplay(
+        remark=remark if rows else NOTHING[kind],
+        has_rows=bool(rows),
+        is_stage=kind is SeriesKind.STAGE,
+        can_remove=state.selected_row is not None,
+        can_report=bool(rows) and not state.advice.value and not busy,
+        references=(("Ground truth", None), *((path.stem, path) for path in (*paths, *others))),
+    )

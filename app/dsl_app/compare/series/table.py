@@ -1,15 +1,16 @@
-"""The results of a series as a table; positions of the stage can be typed into it."""
+"""The results of a series as a table; stage positions can be typed into it."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
 
-from dsl_app.compare.series.commands import SeriesCommands
-from dsl_app.compare.series.state import Kind, Row, SeriesState
+from dsl_app.compare.series.controller import SeriesController
+from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.evaluation.time_sweep import FIGURES, best_points
@@ -17,16 +18,16 @@ from dsl_core.evaluation.time_sweep import FIGURES, best_points
 STAGE_HEADS = ("Result", "Position (mm)", "Pixels", "RMS (mm)", "Off the line (mm)", "± (mm)", "Remark")
 SWEEP_HEADS = ("Result", "Capture (s)", "Depth (mm)", "Reflectance", "Angle (rad)", "Remark")
 TIPS = {
-    "Position (mm)": "Where the stage stood; double-click or press F2 to type another",
-    "Pixels": "Pixels that lie on the plane of the target",
-    "RMS (mm)": "Scatter of single pixels about their plane",
-    "Off the line (mm)": "Distance of the plane minus the straight line over all positions, slope free",
-    "± (mm)": "One standard deviation of the distance, from how far means of patches lie off the plane",
-    "Capture (s)": "Exposures and latencies of all frames",
-    "Depth (mm)": "Root mean square error of depth, over single pixels",
-    "Reflectance": "Root mean square error of reflectance, over single pixels and bands",
+    "Position (mm)": "The stage position; double-click or press F2 to change it",
+    "Pixels": "Pixels on the plane of the target",
+    "RMS (mm)": "Scatter of single pixels about the plane",
+    "Off the line (mm)": "Distance of the plane minus the line fitted over all positions, slope free",
+    "± (mm)": "Standard deviation of the distance, from how far the means of patches are off the plane",
+    "Capture (s)": "Exposures and latencies of all frames together",
+    "Depth (mm)": "RMS error of depth, over single pixels",
+    "Reflectance": "RMS error of reflectance, over single pixels and bands",
     "Angle (rad)": "Mean angle between spectra",
-    "Remark": "Why a result does not count, or whether no quicker one beats it",
+    "Remark": "Why a result does not count, or whether no faster one beats it",
 }
 POSITION = 1
 
@@ -34,10 +35,10 @@ POSITION = 1
 class SeriesTable(ReadTable):
     """Follows the rows of a `SeriesState`."""
 
-    def __init__(self, state: SeriesState, commands: SeriesCommands) -> None:
-        tip = "Results of the series. Double-click a position to type another."
+    def __init__(self, state: SeriesState, control: SeriesController) -> None:
+        tip = "Results of the series. Double-click a position to change it."
         super().__init__("Results of the series", tip, STAGE_HEADS)
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._control, self._theme = state, control, DARK
         triggers = QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -53,9 +54,9 @@ class SeriesTable(ReadTable):
         self.show_series()
 
     def show_series(self) -> None:
-        """Show all rows, the selected one still selected."""
+        """Show all rows; the selection stays."""
         kind = self._state.kind.value
-        heads = STAGE_HEADS if kind is Kind.STAGE else SWEEP_HEADS
+        heads = STAGE_HEADS if kind is SeriesKind.STAGE else SWEEP_HEADS
         self.blockSignals(True)
         self.setColumnCount(len(heads))
         self.setHorizontalHeaderLabels(heads)
@@ -63,7 +64,7 @@ class SeriesTable(ReadTable):
             item = self.horizontalHeaderItem(column)
             if item is not None:
                 item.setToolTip(TIPS.get(head, ""))
-        self.show_rows(self._stage_rows() if kind is Kind.STAGE else self._sweep_rows())
+        self.show_rows([self._items(texts) for texts in row_texts(self._state)])
         rows = self._state.rows.value
         at = next((i for i, row in enumerate(rows) if row.path == self._state.selected.value), None)
         self.clearSelection()
@@ -71,55 +72,18 @@ class SeriesTable(ReadTable):
             self.selectRow(at)
         self.blockSignals(False)
 
-    def _stage_rows(self) -> list[list[QTableWidgetItem]]:
-        test = self._state.test.value
-        counted = {row.path: i for i, row in enumerate(self._state.counted)}
-        found = []
-        for row in self._state.rows.value:
-            i = counted.get(row.path) if test is not None else None
-            target = row.target
-            texts = (
-                "–" if target is None else str(target.plane.pixels),
-                "–" if target is None else f"{target.plane.rms_mm:.3f}",
-                "–" if test is None or i is None else f"{test.free.deviations_mm[i]:+.4f}",
-                "–" if test is None or i is None else f"{test.std_mm[i]:.4f}",
-            )
-            found.append([cell(row.name), self._position(row), *map(_number, texts), self._remark(row)])
-        return found
-
-    def _sweep_rows(self) -> list[list[QTableWidgetItem]]:
-        points = self._state.points
-        best = {points[i].name for i in best_points(points, self._state.figure.value)}
-        found = []
-        for row in self._state.rows.value:
-            point = row.point
-            texts = ["–"] * (1 + len(FIGURES))
-            if point is not None:
-                texts = [f"{point.seconds:.1f}", *(point.words(figure) for figure in FIGURES)]
-            good = "No quicker one is better" if point is not None and point.name in best else ""
-            found.append([cell(row.name), *map(_number, texts), self._remark(row, good)])
-        return found
-
-    def _position(self, row: Row) -> QTableWidgetItem:
-        known = row.position_mm
-        item = _number("" if known is None else f"{known:g}")
-        item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable)
-        return item
-
-    def _remark(self, row: Row, good: str = "") -> QTableWidgetItem:
-        kind = self._state.kind.value
-        trouble = row.trouble(kind)
-        if trouble:
-            return _fixed(cell(trouble, self._theme.warn))
-        return _fixed(cell(good if row.is_read(kind) else "Not read yet", self._theme.muted))
-
-    # Ask -------------------------------------------------------------------------------------------
+    def _items(self, texts: RowTexts) -> list[QTableWidgetItem]:
+        items = [cell(texts.name), *map(_number, texts.numbers)]
+        if self._state.kind.value is SeriesKind.STAGE:
+            items[POSITION].setFlags(items[POSITION].flags() | Qt.ItemFlag.ItemIsEditable)
+        colour = self._theme.warn if texts.is_trouble else self._theme.muted
+        return [*items, _fixed(cell(texts.remark, colour))]
 
     def _typed(self, item: QTableWidgetItem) -> None:
-        if item.column() != POSITION or self._state.kind.value is not Kind.STAGE:
+        if item.column() != POSITION or self._state.kind.value is not SeriesKind.STAGE:
             return
         path, text = self._state.rows.value[item.row()].path, item.text()
-        # The table is filled anew, which it cannot be while it still keeps what was typed.
+        # The table cannot be refilled while it is still storing what was typed.
         QTimer.singleShot(0, self, lambda: self._keep(path, text))
 
     def _keep(self, path: Path, text: str) -> None:
@@ -128,19 +92,73 @@ class SeriesTable(ReadTable):
         except ValueError:
             value = math.nan
         if math.isfinite(value):
-            self._commands.set_position(path, value)
-        # What was typed is shown as it is kept; what is no number is not.
+            self._control.set_position(path, value)
+        # Shows the position as stored; text that is not a number is dropped.
         self.show_series()
 
     def _chosen(self) -> None:
         rows = self.selectionModel().selectedRows()
         if rows:
-            self._commands.select(self._state.rows.value[rows[0].row()].path)
+            self._control.select(self._state.rows.value[rows[0].row()].path)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
         self.show_series()
+
+
+@dataclass(frozen=True)
+class RowTexts:
+    """What a row of the table says; ``is_trouble`` marks a remark on why the result does not count."""
+
+    name: str
+    numbers: tuple[str, ...]
+    remark: str
+    is_trouble: bool = False
+
+
+def row_texts(state: SeriesState) -> list[RowTexts]:
+    """The table of a series, row by row."""
+    kind, points = state.kind.value, state.points
+    numbers = _stage_numbers(state) if kind is SeriesKind.STAGE else _sweep_numbers(state)
+    is_sweep = kind is SeriesKind.SWEEP
+    best = {points[i].name for i in best_points(points, state.figure.value)} if is_sweep else set()
+    found = []
+    for row, texts in zip(state.rows.value, numbers, strict=True):
+        trouble = row.trouble(kind)
+        good = "No faster one is better" if row.point is not None and row.point.name in best else ""
+        remark = trouble or (good if row.is_read(kind) else "Not read yet")
+        found.append(RowTexts(row.name, texts, remark, bool(trouble)))
+    return found
+
+
+def _stage_numbers(state: SeriesState) -> list[tuple[str, ...]]:
+    """Position, pixels, scatter, deviation and its standard deviation."""
+    test = state.test.value
+    counted = {row.path: i for i, row in enumerate(state.counted)}
+    found: list[tuple[str, ...]] = []
+    for row in state.rows.value:
+        i, target = counted.get(row.path), row.target
+        found.append(
+            (
+                "" if row.position_mm is None else f"{row.position_mm:g}",
+                "–" if target is None else str(target.plane.pixels),
+                "–" if target is None else f"{target.plane.rms_mm:.3f}",
+                "–" if test is None or i is None else f"{test.free.deviations_mm[i]:+.4f}",
+                "–" if test is None or i is None else f"{test.std_mm[i]:.4f}",
+            )
+        )
+    return found
+
+
+def _sweep_numbers(state: SeriesState) -> list[tuple[str, ...]]:
+    """Seconds and errors."""
+    return [
+        ("–",) * (1 + len(FIGURES))
+        if row.point is None
+        else (f"{row.point.seconds:.1f}", *(row.point.words(figure) for figure in FIGURES))
+        for row in state.rows.value
+    ]
 
 
 def _number(text: str) -> QTableWidgetItem:

@@ -1,1 +1,1 @@
-"""The 3D view of a result, drawn in a thread of its own."""
+"""The 3D view of a result, rendered in its own thread."""

@@ -1,8 +1,6 @@
-"""The 3D cloud of a result: cursor and pins in both directions, and a lasso through space."""
+"""The 3D cloud of a result, with cursor, pins and a lasso."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +8,9 @@ from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from dsl_app.results.cloud.scene import Scene, make_scene, normalised, prepare_scene
+from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
 from dsl_app.results.layers import Layers, rgb_of, within
-from dsl_app.results.state import ResultsState, Tool, View
+from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
@@ -20,14 +18,14 @@ from dsl_app.shared.widgets.forms import label
 from dsl_core.evaluation.marks import inside_outline, nearest_on_screen, on_screen
 from dsl_core.io.result.result_arrays import ResultArrays
 
-#: Points among which the one under the moving mouse is looked for; a click looks at all.
+#: Number of points searched for the one under the moving mouse; a click searches all.
 HOVER_POINTS = 60_000
-#: Between two steps in which a scene is filled, ms.
+#: Delay between the steps that fill a view, ms.
 STEP_MS = 20
 
 
-class ScenePanel(QWidget):
-    """Follows a state while it is visible; the scene is made when it is first shown."""
+class CloudPanel(QWidget):
+    """Follows a state while it is visible; the view is made when it is first shown."""
 
     pointed = Signal(object)
     pinned = Signal(object)
@@ -37,21 +35,21 @@ class ScenePanel(QWidget):
         super().__init__()
         self._state, self._runner, self._theme = state, runner, DARK
         self._is_preparing = False
-        self.scene: Scene | None = None
+        self.view: CloudView | None = None
         self._layers: Layers | None = None
         self._points = np.empty((0, 3), np.float32)
         self._flat = np.empty(0, np.intp)
-        #: Whether the points are of another result than those that are seen.
+        #: Whether the points are of another result than those on screen.
         self._is_new = True
-        self._seen: NDArray[np.float64] | None = None
+        self._projected: NDArray[np.float64] | None = None
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
         self._box = QVBoxLayout(self)
         self._box.setContentsMargins(0, 0, 0, 0)
         self._hint = label("", "muted")
         self._reset = QPushButton("Reset view")
-        self._reset.setToolTip("Look from where the camera stood")
-        self._reset.clicked.connect(lambda: self._when_made(lambda scene: scene.reset()))
+        self._reset.setToolTip("Look from the position of the camera")
+        self._reset.clicked.connect(lambda: None if self.view is None else self.view.reset())
         row = QHBoxLayout()
         row.addWidget(self._hint, 1)
         row.addWidget(self._reset)
@@ -63,22 +61,18 @@ class ScenePanel(QWidget):
         state.cursor.changed.connect(self._show_cursor)
         state.marks.changed.connect(lambda _: self._show_pins())
         state.tool.follow(lambda _: self._show_hint())
-        # Colours follow a slider that is dragged once it rests a moment.
+        # Colours follow a dragged slider once it rests for a moment.
         self._later = QTimer(self)
         self._later.setSingleShot(True)
         self._later.setInterval(60)
         self._later.timeout.connect(self._paint)
 
-    def _when_made(self, do: Any) -> None:
-        if self.scene is not None:
-            do(self.scene)
-
     # Make and fill ---------------------------------------------------------------------------------
 
     def showEvent(self, event: QShowEvent) -> None:
-        """Make the scene, or bring it up to date."""
+        """Make the view, or update it."""
         super().showEvent(event)
-        if self.scene is None and not self._is_preparing:
+        if self.view is None and not self._is_preparing:
             self._prepare()
         self._new_result()
 
@@ -88,10 +82,10 @@ class ScenePanel(QWidget):
         self._runner.submit(
             Job(
                 "Prepare the 3D view",
-                lambda progress: prepare_scene(),
+                lambda progress: prepare_cloud_view(),
                 self._make,
                 lambda error: self._give_up(f"The 3D view could not be prepared: {error}"),
-                lambda: self._give_up("The 3D view was cancelled. Leave it and come back to have it."),
+                lambda: self._give_up("The 3D view was cancelled. Switch views to try again."),
                 is_minor=True,
             )
         )
@@ -100,19 +94,19 @@ class ScenePanel(QWidget):
         self._is_preparing = False
         self._hint.setText(sentence)
 
-    def _make(self, is_drawn: bool) -> None:
-        self.scene = scene = make_scene(is_drawn, self._view_moved, self._mouse)
-        scene.set_background(self._theme.base)
-        self._box.insertWidget(0, scene.widget, 1)
-        # The widget gets its size, and with it the view, when the event loop comes round.
+    def _make(self, can_draw: bool) -> None:
+        self.view = view = make_cloud_view(can_draw, self._view_moved, self._mouse)
+        view.set_background(self._theme.base)
+        self._box.insertWidget(0, view, 1)
+        # The widget gets its size, and with it the camera, in the event loop.
         QTimer.singleShot(STEP_MS, self, self._new_result)
 
     def _new_result(self) -> None:
         result = self._state.result.value
         if self._layers is not None and self._layers.result is not result:
-            # Whether or not it is seen: a result that was closed must not stay in memory.
+            # Even while hidden: a closed result must not stay in memory.
             self._layers, self._points = None, np.empty((0, 3), np.float32)
-        if self.scene is None or not self.isVisible():
+        if self.view is None or not self.isVisible():
             return
         if result is None or "points_mm" not in result.arrays:
             self._hint.setText("This result holds no points.")
@@ -130,7 +124,7 @@ class ScenePanel(QWidget):
             self._later.start()
 
     def _choose_points(self, result: ResultArrays) -> None:
-        """Take the points between the limits; the others can neither be seen nor pointed at."""
+        """Choose the points within the limits; the others can neither be seen nor pointed at."""
         points = result["points_mm"]
         self._flat = np.flatnonzero(within(points[2], self._state.depth_limits.value))
         self._points = np.ascontiguousarray(points.reshape(3, -1)[:, self._flat].T)
@@ -141,7 +135,7 @@ class ScenePanel(QWidget):
         self._show_cursor(self._state.cursor.value)
 
     def _paint(self) -> None:
-        if self.scene is None or self._layers is None or not self.isVisible():
+        if self.view is None or self._layers is None or not self.isVisible():
             return
         layer = self._layers.layer(self._state)
         if layer is None:
@@ -151,21 +145,21 @@ class ScenePanel(QWidget):
         if search is not None:
             colours = colours.copy()
             colours[search.found.ravel()[self._flat]] = tuple(bytes.fromhex(self._theme.accent[1:]))
-        self.scene.show_cloud(self._points, colours, self._is_new)
+        self.view.show_cloud(self._points, colours, self._is_new)
         self._is_new = False
-        self._seen = None
+        self._projected = None
 
     def _show_cursor(self, pixel: Pixel | None) -> None:
         result = self._state.result.value
-        if self.scene is None or result is None or not self.isVisible() or self._layers is None:
+        if self.view is None or result is None or not self.isVisible() or self._layers is None:
             return
         point = None if pixel is None or not result.holds(pixel) else result.at("points_mm", pixel)
         known = point is not None and bool(np.isfinite(point).all())
-        self.scene.show_marker(point if known else None, self._theme.accent)
+        self.view.show_marker(point if known else None, self._theme.accent)
 
     def _show_pins(self) -> None:
         result = self._state.result.value
-        if self.scene is None or result is None or not self.isVisible() or self._layers is None:
+        if self.view is None or result is None or not self.isVisible() or self._layers is None:
             return
         spots, colours = [], []
         for mark in self._state.marks.value:
@@ -175,25 +169,25 @@ class ScenePanel(QWidget):
                 colours.append(tuple(bytes.fromhex(colour[1:])))
         points = np.array(spots, np.float32).reshape(-1, 3)
         known = np.isfinite(points).all(1)
-        self.scene.show_pins(points[known], np.array(colours, np.uint8).reshape(-1, 3)[known])
+        self.view.show_pins(points[known], np.array(colours, np.uint8).reshape(-1, 3)[known])
 
     def _show_hint(self) -> None:
         lasso = self._state.tool.value is Tool.LASSO
         self._hint.setText(
             "Draw around points with the left button."
             if lasso
-            else "Drag turns, Shift+drag moves, wheel zooms; arrow keys turn, + and − zoom."
+            else "Drag to rotate, Shift+drag to pan, wheel to zoom; arrow keys rotate, + and − zoom."
         )
 
     # Mouse -----------------------------------------------------------------------------------------
 
     def _view_moved(self) -> None:
-        self._seen = None
+        self._projected = None
 
     def _mouse(self, event: QMouseEvent) -> bool:
-        """Point, pin or draw; True keeps the event from turning the view."""
-        assert self.scene is not None
-        at = normalised(event.position(), self.scene.widget)
+        """Point, pin or draw; True if the event must not rotate the view."""
+        assert self.view is not None
+        at = normalised(event.position(), self.view)
         lasso = self._state.tool.value is Tool.LASSO
         match event.type():
             case QEvent.Type.MouseButtonPress if event.button() == Qt.MouseButton.LeftButton:
@@ -206,7 +200,7 @@ class ScenePanel(QWidget):
             case QEvent.Type.MouseMove if event.buttons() == Qt.MouseButton.NoButton:
                 self._point(at, HOVER_POINTS)
             case QEvent.Type.MouseMove:
-                self._seen = None
+                self._projected = None
             case QEvent.Type.MouseButtonRelease if event.button() == Qt.MouseButton.LeftButton:
                 return self._released(at, lasso)
         return False
@@ -223,17 +217,17 @@ class ScenePanel(QWidget):
         return False
 
     def _point(self, at: tuple[float, float], most: int) -> Pixel | None:
-        """Put the cursor on the point under the mouse, looked for among some of them."""
-        assert self.scene is not None
+        """Put the cursor on the point under the mouse, searching at most ``most`` points."""
+        assert self.view is not None
         if len(self._points) == 0:
             return None
         step = max(len(self._points) // most, 1)
-        if step == 1 or self._seen is None:
-            seen = on_screen(self._points[::step], self.scene.projection())
-            self._seen = seen if step > 1 else None
+        if step == 1 or self._projected is None:
+            seen = on_screen(self._points[::step], self.view.projection())
+            self._projected = seen if step > 1 else None
         else:
-            seen = self._seen
-        size = self.scene.widget.width(), self.scene.widget.height()
+            seen = self._projected
+        size = self.view.width(), self.view.height()
         found = nearest_on_screen(seen, at, size, 6.0 * step**0.5)
         if found is None:
             return None
@@ -250,9 +244,9 @@ class ScenePanel(QWidget):
     def _end_lasso(self) -> None:
         outline, self._lasso = self._lasso, []
         result = self._state.result.value
-        if self.scene is None or result is None or len(outline) < 3:
+        if self.view is None or result is None or len(outline) < 3:
             return
-        seen = on_screen(self._points, self.scene.projection())
+        seen = on_screen(self._points, self.view.projection())
         inside = inside_outline(seen[:, 0], seen[:, 1], outline)
         mask = np.zeros(result.shape, bool)
         mask.ravel()[self._flat[inside]] = True
@@ -264,12 +258,13 @@ class ScenePanel(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
-        self._when_made(lambda scene: scene.set_background(theme.base))
-        if self._state.view.value is View.CLOUD:
+        if self.view is not None:
+            self.view.set_background(theme.base)
+        if self._state.view.value is ResultView.CLOUD:
             self._show_pins()
 
     def release(self) -> None:
-        """Let go of the graphics."""
-        if self.scene is not None:
-            self.scene.close()
-            self.scene = None
+        """Release the graphics."""
+        if self.view is not None:
+            self.view.release()
+            self.view = None

@@ -1,4 +1,4 @@
-"""The actors of a point cloud in a pyvista plotter: a part while it moves, all that is quick at rest."""
+"""A point cloud in a pyvista plotter: a part of it while it moves, as much as is quick at rest."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 Points = NDArray[np.float32]
-#: Points drawn while the view turns.
+#: Points drawn while the view rotates.
 COARSE = 60_000
-#: A picture at rest may take so long, s: who begins to turn the view waits for it. Steps that add less than a
-#: share of what is there are not worth it.
+#: A picture at rest may take this long, s, as rotating has to wait for it. Steps that add less than this
+#: share of the points are not worth it.
 SLOW_S, LEAST_STEP = 0.1, 0.25
 POINT_PX, COARSE_PX, LARGEST_PX = 2, 3, 10
-#: Steps of the depth buffer that bring a mark before any cloud.
+#: Depth buffer offset that draws marks in front of any cloud.
 TO_THE_FRONT = -66_000
-#: What a cloud covers of a view, about; points that are few are drawn larger, so that it is no veil.
+#: About the share of the view that a cloud covers; few points are drawn larger, so that it looks solid.
 COVERED = 0.6
 
 
-class Cloud:
-    """Shows a few points at once; `grow` adds more of them, step by step, as long as that is quick."""
+class PointsActor:
+    """Shows some points at once; `grow` adds more, step by step, as long as that is quick."""
 
     def __init__(self, plotter: Any) -> None:
         self.plotter = plotter
@@ -37,10 +37,10 @@ class Cloud:
         self._size = 640, 480
 
     def show(self, points: Points, colours: NDArray[np.uint8]) -> bool:
-        """Show a cloud; True when it is another than before, and not only of other colours."""
+        """Show a cloud; True when the points are new, and not only their colours."""
         self._colours = colours
         if points is self._points and self._parts:
-            # Graphics take colours in as slowly as points: the rest grows anew.
+            # Uploading colours is as slow as points, so the rest grows again.
             first, *others = self._parts
             self._drop(others)
             self._meshes[first]["colours"] = colours[self._parts[first]]
@@ -48,7 +48,7 @@ class Cloud:
             return False
         self._drop(list(self._parts))
         self._points = points
-        # A fixed random order, so that a part of the cloud is even and does not flicker.
+        # A fixed random order, so that a part of the cloud is evenly spread and does not flicker.
         self._order = np.random.default_rng(0).permutation(len(points)).astype(np.int32)
         self._add(COARSE)
         return True
@@ -60,7 +60,7 @@ class Cloud:
         self.shown = sum(map(len, self._parts.values()))
 
     def grow(self, frame_s: float) -> bool:
-        """Add points, if a picture that took ``frame_s`` stays quick; False where there is nothing to add."""
+        """Add points if pictures stay quick, the last having taken ``frame_s``; False if none were added."""
         left = len(self._order) - self.shown
         room = int(self.shown * min(SLOW_S / max(frame_s, 1e-4) - 1, 1.0))
         if left == 0 or room < min(left, LEAST_STEP * self.shown):
@@ -82,7 +82,7 @@ class Cloud:
         if name in self._actors:
             self.plotter.remove_actor(self._actors.pop(name), reset_camera=False, render=False)
         if len(points) == 0:
-            # VTK wants at least one point; this one is never in view.
+            # VTK needs at least one point; this one is never visible.
             points, colours = np.full((1, 3), -1e6, np.float32), np.zeros((1, 3), np.uint8)
         mesh = pyvista.PolyData(np.ascontiguousarray(points))
         mesh["colours"] = colours
@@ -99,7 +99,7 @@ class Cloud:
         )
 
     def mark(self, name: str, points: Points, colours: NDArray[np.uint8], size_px: int) -> None:
-        """Show some points before all others: who marks a place wants to see it."""
+        """Show points in front of all others, so that marks are always visible."""
         old = self._meshes.get(name)
         if old is not None and len(points) and old.n_points == len(points):
             old.points = np.ascontiguousarray(points)
@@ -111,12 +111,12 @@ class Cloud:
             mapper.SetRelativeCoincidentTopologyPointOffsetParameter(TO_THE_FRONT)
 
     def resize(self, width: int, height: int) -> None:
-        """Draw points as large as a view of this size, px, calls for."""
+        """Adapt the point size to a view of this size, px."""
         self._size = width, height
         self.be_coarse(self.is_coarse)
 
     def be_coarse(self, coarse: bool) -> None:
-        """Show the first part alone, or all of them; the fewer points, the larger."""
+        """Show only the first part, or all; the fewer points, the larger they are."""
         self.is_coarse = coarse
         width, height = self._size
         size_px = point_size(min(COARSE, self.shown) if coarse else self.shown, width * height)
@@ -126,7 +126,7 @@ class Cloud:
             actor.GetProperty().SetPointSize(min(size_px, COARSE_PX) if self.shown > COARSE else size_px)
 
     def reset(self) -> None:
-        """Look along the camera's axis, as the picture does, so that all fits into the view."""
+        """Look along the axis of the camera, so that the whole cloud fits into the view."""
         if self._points is None or len(self._order) == 0:
             return
         low, high = np.percentile(self._points[self._order[:COARSE]], (0.5, 99.5), axis=0)
@@ -146,7 +146,7 @@ class Cloud:
 
 
 def point_size(count: int, view_px: int) -> int:
-    """Size of the points of a cloud in a view of so many pixels, px.
+    """Size of ``count`` points in a view of ``view_px`` pixels, px.
 
     >>> point_size(500_000, 300_000), point_size(14_000, 300_000), point_size(100, 300_000)
     (2, 4, 10)

@@ -1,4 +1,4 @@
-"""Draws a cloud in a thread of its own, so that no picture, however slow, stops the window. No Qt here."""
+"""Renders a cloud in its own thread, so that slow pictures do not block the window. No Qt."""
 
 from __future__ import annotations
 
@@ -10,160 +10,160 @@ from functools import partial
 from queue import Empty, SimpleQueue
 
 from dsl_app.results.cloud.points import Points
-from dsl_app.results.cloud.render_window import Colours, Easel, MouseButton, Picture, Place
+from dsl_app.results.cloud.render_window import Colours, MouseButton, Place, Rendering, RenderWindow
 
-#: How long after the last move the whole cloud comes back, s.
+#: Time after the last move until the whole cloud is drawn again, s.
 SETTLE_S = 0.25
 
 Act = Callable[[], object]
 
 
-class Artist:
-    """Does what it is asked to in its thread, in order, and draws when nothing more waits.
+class CloudRenderer:
+    """Handles requests in its thread, in order, and draws once none is waiting.
 
-    The cloud is coarse while it is turned and while marks move; at rest it grows until pictures get slow.
-    ``drawn`` is called in that thread when there is a picture to `take` and the one before was taken.
+    The cloud is coarse while it is rotated and while marks move; at rest it grows until pictures get slow.
+    ``drawn`` is called in the thread when there is a picture to `take` and the previous one was taken.
     """
 
     def __init__(self, drawn: Act) -> None:
         self._drawn = drawn
         self._waiting: SimpleQueue[Act] = SimpleQueue()
-        self._asked = self._done = 0
+        self._requested = self._done = 0
         self._lock = threading.Lock()
-        self._picture: Picture | None = None
+        self._picture: Rendering | None = None
         self._picture_s = 0.0
-        #: When the cloud is to be whole again, on the monotonic clock; None while it is, or is turned.
+        #: When to draw the whole cloud again, by the monotonic clock; None if it is whole or being rotated.
         self._rest_at: float | None = None
         self._is_held, self._is_grown, self._is_over = False, True, False
-        #: Whether the next picture takes in new points, which tells nothing of how long later ones take.
+        #: Whether the next picture uploads new points, so its duration says nothing about later ones.
         self._is_fresh = False
-        #: How many points of the cloud are drawn at rest.
+        #: Number of points drawn at rest.
         self.shown = 0
-        self._easel: Easel
+        self._window: RenderWindow
         self._thread = threading.Thread(target=self._run, name="3d-view", daemon=True)
         self._thread.start()
 
-    # Asked for by the window -----------------------------------------------------------------------
+    # Requests of the window -------------------------------------------------------------------------
 
     @property
     def is_at_rest(self) -> bool:
-        """Whether all that was asked for is drawn, with as many points as this machine draws in time."""
-        return self._done == self._asked and self._patience_s() is None
+        """Whether all requests are drawn, with as many points as this computer draws in time."""
+        return self._done == self._requested and self._timeout_s() is None
 
-    def take(self) -> Picture | None:
+    def take(self) -> Rendering | None:
         """The latest picture, once."""
         with self._lock:
             picture, self._picture = self._picture, None
         return picture
 
-    def show(self, points: Points, colours: Colours, anew: bool = True) -> None:
-        """Show a cloud; other points than before are looked at ``anew``, or from where one is."""
-        self._ask(partial(self._show, points, colours, anew))
+    def show(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+        """Show a cloud; points other than before reset the view, or keep it."""
+        self._request(partial(self._show, points, colours, reset_view))
 
     def mark(self, name: str, points: Points, colours: Colours, size_px: int, moves: bool = False) -> None:
-        """Mark points; the cloud is coarse for a while where the mark ``moves``."""
-        self._ask(partial(self._mark, name, points, colours, size_px, moves))
+        """Mark points; the cloud is coarse for a while if the mark ``moves``."""
+        self._request(partial(self._mark, name, points, colours, size_px, moves))
 
     def set_background(self, colour: str) -> None:
-        """The colour behind the cloud."""
-        self._ask(lambda: self._easel.set_background(colour))
+        """Set the colour behind the cloud."""
+        self._request(lambda: self._window.set_background(colour))
 
     def resize(self, width: int, height: int) -> None:
-        """The size of pictures, px."""
-        self._ask(lambda: self._easel.resize(width, height))
+        """Set the size of pictures, px."""
+        self._request(lambda: self._window.resize(width, height))
 
     def press(self, button: MouseButton, at: Place, shift: bool, control: bool) -> None:
-        """A button of the mouse goes down."""
-        self._ask(partial(self._press, button, at, shift, control))
+        """Press a mouse button."""
+        self._request(partial(self._press, button, at, shift, control))
 
     def move(self, at: Place, shift: bool, control: bool) -> None:
-        """The mouse moves."""
-        self._ask(lambda: self._easel.move(at, shift, control))
+        """Move the mouse."""
+        self._request(lambda: self._window.move(at, shift, control))
 
     def release(self, button: MouseButton, at: Place) -> None:
-        """A button of the mouse goes up."""
-        self._ask(partial(self._release, button, at))
+        """Release a mouse button."""
+        self._request(partial(self._release, button, at))
 
     def turn(self, right: int, up: int) -> None:
-        """Turn the view by so many steps."""
-        self._ask(partial(self._step, lambda: self._easel.turn(right, up)))
+        """Rotate the view by steps."""
+        self._request(partial(self._step, lambda: self._window.turn(right, up)))
 
     def zoom(self, steps: float) -> None:
-        """Move nearer by so many steps, or away."""
-        self._ask(partial(self._step, lambda: self._easel.zoom(steps)))
+        """Move the camera closer by steps, or away."""
+        self._request(partial(self._step, lambda: self._window.zoom(steps)))
 
     def reset(self) -> None:
-        """Look from where the camera stood."""
-        self._ask(lambda: self._easel.reset())
+        """Look from the position of the camera."""
+        self._request(lambda: self._window.reset())
 
     def close(self) -> None:
-        """End after the picture at hand, and wait for that."""
-        self._ask(self._end)
+        """End the thread after the current picture, and wait for it."""
+        self._request(self._end)
         self._thread.join()
 
-    def _ask(self, act: Act) -> None:
-        self._asked += 1
+    def _request(self, act: Act) -> None:
+        self._requested += 1
         self._waiting.put(act)
 
     # In the thread ---------------------------------------------------------------------------------
 
     def _run(self) -> None:
-        self._easel = Easel()
+        self._window = RenderWindow()
         while not self._is_over:
             acts = self._wait()
             for act in acts:
                 act()
             if not acts:
-                self._go_on()
+                self._refine()
             if not self._is_over:
                 self._draw()
             self._done += len(acts)
 
     def _end(self) -> None:
         self._is_over = True
-        self._easel.close()
+        self._window.close()
 
     def _wait(self) -> list[Act]:
-        """All that waits; nothing where it is time to go on unasked."""
+        """All requests that wait; none when it is time to draw more unrequested."""
         acts = []
         try:
-            acts.append(self._waiting.get(timeout=self._patience_s()))
+            acts.append(self._waiting.get(timeout=self._timeout_s()))
             while True:
                 acts.append(self._waiting.get_nowait())
         except Empty:
             return acts
 
-    def _patience_s(self) -> float | None:
+    def _timeout_s(self) -> float | None:
         if self._rest_at is not None:
             return max(self._rest_at - time.monotonic(), 0.0)
         return None if self._is_grown or self._is_held else 0.0
 
-    def _go_on(self) -> None:
+    def _refine(self) -> None:
         if self._rest_at is not None:
             self._rest()
         elif self._is_fresh:
             self._is_fresh = False
         else:
-            self._is_fresh = self._easel.cloud.grow(self._picture_s)
+            self._is_fresh = self._window.cloud.grow(self._picture_s)
             self._is_grown = not self._is_fresh
 
     def _draw(self) -> None:
         begun = time.perf_counter()
-        picture = self._easel.draw()
-        self._picture_s, self.shown = time.perf_counter() - begun, self._easel.cloud.shown
+        picture = self._window.draw()
+        self._picture_s, self.shown = time.perf_counter() - begun, self._window.cloud.shown
         with self._lock:
             is_taken, self._picture = self._picture is None, picture
         if is_taken:
-            # Who looked at it may be gone by now.
+            # The widget may be deleted by now.
             with suppress(RuntimeError):
                 self._drawn()
 
-    def _show(self, points: Points, colours: Colours, anew: bool) -> None:
-        self._easel.show(points, colours, anew)
+    def _show(self, points: Points, colours: Colours, reset_view: bool) -> None:
+        self._window.show(points, colours, reset_view)
         self._is_fresh, self._is_grown = True, False
 
     def _mark(self, name: str, points: Points, colours: Colours, size_px: int, moves: bool) -> None:
-        self._easel.cloud.mark(name, points, colours, size_px)
+        self._window.cloud.mark(name, points, colours, size_px)
         if moves:
             self._be_coarse()
 
@@ -172,20 +172,20 @@ class Artist:
         self._be_coarse()
 
     def _press(self, button: MouseButton, at: Place, shift: bool, control: bool) -> None:
-        self._easel.press(button, at, shift, control)
+        self._window.press(button, at, shift, control)
         self._is_held = True
         self._be_coarse()
 
     def _release(self, button: MouseButton, at: Place) -> None:
-        self._easel.release(button, at)
+        self._window.release(button, at)
         self._is_held = False
         self._rest()
 
     def _be_coarse(self) -> None:
-        """Show a part of the cloud until nothing moves for a while, and as long as a button is held."""
-        self._easel.cloud.be_coarse(True)
+        """Show a part of the cloud until nothing has moved for a while, and while a button is held."""
+        self._window.cloud.be_coarse(True)
         self._rest_at = None if self._is_held else time.monotonic() + SETTLE_S
 
     def _rest(self) -> None:
         self._rest_at = None
-        self._easel.cloud.be_coarse(False)
+        self._window.cloud.be_coarse(False)

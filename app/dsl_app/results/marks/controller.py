@@ -1,4 +1,4 @@
-"""Pins, regions and references of a result: made, named, shown, removed, kept beside it. No Qt."""
+"""Pins, regions and references of a result: adds, names, shows, removes and saves them. No Qt."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_app.results.marks.kept import KeptMarks
-from dsl_app.results.marks.records import NOTHING, fill_region, mark_of_reference
-from dsl_app.results.marks.spectra import spectra_of
+from dsl_app.results.marks.spectra import NO_SPECTRUM, fill_region, mark_of_reference, shown_spectra
+from dsl_app.results.marks.storage import MarkStorage
 from dsl_app.results.state import Library, Mark, ResultsState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
@@ -22,25 +21,25 @@ from dsl_core.io.spectra.reference_file import Reference, ReferenceFile, read_re
 from dsl_core.progress import Progress
 
 Mask = NDArray[np.bool_]
-#: Colours that are told apart; further marks share them.
+#: Distinct colours; further marks share them.
 COLOURS = 8
 
 
 class MarksController:
-    """Changes the marks; each change can be taken back and is saved beside the result at once.
+    """Changes the marks; each change can be undone and is saved next to the result at once.
 
-    New ones wait while those that are kept are read.
+    Changes wait while saved marks are being read.
     """
 
     def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
-        self._kept = KeptMarks(state, runner, notifier)
+        self._storage = MarkStorage(state, runner, notifier)
 
-    # Make ------------------------------------------------------------------------------------------
+    # Add -------------------------------------------------------------------------------------------
 
     def pin(self, pixel: Pixel) -> None:
-        """Keep the spectrum of a pixel; says why where there is none."""
-        self._kept.when_read(lambda: self._pin(pixel))
+        """Pin the spectrum of a pixel; says so if it has none."""
+        self._storage.when_read(lambda: self._pin(pixel))
 
     def _pin(self, pixel: Pixel) -> None:
         spectrum = self.state.spectrum_at(pixel)
@@ -50,18 +49,18 @@ class MarksController:
         self._add(Mark("pin", self._name("pin"), self._colour(), spectrum, pixel=pixel))
 
     def add_outline(self, outline_px: Iterable[tuple[float, float]]) -> None:
-        """Make a region of the pixels in an outline of (x, y) corners."""
+        """Add a region: the pixels inside an outline of (x, y) corners."""
         outline = tuple((float(x), float(y)) for x, y in outline_px)
-        self._add_region(Mark("region", "", 0, NOTHING, outline_px=outline))
+        self._add_region(Mark("region", "", 0, NO_SPECTRUM, outline_px=outline))
 
     def add_pixels(self, mask: Mask) -> None:
-        """Make a region of the pixels of a mask (rows, columns), as a lasso in 3D does."""
-        self._add_region(Mark("region", "", 0, NOTHING, runs=runs_of(mask)))
+        """Add a region: the pixels of a mask (rows, columns), as a lasso in 3D gives them."""
+        self._add_region(Mark("region", "", 0, NO_SPECTRUM, runs=runs_of(mask)))
 
     def add_reference(self, path: Path) -> None:
-        """Take a file with a spectrum to compare with, or let somebody choose where it holds several.
+        """Add the reference spectrum in a file; if it holds several, the user is asked which.
 
-        Says why where it cannot be read.
+        Says why if the file cannot be read.
         """
         result = self.state.result.value
 
@@ -69,7 +68,7 @@ class MarksController:
             if self.state.result.value is not result:
                 return
             if len(content.references) == 1:
-                self.take_references(path, content.references)
+                self.add_references(path, content.references)
             else:
                 self.state.library.set(Library(path, content))
 
@@ -77,11 +76,11 @@ class MarksController:
             Job(f"Read {path.name}", lambda progress: read_references(path), done, self._tell, is_minor=True)
         )
 
-    def take_references(self, path: Path, chosen: Iterable[Reference]) -> None:
-        """Take spectra of a file to compare with; a library is not asked about any more."""
+    def add_references(self, path: Path, chosen: Iterable[Reference]) -> None:
+        """Add reference spectra of a file; ends the choice from a library."""
         self.state.library.set(None)
         for each in chosen:
-            self._kept.when_read(lambda each=each: self._add(self._reference(path, each)))  # type: ignore[misc]
+            self._storage.when_read(lambda each=each: self._add(self._reference(path, each)))  # type: ignore[misc]
 
     def _reference(self, path: Path, chosen: Reference) -> Mark:
         name = chosen.name or path.stem
@@ -99,7 +98,7 @@ class MarksController:
             if region.used == 0:
                 self._notifier.tell("info", "No pixel in this outline has a spectrum. Draw a larger one.")
                 return
-            self._kept.when_read(
+            self._storage.when_read(
                 lambda: self._add(replace(region, name=self._name("region"), colour=self._colour()))
             )
 
@@ -120,19 +119,19 @@ class MarksController:
     # Change ----------------------------------------------------------------------------------------
 
     def remove(self, key: int) -> None:
-        """Take a mark away."""
+        """Remove a mark."""
         mark = self._find(key)
         if mark is not None:
             self._change(f"removing {mark.name}", tuple(m for m in self.state.marks.value if m.key != key))
 
     def rename(self, key: int, name: str) -> None:
-        """Name a mark; an empty name changes nothing."""
+        """Rename a mark; an empty name is ignored."""
         mark = self._find(key)
         if mark is not None and name.strip() and name.strip() != mark.name:
-            self._replace(f"naming {name.strip()}", replace(mark, name=name.strip()))
+            self._replace(f"renaming to {name.strip()}", replace(mark, name=name.strip()))
 
     def show(self, key: int, shown: bool) -> None:
-        """Show or hide a mark in pictures and plot."""
+        """Show or hide a mark in the pictures and the plot."""
         mark = self._find(key)
         if mark is not None and mark.shown != shown:
             self._replace(f"{'showing' if shown else 'hiding'} {mark.name}", replace(mark, shown=shown))
@@ -150,7 +149,7 @@ class MarksController:
     def _setter(self, marks: tuple[Mark, ...]) -> Callable[[], None]:
         def set_marks() -> None:
             self.state.marks.set(marks)
-            self._kept.save()
+            self._storage.save()
 
         return set_marks
 
@@ -159,34 +158,34 @@ class MarksController:
         return next(name for i in range(1, len(taken) + 2) if (name := f"{kind} {i}") not in taken)
 
     def _colour(self) -> int:
-        """The colour that the fewest marks have."""
+        """The colour that the fewest marks use."""
         used = [mark.colour for mark in self.state.marks.value]
         return min(range(COLOURS), key=used.count)
 
-    # Hand on ---------------------------------------------------------------------------------------
+    # Copy and export -------------------------------------------------------------------------------
 
-    def has_shown(self) -> bool:
-        """Whether a spectrum is shown that could be copied or exported; says what to do where none is."""
-        found = bool(spectra_of(self.state.marks.value))
+    def can_export(self) -> bool:
+        """Whether a spectrum is shown that can be copied or exported; if not, says what to do."""
+        found = bool(shown_spectra(self.state.marks.value))
         if not found:
             self._notifier.tell("info", "No spectrum is ticked. Pin a pixel, draw a region, or tick one.")
         return found
 
     def copy_spectra(self, put: Callable[[str], object]) -> None:
-        """Hand the spectra that are shown to ``put``, as a table with tabs."""
+        """Pass the spectra shown to ``put``, as a tab-separated table."""
         from dsl_core.io.export.spectra import spectra_as_text
 
-        if self.has_shown():
-            spectra = spectra_of(self.state.marks.value)
+        if self.can_export():
+            spectra = shown_spectra(self.state.marks.value)
             put(spectra_as_text(spectra))
             self._notifier.tell("info", f"Copied {_counted(len(spectra))}. Paste them into a spreadsheet.")
 
     def export_spectra(self, path: Path, overwrite: bool) -> None:
-        """Write the spectra that are shown as CSV."""
+        """Write the spectra shown as CSV."""
         result = self.state.result.value
-        if result is None or not self.has_shown():
+        if result is None or not self.can_export():
             return
-        spectra = spectra_of(self.state.marks.value)
+        spectra = shown_spectra(self.state.marks.value)
 
         def work(progress: Progress) -> Path:
             from dsl_core.io.export.spectra import export_spectra
@@ -199,17 +198,17 @@ class MarksController:
 
         self._runner.submit(Job("Export spectra", work, done, self._tell))
 
-    # Keep ------------------------------------------------------------------------------------------
+    # Read ------------------------------------------------------------------------------------------
 
     def load(self) -> None:
-        """Take the marks that are kept beside the result that was opened; forgets what could be undone."""
+        """Read the marks of the result that was just opened; clears the undo history."""
         self._undo.clear()
-        self._kept.read()
+        self._storage.read()
 
     @property
     def is_reading(self) -> bool:
-        """Whether kept marks are still being read."""
-        return self._kept.is_reading
+        """Whether saved marks are still being read."""
+        return self._storage.is_reading
 
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", str(error))

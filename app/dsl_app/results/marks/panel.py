@@ -1,4 +1,4 @@
-"""The list of pins, regions and references: show, name, select, remove; and the selected one in figures."""
+"""The list of pins, regions and references, and the comparison of the selected one."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.results.commands import MarkCommands
-from dsl_app.results.marks.figures import figures_of
+from dsl_app.results.marks.comparison import comparison_html
+from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
-    "Click the picture to pin a spectrum, draw a region with the tools above, or drop a file with a reference"
-    " spectrum here."
+    "Click the picture to pin a spectrum, draw a region with the tools above it, or drop a file with a"
+    " reference spectrum here."
 )
 _FORMATS = "Spectra (*.csv *.txt *.tsv *.dat *.asc *.sli *.hdr);;All files (*)"
 
 
 class MarksPanel(QWidget):
-    """Follows the marks of a state and asks a controller."""
+    """Follows the marks of a state and asks their controller."""
 
-    def __init__(self, state: ResultsState, commands: MarkCommands) -> None:
+    def __init__(self, state: ResultsState, control: MarksController) -> None:
         super().__init__()
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._control, self._theme = state, control, DARK
         self._filling = False
         self.tree = QTreeWidget()
         self.tree.setColumnCount(3)
@@ -53,7 +53,7 @@ class MarksPanel(QWidget):
         )
         self.tree.setAccessibleName("Pins, regions and references")
         self.tree.setToolTip(
-            "Tick to show; F2 or a double click names; Delete removes; the selection is compared"
+            "Tick to show; F2 or double-click to rename; Delete to remove; the selected one is compared"
         )
         header = self.tree.header()
         header.setStretchLastSection(False)
@@ -75,21 +75,21 @@ class MarksPanel(QWidget):
         self.tree.setMinimumHeight(88)
         self.reference = QPushButton("Add reference…")
         self.reference.setToolTip(
-            "Open a spectrum (text, nm and reflectance) or an ENVI library (.sli) to compare with"
+            "Open a spectrum (text with nm and reflectance) or an ENVI library (.sli) to compare with"
         )
         self.remove = QPushButton("Remove")
-        self.remove.setToolTip("Take the selected pin, region or reference away (Delete)")
+        self.remove.setToolTip("Remove the selected pin, region or reference (Delete)")
         self.copy = QPushButton("Copy spectra")
         self.copy.setToolTip(
             "Copy the ticked spectra for a spreadsheet: nm, mean, deviation, n, uncertainty (Ctrl+C)"
         )
         self.export = QPushButton("Export spectra…")
-        self.export.setToolTip("Write the same table as CSV, with where the result comes from")
+        self.export.setToolTip("Write the same table as CSV, with the origin of the result")
         column_box = QVBoxLayout(self)
         column_box.setContentsMargins(0, 0, 0, 0)
         for widget in (self.hint, self.tree):
             column_box.addWidget(widget, 1 if widget is self.tree else 0)
-        # Two rows of buttons, as the smallest window has no room for one.
+        # Two rows, as the smallest window is too narrow for one.
         for buttons in ((self.reference, self.remove), (self.copy, self.export)):
             row = QHBoxLayout()
             for button in buttons:
@@ -114,32 +114,32 @@ class MarksPanel(QWidget):
         self._state.selected.follow(lambda _: self._show_selection())
 
     def choose_reference(self) -> None:
-        """Choose a file with a spectrum."""
+        """Ask for a file with a spectrum."""
         name, _ = QFileDialog.getOpenFileName(self, "Add a reference spectrum", "", _FORMATS)
         if name:
-            self._commands.add_reference(Path(name))
+            self._control.add_reference(Path(name))
 
     def remove_selected(self) -> None:
-        """Take the selected mark away."""
+        """Remove the selected mark."""
         if self._state.selected.value:
-            self._commands.remove(self._state.selected.value)
+            self._control.remove(self._state.selected.value)
 
     def copy_spectra(self) -> None:
-        """Copy the spectra that are shown, as a table."""
-        self._commands.copy_spectra(QGuiApplication.clipboard().setText)
+        """Copy the spectra shown, as a table."""
+        self._control.copy_spectra(QGuiApplication.clipboard().setText)
 
     def export_spectra(self) -> None:
-        """Choose a file and write the spectra that are shown."""
+        """Ask for a file and write the spectra shown."""
         result = self._state.result.value
-        if result is None or not self._commands.has_shown():
+        if result is None or not self._control.can_export():
             return
         draft = str(result.path.with_name(f"{result.path.stem}_spectra.csv"))
         name, _ = QFileDialog.getSaveFileName(self, "Export spectra", draft, "Spectra (*.csv)")
         if name:
             path = Path(name)
-            # The dialog asked about the name as it was typed, not about one with an ending added.
+            # The dialog asked about replacing the name as typed, not one with a suffix added.
             is_whole = path.suffix.lower() == ".csv"
-            self._commands.export_spectra(
+            self._control.export_spectra(
                 path if is_whole else path.with_name(f"{path.name}.csv"), overwrite=is_whole
             )
 
@@ -176,9 +176,9 @@ class MarksPanel(QWidget):
         if mark is None:
             return
         if mark.shown != shown:
-            self._commands.show(key, shown)
+            self._control.show(key, shown)
         elif item.text(0) != mark.name:
-            self._commands.rename(key, item.text(0))
+            self._control.rename(key, item.text(0))
 
     def _selection_changed(self, item: QTreeWidgetItem | None, _before: object) -> None:
         if not self._filling:
@@ -196,7 +196,7 @@ class MarksPanel(QWidget):
             self.tree.setCurrentIndex(QModelIndex())
         self._filling = False
         self.remove.setEnabled(self._state.selected_mark is not None)
-        text = figures_of(self._state, self._theme)
+        text = comparison_html(self._state, self._theme)
         self.below.setVisible(bool(text))
         self.figures.setText(text)
 
@@ -207,7 +207,7 @@ class MarksPanel(QWidget):
 
 
 def where(mark: Mark) -> str:
-    """Where a mark lies, in a few words, or that it has no spectrum now."""
+    """Where a mark is, in a few words, or that it has no spectrum now."""
     if mark.trouble:
         return "no spectrum"
     if mark.pixel is not None:
@@ -218,5 +218,5 @@ def where(mark: Mark) -> str:
 
 
 def count(mark: Mark) -> str:
-    """Pixels of a region, those without spectrum left out."""
+    """Pixels of a region that have a spectrum."""
     return f"{mark.used}" if mark.kind == "region" and not mark.trouble else ""

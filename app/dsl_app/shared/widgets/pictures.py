@@ -14,6 +14,8 @@ from dsl_app.shared.theme import Theme
 
 #: Perceptually uniform maps of pyqtgraph: grey for a band, colours for quantities that are not light.
 GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
+#: Differences: white is zero, blue negative, red positive; lightness changes evenly.
+DIFFERENCE = "CET-D1A"
 
 
 def spread_of(values: NDArray[np.floating[Any]], low: float = 0.5, high: float = 99.5) -> tuple[float, float]:

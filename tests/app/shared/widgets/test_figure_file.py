@@ -19,8 +19,8 @@ from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
 
 from dsl_core.errors import StoreError
-from tests.app.results.test_results_page import Bench
-from tests.app.results.test_results_page import bench as bench
+from tests.app.support.results_bench import Bench
+from tests.app.support.results_bench import bench as bench
 
 NM = np.linspace(430.0, 660.0, 24)
 PAPER = tuple(bytes.fromhex(LIGHT.base[1:]))

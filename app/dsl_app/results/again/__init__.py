@@ -1,1 +1,0 @@
-"""Reconstruction of a scan with other parameters."""

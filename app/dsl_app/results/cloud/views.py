@@ -1,0 +1,290 @@
+"""Widgets that show a point cloud: interactive where VTK can draw, else a static picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtGui import (
+    QColor,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPixmap,
+    QResizeEvent,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from dsl_app.results.cloud.points import Points
+from dsl_app.results.cloud.render_window import Colours, MouseButton, Rendering, graphics_work
+from dsl_app.results.cloud.renderer import CloudRenderer
+from dsl_app.shared.widgets.pictures import arrow_step
+
+#: One notch of a mouse wheel, in Qt's unit.
+NOTCH = 120
+NO_OPENGL = (
+    "OpenGL was not found, so the cloud cannot be rotated here. Export it as PLY to view it in another"
+    " program, or install a graphics driver."
+)
+_BUTTONS: dict[Qt.MouseButton, MouseButton] = {
+    Qt.MouseButton.LeftButton: "Left",
+    Qt.MouseButton.MiddleButton: "Middle",
+    Qt.MouseButton.RightButton: "Right",
+}
+
+
+class CloudView(QWidget):
+    """Shows a cloud; this base has one fixed view without marks."""
+
+    def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+        """Show points (n, 3) in mm with colours (n, 3); other points reset the view, or keep it."""
+        raise NotImplementedError
+
+    def show_marker(self, point: Points | None, colour: str) -> None:
+        """Mark a point; None marks nothing."""
+
+    def show_pins(self, points: Points, colours: Colours) -> None:
+        """Mark the pins."""
+
+    def set_background(self, colour: str) -> None:
+        """Set the colour behind the cloud."""
+        raise NotImplementedError
+
+    def projection(self) -> NDArray[np.float64]:
+        """The 4 x 4 matrix from points to normalised screen coordinates; by zeros nothing is visible."""
+        return np.zeros((4, 4))
+
+    def reset(self) -> None:
+        """Look from the position of the camera."""
+
+    def release(self) -> None:
+        """Release the graphics."""
+
+
+def prepare_cloud_view() -> bool:
+    """Import what a view needs, in any thread, for a second or so; False where nothing can draw."""
+    import pyvista.plotting
+
+    # What pyvista imports only when a plotter is made.
+    import vtkmodules.vtkInteractionWidgets
+    import vtkmodules.vtkViewsContext2D  # noqa: F401
+
+    # The first points ever make pyvista import more than later ones.
+    pyvista.PolyData(np.zeros((1, 3), np.float32))["colours"] = np.zeros((1, 3), np.uint8)
+    return graphics_work()
+
+
+def make_cloud_view(
+    can_draw: bool, moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]
+) -> CloudView:
+    """An interactive view where VTK can draw, else a static one.
+
+    ``moved`` is called when the view changes; ``mouse`` may consume mouse events, which then rotate nothing.
+    """
+    return InteractiveCloud(moved, mouse) if can_draw else StaticCloud()
+
+
+class InteractiveCloud(CloudView):
+    """Shows the pictures of a `CloudRenderer` and forwards mouse, wheel and keys to it."""
+
+    _drawn = Signal()
+
+    def __init__(self, moved: Callable[[], object], mouse: Callable[[QMouseEvent], bool]) -> None:
+        super().__init__()
+        self._moved, self._mouse = moved, mouse
+        self.image, self._pixels = QImage(), np.empty(0, np.uint8)
+        self._background = QColor()
+        self._projection = np.zeros((4, 4))
+        self.setAccessibleName("Point cloud")
+        self.setAccessibleDescription("Arrow keys rotate, plus and minus zoom, Home resets the view")
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self._drawn.connect(self._take)
+        self.renderer = CloudRenderer(self._drawn.emit)
+
+    # Show ------------------------------------------------------------------------------------------
+
+    def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+        """Show points with their colours, as many as this computer draws in time."""
+        self.renderer.show(points, colours, reset_view)
+
+    def show_marker(self, point: Points | None, colour: str) -> None:
+        """Mark a point; the cloud is coarse until the marker rests."""
+        rgb = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8)[None]
+        points = np.empty((0, 3), np.float32) if point is None else point[None]
+        self.renderer.mark("marker", points, rgb, round(14 * self.devicePixelRatioF()), moves=True)
+
+    def show_pins(self, points: Points, colours: Colours) -> None:
+        """Mark the pins."""
+        self.renderer.mark("pins", points, colours, round(10 * self.devicePixelRatioF()))
+
+    def set_background(self, colour: str) -> None:
+        """Set the colour behind the cloud, also where there is no picture yet."""
+        self._background = QColor(colour)
+        self.renderer.set_background(colour)
+        self.update()
+
+    def projection(self) -> NDArray[np.float64]:
+        """The 4 x 4 matrix of the picture shown."""
+        return self._projection
+
+    def reset(self) -> None:
+        """Look from the position of the camera."""
+        self.renderer.reset()
+
+    def release(self) -> None:
+        """End the render thread."""
+        self.renderer.close()
+
+    def _take(self) -> None:
+        picture = self.renderer.take()
+        if picture is None:
+            return
+        self._show(picture)
+        if not np.array_equal(picture.projection, self._projection):
+            self._projection = picture.projection
+            self._moved()
+
+    def _show(self, picture: Rendering) -> None:
+        height, width = picture.pixels.shape[:2]
+        # QImage only points to these bytes, so they have to stay.
+        self._pixels = picture.pixels
+        self.image = QImage(self._pixels.data, width, height, 4 * width, QImage.Format.Format_RGBX8888)
+        self.image.setDevicePixelRatio(self.devicePixelRatioF())
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Paint the latest picture."""
+        painter = QPainter(self)
+        painter.fillRect(event.rect(), self._background)
+        painter.drawImage(0, 0, self.image)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Request pictures of the new size."""
+        self._resize_pictures()
+
+    def event(self, event: QEvent) -> bool:
+        """Request pictures of the new size also when the window moves to a screen of another scaling."""
+        if event.type() is QEvent.Type.DevicePixelRatioChange:
+            self._resize_pictures()
+        return super().event(event)
+
+    def _resize_pictures(self) -> None:
+        self.renderer.resize(*self._px(QPointF(self.width(), self.height())))
+
+    def _px(self, at: QPointF) -> tuple[int, int]:
+        ratio = self.devicePixelRatioF()
+        return round(at.x() * ratio), round(at.y() * ratio)
+
+    # Mouse and keys --------------------------------------------------------------------------------
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Start to rotate, pan or zoom, unless the event is consumed."""
+        button = _BUTTONS.get(event.button())
+        if not self._mouse(event) and button is not None:
+            self.renderer.press(button, self._px(event.position()), *_modifiers(event))
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Continue to rotate, pan or zoom."""
+        if not self._mouse(event) and event.buttons():
+            self.renderer.move(self._px(event.position()), *_modifiers(event))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        """Stop rotating, panning or zooming."""
+        button = _BUTTONS.get(event.button())
+        if not self._mouse(event) and button is not None:
+            self.renderer.release(button, self._px(event.position()))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Zoom."""
+        self.renderer.zoom(event.angleDelta().y() / NOTCH)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Rotate and zoom by keys."""
+        step = arrow_step(event)
+        if step is not None:
+            self.renderer.turn(step[0], -step[1])
+        elif event.key() in (Qt.Key.Key_Plus, Qt.Key.Key_Equal, Qt.Key.Key_Minus):
+            self.renderer.zoom(-1.0 if event.key() == Qt.Key.Key_Minus else 1.0)
+        elif event.key() == Qt.Key.Key_Home:
+            self.renderer.reset()
+        else:
+            super().keyPressEvent(event)
+
+
+def _modifiers(event: QMouseEvent) -> tuple[bool, bool]:
+    """Whether Shift and Control are held."""
+    keys = event.modifiers()
+    return bool(keys & Qt.KeyboardModifier.ShiftModifier), bool(keys & Qt.KeyboardModifier.ControlModifier)
+
+
+class StaticCloud(CloudView):
+    """Without OpenGL: one picture of the cloud, seen slightly from the side, and a hint."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._picture, self._text = QLabel(), QLabel(NO_OPENGL)
+        self._text.setWordWrap(True)
+        self._text.setProperty("role", "muted")
+        self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._picture.setAccessibleName("Picture of the point cloud")
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._picture, 1)
+        column.addWidget(self._text)
+        self._background = "#000000"
+
+    def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
+        """Draw points into a picture."""
+        picture = static_picture(points, colours, self._background)
+        if picture is None:
+            return
+        height, width = picture.shape[:2]
+        image = QImage(picture.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+        self._picture.setPixmap(QPixmap.fromImage(image))
+
+    def set_background(self, colour: str) -> None:
+        """Set the colour behind the next picture."""
+        self._background = colour
+
+
+def static_picture(points: Points, colours: Colours, background: str) -> NDArray[np.uint8] | None:
+    """A cloud as bytes (rows, columns, 3), drawn by numpy alone; None without points.
+
+    Painted from back to front, so that near points cover far ones.
+    """
+    if len(points) == 0:
+        return None
+    width, height = 640, 480
+    centre = np.median(points, axis=0)
+    turn = np.radians(20.0)
+    moved = points - centre
+    x = moved[:, 0] * np.cos(turn) + moved[:, 2] * np.sin(turn)
+    z = moved[:, 2] * np.cos(turn) - moved[:, 0] * np.sin(turn)
+    scale = min(width / np.ptp(x), height / np.ptp(moved[:, 1])) * 0.94 if np.ptp(x) > 0 else 1.0
+    column = np.rint((x - (x.min() + x.max()) / 2) * scale + width / 2).astype(int)
+    row = np.rint((moved[:, 1] - (moved[:, 1].min() + moved[:, 1].max()) / 2) * scale + height / 2).astype(
+        int
+    )
+    picture = np.empty((height, width, 3), np.uint8)
+    picture[:] = tuple(bytes.fromhex(background[1:]))
+    back_to_front = np.argsort(-z)
+    seen = (column >= 1) & (column < width - 1) & (row >= 1) & (row < height - 1)
+    order = back_to_front[seen[back_to_front]]
+    for dy, dx in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        picture[row[order] + dy, column[order] + dx] = colours[order]
+    return np.ascontiguousarray(picture)
+
+
+def normalised(position: QPointF, widget: QWidget) -> tuple[float, float]:
+    """A place on a widget in normalised screen coordinates, -1 to 1, y upwards."""
+    return (
+        2 * position.x() / max(widget.width(), 1) - 1,
+        1 - 2 * position.y() / max(widget.height(), 1),
+    )

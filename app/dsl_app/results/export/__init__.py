@@ -1,0 +1,1 @@
+"""Writing a result in formats of other programs."""

@@ -1,0 +1,139 @@
+"""Exports a result: formats, the files they make, and what stands in the way. No Qt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from dsl_app.results.state import ResultsState
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.progress import Progress
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of the dialog: its key, suffix and description."""
+
+    key: str
+    suffix: str
+    about: str
+    needs_spectra: bool = False
+    needs_pins: bool = False
+
+
+FORMATS = (
+    Format("ply", ".ply", "PLY – points with normals, colours, spectra and deviations"),
+    Format("envi", ".hdr", "ENVI – spectral cube and its deviation", needs_spectra=True),
+    Format("exr", ".exr", "OpenEXR – spectral image", needs_spectra=True),
+    Format("csv", ".csv", "CSV – spectra of the pins, with deviations", needs_spectra=True, needs_pins=True),
+    Format("tiff", ".tiff", "TIFF – depth in mm, with its deviation and flags in separate files"),
+    Format("npy", ".npy", "NumPy – the same as arrays"),
+    Format("png", ".png", "PNG – pictures of colour, depth, the band shown, and flags"),
+)
+
+
+class ExportController:
+    """Writes the result of a `ResultsState` in other formats."""
+
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+
+    def refusal(self, form: Format) -> str:
+        """Why a format cannot be written for this result; empty when it can."""
+        result = self.state.result.value
+        has_pins = any(mark.kind == "pin" and not mark.trouble for mark in self.state.marks.value)
+        if form.needs_pins and not has_pins:
+            return "Pin a pixel first"
+        if form.needs_spectra and not (result is not None and result.has_spectra):
+            return "This result holds depth only"
+        return ""
+
+    def trouble(self, folder: str, name: str, targets: dict[str, Path], replace: bool) -> str:
+        """Why the files cannot be written, and what to do; empty when they can."""
+        if not targets:
+            return "Select at least one format."
+        if not name:
+            return "Enter a name for the files."
+        if not Path(folder).is_dir():
+            return f"{folder} is not a folder. Choose an existing one."
+        taken = self.taken(targets)
+        if taken and not replace:
+            names = ", ".join(path.name for path in taken[:4]) + (" and more" if len(taken) > 4 else "")
+            verb = "exists" if len(taken) == 1 else "exist"
+            return f"{names} already {verb}. Choose another name, or allow replacing."
+        return ""
+
+    def taken(self, targets: dict[str, Path]) -> list[Path]:
+        """Files that an export would replace."""
+        result = self.state.result.value
+        return [] if result is None else [path for path in expected_files(targets, result) if path.exists()]
+
+    def write(self, targets: dict[str, Path], overwrite: bool) -> None:
+        """Write the result to a path per format key.
+
+        Tables hold the pins; pictures show the current band and light.
+        """
+        state, result = self.state, self.state.result.value
+        if result is None or not targets:
+            return
+        pixels = [mark.pixel for mark in state.marks.value if mark.pixel and not mark.trouble]
+        band_nm = float(result.wavelengths_nm[state.band.value]) if result.has_spectra else None
+        light, adapted = state.picture_light.value
+
+        def work(progress: Progress) -> list[Path]:
+            from dsl_core.io.export import Exporter, export_csv, export_png, formats
+            from dsl_core.io.result.result_file import load_result
+
+            exporters: dict[str, Exporter] = {
+                **formats(),
+                "csv": partial(export_csv, pixels=pixels),
+                "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted),
+            }
+            data, written = load_result(result.path), []
+            for done, (form, path) in enumerate(targets.items()):
+                check = partial(progress.report, f"write {form}", done, len(targets))
+                check()
+                written += exporters[form](data, path, overwrite=overwrite, check=check)
+            return written
+
+        self._runner.submit(
+            Job(
+                f"Export {result.path.stem}",
+                work,
+                self._exported,
+                lambda error: self._notifier.tell("error", str(error)),
+            )
+        )
+
+    def _exported(self, written: Sequence[Path]) -> None:
+        megabytes = sum(path.stat().st_size for path in written if path.is_file()) / 1e6
+        files = "file" if len(written) == 1 else "files"
+        self._notifier.tell(
+            "info",
+            f"Wrote {len(written)} {files}, {megabytes:.1f} MB, to {written[0].parent}.",
+            "\n".join(str(path) for path in written),
+        )
+
+
+def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
+    """Files that an export writes."""
+    from dsl_core.io.export.depth_maps import depth_files
+
+    files: list[Path] = []
+    for form, path in targets.items():
+        if form == "envi":
+            headers = [path]
+            if "reflectance_std" in result.arrays:
+                headers.append(path.with_name(f"{path.stem}_std.hdr"))
+            files += [file for header in headers for file in (header, header.with_suffix(".img"))]
+        elif form in ("tiff", "npy"):
+            files += depth_files(path, "depth_std_mm" in result.arrays, "flags" in result.arrays)
+        elif form == "png":
+            files += sorted(path.parent.glob(f"{path.stem}_*.png"))
+        else:
+            files.append(path)
+    return files

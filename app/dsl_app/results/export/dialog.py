@@ -1,0 +1,110 @@
+"""The export dialog: formats, folder and name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QDialogButtonBox,
+    QFileDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from dsl_app.results.export.controller import FORMATS, ExportController
+from dsl_app.shared.widgets.forms import push_button, set_role
+from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_core.io.result.result_arrays import ResultArrays
+
+
+class ExportDialog(QDialog):
+    """Asks for formats, folder and name; the controller writes."""
+
+    def __init__(self, result: ResultArrays, control: ExportController, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._control = control
+        self.setWindowTitle("Export")
+        self.resize(560, 360)
+        add_help_key(self, "exporting")
+        self.folder = QLineEdit(str(result.path.parent))
+        self.folder.setAccessibleName("Folder")
+        self.folder.setToolTip("Where to write the files")
+        self.name = QLineEdit(result.path.stem)
+        self.name.setAccessibleName("Name without suffix")
+        self.name.setToolTip("Each format adds its own suffix")
+        browse = push_button("Choose…", "Choose the folder to write to")
+        browse.clicked.connect(self._browse)
+        self.formats: dict[str, QCheckBox] = {}
+        for form in FORMATS:
+            box = self.formats[form.key] = QCheckBox(form.about)
+            refusal = control.refusal(form)
+            box.setEnabled(not refusal)
+            box.setToolTip(refusal or form.about)
+            box.toggled.connect(lambda _: self._check())
+        self.replace = QCheckBox("Replace existing files")
+        self.replace.setToolTip("If not selected, existing files are never touched")
+        self.replace.toggled.connect(lambda _: self._check())
+        self.text = QLabel()
+        self.text.setWordWrap(True)
+        self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
+        self.write = self.buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
+        self.write.setToolTip("Write the selected formats")
+        self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Write nothing (Escape)")
+        self.buttons.accepted.connect(self._export)
+        self.buttons.rejected.connect(self.reject)
+        self.folder.textChanged.connect(lambda _: self._check())
+        self.name.textChanged.connect(lambda _: self._check())
+        self._lay_out(browse)
+        self.formats["ply"].setChecked(True)
+
+    def _lay_out(self, browse: QPushButton) -> None:
+        row = QHBoxLayout()
+        row.addWidget(self.folder, 1)
+        row.addWidget(browse)
+        form = QFormLayout()
+        form.addRow("Folder", row)
+        form.addRow("Name", self.name)
+        column = QVBoxLayout(self)
+        column.addLayout(form)
+        for box in self.formats.values():
+            column.addWidget(box)
+        column.addSpacing(6)
+        column.addWidget(self.replace)
+        column.addWidget(self.text)
+        column.addStretch(1)
+        column.addWidget(self.buttons)
+
+    @property
+    def targets(self) -> dict[str, Path]:
+        """Path by key of every selected format."""
+        folder, name = Path(self.folder.text()), self.name.text().strip()
+        return {
+            form.key: folder / f"{name}{form.suffix}"
+            for form in FORMATS
+            if self.formats[form.key].isChecked()
+        }
+
+    def _browse(self) -> None:
+        folder = QFileDialog.getExistingDirectory(self, "Export to", self.folder.text())
+        if folder:
+            self.folder.setText(folder)
+
+    def _check(self) -> None:
+        targets = self.targets
+        trouble = self._control.trouble(
+            self.folder.text(), self.name.text().strip(), targets, self.replace.isChecked()
+        )
+        self.text.setText(trouble or ", ".join(path.name for path in targets.values()))
+        set_role(self.text, "warn" if trouble else "muted")
+        self.write.setEnabled(not trouble)
+
+    def _export(self) -> None:
+        self._control.write(self.targets, self.replace.isChecked())
+        self.accept()

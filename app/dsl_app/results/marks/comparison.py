@@ -1,0 +1,83 @@
+"""The selected mark as rich text: compared with references, and its distances to other pins."""
+
+from __future__ import annotations
+
+from html import escape
+
+import numpy as np
+
+from dsl_app.results.state import Mark, ResultsState
+from dsl_app.shared.theme import Theme
+from dsl_core.errors import DslError
+from dsl_core.evaluation.marks import distance_between
+from dsl_core.evaluation.spectral import compare
+from dsl_core.io.result.result_arrays import ResultArrays
+
+
+def comparison_html(state: ResultsState, theme: Theme) -> str:
+    """The tables for the selected mark; empty if there is nothing to compare."""
+    chosen, result = state.selected_mark, state.result.value
+    if chosen is not None and chosen.trouble:
+        return f"<span style='color:{theme.warn}'>{escape(chosen.trouble)}</span>"
+    if chosen is None or chosen.kind == "reference" or result is None:
+        return ""
+    shown = [mark for mark in state.marks.value if mark.shown and not mark.trouble and mark.key != chosen.key]
+    return comparison_table(chosen, shown, theme) + distance_table(chosen, shown, result, theme)
+
+
+def _table(head: list[str], rows: list[str], theme: Theme) -> str:
+    if not rows:
+        return ""
+    first, *rest = head
+    cells = f"<td>{first}</td>" + "".join(f"<td align='right'>{cell}</td>" for cell in rest)
+    return (
+        f"<table cellspacing='0' cellpadding='3' width='100%'>"
+        f"<tr style='color:{theme.muted}'>{cells}</tr>{''.join(rows)}</table>"
+    )
+
+
+def comparison_table(chosen: Mark, others: list[Mark], theme: Theme) -> str:
+    """A spectrum compared with every reference, as measured and with a free scale factor."""
+    rows = []
+    for mark in others:
+        if mark.curve is None:
+            continue
+        name = escape(mark.name)
+        try:
+            found = compare(chosen.spectrum.mean, chosen.spectrum.nm, mark.curve)
+        except DslError as error:
+            rows.append(f"<tr><td>{name}</td><td colspan='4'>{escape(str(error))}</td></tr>")
+            continue
+        low, high = found.range_nm
+        # Nothing is extrapolated beyond the ends of a reference.
+        only = "" if found.bands == len(chosen.spectrum.nm) else "only "
+        for title, figures in (
+            (name, (f"{found.rmse:.4f}", f"{found.angle_rad:.4f}", f"{found.delta_e:.2f}", "1")),
+            (
+                f"<span style='color:{theme.muted}'>{only}{low:g}–{high:g} nm, free scale</span>",
+                (f"{found.rmse_scaled:.4f}", "", f"{found.delta_e_scaled:.2f}", f"{found.scale:.3f}"),
+            ),
+        ):
+            cells = "".join(f"<td align='right'>{figure}</td>" for figure in figures)
+            rows.append(f"<tr><td>{title}</td>{cells}</tr>")
+    return _table([f"{escape(chosen.name)} against", "RMSE", "angle, rad", "ΔE00", "×"], rows, theme)
+
+
+def distance_table(chosen: Mark, others: list[Mark], result: ResultArrays, theme: Theme) -> str:
+    """Straight-line distances from a pin to the other pins."""
+    if chosen.pixel is None or "points_mm" not in result.arrays:
+        return ""
+    rows = []
+    here, spread = result.at("points_mm", chosen.pixel), _spread(result, chosen)
+    for mark in others:
+        if mark.pixel is None:
+            continue
+        found = distance_between(here, result.at("points_mm", mark.pixel), spread, _spread(result, mark))
+        text = f"{found.mm:.2f} ± {found.std_mm:.2f} mm" if np.isfinite(found.mm) else "no depth"
+        rows.append(f"<tr><td>{escape(mark.name)}</td><td align='right'>{text}</td></tr>")
+    return _table([f"{escape(chosen.name)} to", "distance"], rows, theme)
+
+
+def _spread(result: ResultArrays, mark: Mark) -> float:
+    assert mark.pixel is not None
+    return float(result.at("depth_std_mm", mark.pixel)) if "depth_std_mm" in result.arrays else 0.0

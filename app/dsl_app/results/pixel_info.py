@@ -1,0 +1,77 @@
+"""The lines under the picture: values of the pixel under the cursor, and why it is limited if it is."""
+
+from __future__ import annotations
+
+import math
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QVBoxLayout
+
+from dsl_app.results.state import ResultsState
+from dsl_app.shared.spectrum import Pixel, number_text
+from dsl_app.shared.widgets.forms import label
+from dsl_core.evaluation.marks import explain_pixel
+from dsl_core.io.result.result_arrays import ResultArrays
+
+HINT = "Point at the picture to read a pixel."
+
+
+def pixel_text(result: ResultArrays, pixel: Pixel, band: int) -> str:
+    """Pixel, position, depth and reflectance in the current band, with deviations."""
+    parts = [f"pixel {pixel[0]}, {pixel[1]}"]
+    if "points_mm" in result.arrays:
+        x, y, z = (float(v) for v in result.at("points_mm", pixel))
+        spread = float(result.at("depth_std_mm", pixel)) if "depth_std_mm" in result.arrays else math.nan
+        x_text, y_text = number_text(x, 1), number_text(y, 1)
+        parts.append(f"x {x_text}  y {y_text}  z {number_text(z, 2)} ± {number_text(spread, 2)} mm")
+    if result.has_spectra:
+        value, std = (
+            float(result.at(name, pixel)[band]) if name in result.arrays else math.nan
+            for name in ("reflectance", "reflectance_std")
+        )
+        nm = result.wavelengths_nm[band]
+        parts.append(f"{nm:g} nm  {number_text(value, 3)} ± {number_text(std, 3)}")
+    return "   ·   ".join(parts)
+
+
+def limits_text(result: ResultArrays, pixel: Pixel) -> str:
+    """Why a pixel is limited, or that it is not."""
+    share = result.at("data_share", pixel) if "data_share" in result.arrays else None
+    spread = float(result.at("depth_std_mm", pixel)) if "depth_std_mm" in result.arrays else None
+    sentences = explain_pixel(int(result.at("flags", pixel)), result.wavelengths_nm, share, spread)
+    return f"Limited: {'; '.join(sentences)}." if sentences else "This pixel has no flags."
+
+
+class PixelInfo(QFrame):
+    """Follows the cursor and band of a state."""
+
+    def __init__(self, state: ResultsState) -> None:
+        super().__init__()
+        self._state = state
+        self.values = label(HINT)
+        self.values.setAccessibleName("Pixel under the cursor")
+        self.reasons = label("", "muted")
+        self.reasons.setAccessibleName("Why this pixel is limited")
+        self.reasons.setWordWrap(True)
+        self.reasons.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.reasons.setMinimumHeight(2 * self.reasons.fontMetrics().lineSpacing() + 2)
+        for each in (self.values, self.reasons):
+            each.setTextFormat(Qt.TextFormat.PlainText)
+            each.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+            each.setSizePolicy(each.sizePolicy().Policy.Ignored, each.sizePolicy().verticalPolicy())
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 2, 0, 0)
+        column.setSpacing(2)
+        column.addWidget(self.values)
+        column.addWidget(self.reasons)
+        state.cursor.follow(lambda _: self._show())
+        state.band.changed.connect(lambda _: self._show())
+
+    def _show(self) -> None:
+        result, pixel = self._state.result.value, self._state.cursor.value
+        if result is None or pixel is None:
+            self.values.setText(HINT)
+            self.reasons.setText("")
+            return
+        self.values.setText(pixel_text(result, pixel, self._state.band.value))
+        self.reasons.setText(limits_text(result, pixel))

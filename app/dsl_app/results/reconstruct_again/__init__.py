@@ -1,0 +1,1 @@
+"""Reconstructing a scan again with other parameters."""

@@ -1,0 +1,1 @@
+"""Looking for a spectrum in the whole picture."""

@@ -1,0 +1,75 @@
+"""Looks for the spectrum of a mark or pixel in the whole picture. No Qt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from dsl_app.results.state import ResultsState, Search, SearchMode
+from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.notify import Notifier
+from dsl_app.shared.spectrum import Spectrum
+from dsl_core.progress import Progress
+
+
+class SearchController:
+    """Sets the search of a `ResultsState`."""
+
+    def __init__(self, state: ResultsState, runner: JobRunner, notifier: Notifier) -> None:
+        self.state, self._runner, self._notifier = state, runner, notifier
+
+    def start(self, mode: SearchMode) -> None:
+        """Search for the spectrum of the selected mark, or of the cursor if no mark is selected."""
+        result, (name, target) = self.state.result.value, self._target()
+        if result is None or target is None or not result.has_spectra:
+            self._notifier.tell(
+                "info", "Select a pin, region or reference, or point at a pixel, to search for its spectrum."
+            )
+            return
+
+        def work(progress: Progress) -> Search:
+            from dsl_core.evaluation.similarity import likeness, spectrum_at
+
+            nm = result.wavelengths_nm
+            return Search(
+                name,
+                likeness(result["reflectance"], spectrum_at(nm, target.nm, target.mean), nm, progress),
+                mode,
+            )
+
+        def done(search: Search) -> None:
+            if self.state.result.value is result:
+                self.state.search.set(search)
+
+        self._runner.submit(
+            Job(
+                f"Search for {name}",
+                work,
+                done,
+                lambda error: self._notifier.tell("error", str(error)),
+                is_minor=True,
+            )
+        )
+
+    def set_limits(self, within_rad: float, within_delta_e: float) -> None:
+        """Change the limits of the search; the picture follows at once."""
+        search = self.state.search.value
+        if search is not None:
+            self.state.search.set(replace(search, within_rad=within_rad, within_delta_e=within_delta_e))
+
+    def set_mode(self, mode: SearchMode) -> None:
+        """Search for something else with the same spectrum."""
+        search = self.state.search.value
+        if search is not None:
+            self.state.search.set(replace(search, mode=mode))
+
+    def clear(self) -> None:
+        """Show the picture without the search."""
+        self.state.search.set(None)
+
+    def _target(self) -> tuple[str, Spectrum | None]:
+        mark, cursor = self.state.selected_mark, self.state.cursor.value
+        if mark is not None:
+            return mark.name, None if mark.trouble else mark.spectrum
+        if cursor is not None:
+            return f"pixel {cursor[0]}, {cursor[1]}", self.state.spectrum_at(cursor)
+        return "", None

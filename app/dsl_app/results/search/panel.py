@@ -1,0 +1,90 @@
+"""Where in the picture a spectrum occurs (spectral angle), or only its colour (metamers)."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QWidget
+
+from dsl_app.results.search.controller import SearchController
+from dsl_app.results.state import ResultsState, Search, SearchMode
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, push_button
+
+HINT = "Select a pin, region or reference, or point at a pixel; then search the whole picture for it."
+
+
+class SearchPanel(QWidget):
+    """Follows the search of a state and asks its controller."""
+
+    def __init__(self, state: ResultsState, control: SearchController) -> None:
+        super().__init__()
+        self._control = control
+        self.mode = ChoiceBox(
+            "Search for", "The same spectrum, or pixels of the same colour under D65 but another spectrum"
+        )
+        for mode in SearchMode:
+            self.mode.addItem(mode.value[0].upper() + mode.value[1:], mode)
+        self.angle = NumberBox("Limit of the spectral angle", 0.001, 1.0, 0.05, "rad", 3)
+        self.angle.setSingleStep(0.005)
+        self.delta_e = NumberBox("Limit of the colour difference CIEDE2000", 0.1, 20.0, 2.0, "", 1)
+        self.delta_e.setSingleStep(0.5)
+        self.start = push_button("Search", "Compare every pixel with the selected spectrum")
+        self.clear = push_button("Clear", "Show the picture without the search")
+        self.text = QLabel(HINT)
+        self.text.setProperty("role", "muted")
+        self.text.setWordWrap(True)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.start)
+        buttons.addWidget(self.clear)
+        buttons.addStretch(1)
+        form = QFormLayout(self)
+        form.setContentsMargins(0, 0, 0, 0)
+        form.addRow("Search for", self.mode)
+        form.addRow("Angle", self.angle)
+        form.addRow("ΔE00 up to", self.delta_e)
+        form.addRow(buttons)
+        form.addRow(self.text)
+        self.start.clicked.connect(lambda: control.start(self._chosen))
+        self.clear.clicked.connect(control.clear)
+        self.mode.currentIndexChanged.connect(lambda _: self._choose())
+        self.angle.valueChanged.connect(lambda _: self._limit())
+        self.delta_e.valueChanged.connect(lambda _: self._limit())
+        state.search.follow(self._show)
+        self._choose()
+
+    @property
+    def _chosen(self) -> SearchMode:
+        return SearchMode(self.mode.currentData())
+
+    def _choose(self) -> None:
+        metamers = self._chosen is SearchMode.METAMERS
+        self.delta_e.setEnabled(metamers)
+        self.angle.setToolTip(f"Finds pixels with a {'larger' if metamers else 'smaller'} angle")
+        self._control.set_mode(self._chosen)
+
+    def _limit(self) -> None:
+        self._control.set_limits(self.angle.value(), self.delta_e.value())
+
+    def _show(self, search: Search | None) -> None:
+        self.clear.setEnabled(search is not None)
+        if search is not None and (search.within_rad, search.within_delta_e) != (
+            self.angle.value(),
+            self.delta_e.value(),
+        ):
+            self._limit()
+            return
+        self.text.setText(search_text(search))
+
+
+def search_text(search: Search | None) -> str:
+    """The share of pixels found, in a sentence."""
+    if search is None:
+        return HINT
+    if search.share is None:
+        return "No pixel of this result has a spectrum."
+    criteria = {
+        SearchMode.SPECTRUM: f"have the spectrum of {search.name} (angle up to {search.within_rad:g} rad)",
+        SearchMode.METAMERS: (
+            f"look like {search.name} (ΔE00 up to {search.within_delta_e:g}) but differ by more than"
+            f" {search.within_rad:g} rad"
+        ),
+    }
+    return f"{search.share:.2%} of the pixels with a spectrum {criteria[search.mode]}."

@@ -1,0 +1,81 @@
+"""What the head of the Results page says of the result that is open, and what can be done with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+from dsl_core.evaluation.rendered_effects import RenderedEffects
+from dsl_core.io.result.result_arrays import ResultArrays
+
+
+class Content(IntEnum):
+    """What the page shows, by its place in the stack."""
+
+    OFFER = 0
+    RESULT = 1
+    WELCOME = 2
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the page shows: texts of its head, and which buttons can be used.
+
+    ``message`` stands in place of a result; ``can_reconstruct`` means that a scan is offered.
+    """
+
+    content: Content
+    title: str = "Results"
+    about: str = ""
+    details: str = ""
+    message: str = ""
+    can_reconstruct: bool = False
+    has_result: bool = False
+
+
+def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Summary:
+    """The summary of a result, of an offered scan, or of what is being opened."""
+    content = Content.WELCOME if result is None else Content.RESULT
+    message = ""
+    if busy:
+        content, message = Content.OFFER, f"{busy} …"
+    elif offer is not None:
+        content, message = Content.OFFER, f"{offer.name} has no result yet. Reconstruct it now?"
+    can_reconstruct = offer is not None and not busy
+    if result is None:
+        return Summary(content, message=message, can_reconstruct=can_reconstruct)
+    height, width = result.shape
+    bands = f" · {len(result.wavelengths_nm)} bands" if result.has_spectra else " · depth only"
+    captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
+    effects, details = effects_text(result.attributes)
+    parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
+    return Summary(
+        content,
+        title=result.path.stem,
+        about=" · ".join(part for part in parts if part),
+        details="\n\n".join(part for part in (str(result.path), details) if part),
+        message=message,
+        can_reconstruct=can_reconstruct,
+        has_result=True,
+    )
+
+
+def effects_text(attributes: Mapping[str, object]) -> tuple[str, str]:
+    """A short and a long text on the rendered effects of a simulated scan; empty where none are noted."""
+    found = RenderedEffects.of_note(str(attributes.get("effects", "")))
+    if found is None:
+        return "", ""
+    on = [effect.name for effect in found.effects if effect.on]
+    off = [effect.name for effect in found.effects if not effect.on]
+    within = f" within {found.tolerance}" if found.choice == "auto" else ""
+    # A list of names does not fit into the line.
+    choice = "chosen" if "," in found.choice else found.choice
+    short = f"effects {choice}{within}: {len(on)} of {len(found.effects)}"
+    long = (
+        f"The simulated rig rendered {', '.join(on)}.\nIt left out {', '.join(off) or 'nothing'}.\n"
+        f"A frame took about {1e3 * found.frame_s:.0f} ms to compute instead of"
+        f" {1e3 * found.frame_with_all_s:.0f} ms with all effects: {100 * found.saved_share:.0f} % less."
+    )
+    return short, long

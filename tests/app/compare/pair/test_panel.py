@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from dsl_app.compare.pair.controller import PairController
+from dsl_app.compare.pair.panel import PairPanel
+from dsl_app.compare.pair.state import NOTHING, PairQuantity, PairState
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.theme import DARK, LIGHT
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from tests.app.support.compare_bench import make_result
+from tests.app.support.doubles import RecordingNotifier
+
+Bench = tuple[PairPanel, PairState, PairController]
+
+
+@pytest.fixture(scope="module")
+def chart(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_result(tmp_path_factory.mktemp("results"), "chart")
+
+
+@pytest.fixture
+def bench(qtbot: QtBot) -> Iterator[Bench]:
+    runner, state = QtRunner(), PairState()
+    control = PairController(state, runner, RecordingNotifier())
+    page = PairPanel(state, control)
+    qtbot.addWidget(page)
+    page.apply_theme(LIGHT)
+    page.resize(1100, 700)
+    page.show()
+    yield page, state, control
+    page.release()
+    runner.shut_down()
+
+
+def with_truth(qtbot: QtBot, bench: Bench, chart: Path) -> None:
+    page, state, control = bench
+    assert control.open(chart)
+    qtbot.waitUntil(lambda: state.first.value is not None and not state.busy.value, timeout=20_000)
+    QTest.mouseClick(page.truth, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: state.pair.value is not None, timeout=20_000)
+
+
+def test_an_empty_page_says_what_to_do(bench: Bench) -> None:
+    page, _, _ = bench
+    assert page.hint.text() == NOTHING
+    assert page.hint.isVisible()
+    assert not page.truth.isEnabled()
+    assert not page.report.isEnabled()
+    assert not page.parts.isEnabled()
+
+
+def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, chart: Path) -> None:
+    page, state, _ = bench
+    with_truth(qtbot, bench, chart)
+    assert not page.hint.isVisible()
+    assert page.report.isEnabled()
+    assert not page.swap.isEnabled()
+    first = page.figures.table.item(0, 0)
+    assert first is not None
+    assert first.text() == "Depth, RMSE per pixel"
+    assert " ± " in page.figures.table.item(0, 1).text()  # type: ignore[union-attr]
+    shapes = [item.image.shape for item in page.pictures.images]
+    assert shapes == [(48, 64)] * 3
+    assert tuple(page.pictures.images[0].levels) == tuple(page.pictures.images[1].levels)
+    qtbot.waitUntil(lambda: len(page.pictures.bars) == 2)
+    assert page.pictures.bars[0].levels() == pytest.approx(page.pictures.images[0].levels, rel=1e-3)
+    low, high = page.pictures.images[2].levels
+    assert low == -high
+    QTest.keyClick(page.pictures, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
+    assert state.cursor.value == (22, 24)
+    assert "column 22, row 24" in page.bar.readout.text()
+    assert all(curve.solid.isVisible() for curve in page.figures.curves)
+    page.apply_theme(DARK)
+
+
+def test_the_slider_steps_through_common_bands(qtbot: QtBot, bench: Bench, chart: Path) -> None:
+    page, state, _ = bench
+    with_truth(qtbot, bench, chart)
+    page.bar.shown.setCurrentIndex(1)
+    page.bar.shown.activated.emit(1)
+    assert state.shown.value is PairQuantity.BAND
+    assert page.bar.band.isVisible()
+    page.bar.band.setFocus()
+    QTest.keyClick(page.bar.band, Qt.Key.Key_Right)
+    assert page.bar.nm.text() == "550 nm"
+    assert page.pictures.images[0].levels[0] == 0.0
+
+
+def test_pictures_stay_where_they_are_while_work_is_told(qtbot: QtBot, bench: Bench, chart: Path) -> None:
+    page, state, _ = bench
+    with_truth(qtbot, bench, chart)
+    QApplication.processEvents()
+    before = page.parts.geometry()
+    state.busy.set("Compare chart")
+    QApplication.processEvents()
+    assert page.hint.isVisible()
+    assert page.parts.geometry() == before
+    state.busy.set("")
+    QApplication.processEvents()
+    assert not page.hint.isVisible()
+    assert page.parts.geometry() == before

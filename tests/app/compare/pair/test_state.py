@@ -1,0 +1,78 @@
+"""What the panel of a pair shows for a state, without a window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.compare.pair.state import (
+    NOTHING,
+    Pair,
+    PairDisplay,
+    PairQuantity,
+    PairState,
+    Side,
+    cursor_text,
+    pair_display,
+)
+
+from dsl_core.evaluation.summary import Truth
+from dsl_core.io.result.result_arrays import ResultArrays
+
+
+def side(name: str, depth_mm: float, reflectance: float, truth: Truth | None = None) -> Side:
+    arrays = {
+        "depth_mm": np.full((2, 3), depth_mm, np.float32),
+        "reflectance": np.full((1, 2, 3), reflectance, np.float32),
+    }
+    return Side(name, ResultArrays(Path(f"{name}.zarr"), np.array([550.0]), arrays), truth)
+
+
+def state_of(sides: str, busy: str = "", trouble: str = "") -> PairState:
+    """A state with the sides ``a``, ``b`` and ``t`` (the ground truth of A)."""
+    state = PairState()
+    if "a" in sides:
+        state.first.set(side("chart", 700.0, 0.5))
+    if "b" in sides:
+        state.second.set(side("box", 702.5, 0.75))
+    if "t" in sides:
+        state.second.set(side("truth", 700.0, 0.5, Truth(depth_mm=np.full((2, 3), 700.0))))
+    first, second = state.first.value, state.second.value
+    if first is not None and second is not None and not trouble:
+        state.pair.set(Pair(first, second, ((0, 0),), ()))
+    state.busy.set(busy)
+    state.trouble.set(trouble)
+    return state
+
+
+@pytest.mark.parametrize(
+    ("state", "display"),
+    [
+        (state_of(""), PairDisplay(("A: –", "B: –"), NOTHING, False, True, False, False, False)),
+        (state_of("a"), PairDisplay(("A: chart", "B: –"), NOTHING, False, True, True, False, False)),
+        (state_of("ab"), PairDisplay(("A: chart", "B: box"), "", False, True, True, True, False)),
+        (state_of("at"), PairDisplay(("A: chart", "B: truth"), "", False, True, True, False, True)),
+        (
+            state_of("at", busy="Compare"),
+            PairDisplay(("A: chart", "B: truth"), "Compare…", False, False, False, False, False),
+        ),
+        (
+            state_of("ab", trouble="They differ."),
+            PairDisplay(("A: chart", "B: box"), "They differ.", True, True, True, False, False),
+        ),
+    ],
+)
+def test_buttons_and_remark_follow_the_state(state: PairState, display: PairDisplay) -> None:
+    assert pair_display(state) == display
+
+
+def test_the_cursor_reads_both_sides_and_their_difference() -> None:
+    state = state_of("ab")
+    assert cursor_text(state) == "Point at a picture to compare values."
+    state.cursor.set((2, 1))
+    assert cursor_text(state) == "column 2, row 1:   A 700.00 mm   B 702.50 mm   A − B −2.50 mm"
+    state.shown.set(PairQuantity.BAND)
+    assert cursor_text(state) == "column 2, row 1:   A 0.500   B 0.750   A − B −0.250"
+    state.band.set(1)
+    assert cursor_text(state) == ""

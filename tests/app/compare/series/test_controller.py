@@ -1,0 +1,142 @@
+"""A series of results, decided without a window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.compare.series.controller import SeriesController
+from dsl_app.compare.series.state import SeriesKind, SeriesState
+from dsl_app.shared.undo import UndoStack
+
+from dsl_core.io.result.result_file import save_result
+from dsl_core.model.result import build_result
+from tests.app.support.doubles import InlineRunner, ManualRunner, RecordingNotifier
+from tests.cases.stage_series import NM, flat_arrays, write_stage, write_sweep
+
+POSITIONS = (700.0, 725.0, 750.0, 775.0)
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("stage")
+    return [write_stage(folder, position, seed=i) for i, position in enumerate(POSITIONS)]
+
+
+@pytest.fixture
+def undo() -> UndoStack:
+    return UndoStack()
+
+
+@pytest.fixture
+def series(undo: UndoStack) -> SeriesController:
+    return SeriesController(SeriesState(), InlineRunner(), RecordingNotifier(), undo)
+
+
+def told(series: SeriesController) -> str:
+    assert isinstance(series._notifier, RecordingNotifier)
+    return series._notifier.told[-1][1]
+
+
+def test_a_folder_of_results_becomes_a_depth_test(series: SeriesController, stage: list[Path]) -> None:
+    series.add([stage[0].parent])
+    state = series.state
+    assert [row.position_mm for row in state.rows.value] == list(POSITIONS)
+    assert state.test.value is not None
+    assert state.test.value.free.scale == pytest.approx(1.0, abs=1e-3)
+    paths = " ".join(f"'{path}'" for path in stage)
+    assert series.command_line() == f"dsl-scan depth-test {paths} --positions 700,725,750,775"
+    series.add(stage)
+    assert "already" in told(series)
+    assert len(state.rows.value) == len(stage)
+
+
+def test_too_few_positions_are_said(series: SeriesController, stage: list[Path]) -> None:
+    series.add(stage[:2])
+    assert series.state.test.value is None
+    assert "there are 2" in series.state.advice.value
+    assert series.command_line() == ""
+    series.write_report(stage[0].parent / "none.html")
+    assert "there are 2" in told(series)
+    series.add([stage[0] / "nothing"])
+    assert "There is no result" in told(series)
+
+
+def test_positions_are_typed_and_rows_removed_and_both_come_back(
+    series: SeriesController, undo: UndoStack, stage: list[Path]
+) -> None:
+    series.add(stage)
+    series.set_position(stage[1], 730.0)
+    assert series.state.test.value is not None
+    assert max(np.abs(series.state.test.value.fixed.deviations_mm)) > 3
+    series.remove(stage[1])
+    assert series.state.test.value.fixed.worst_mm < 0.1
+    undo.undo()
+    assert [row.position_mm for row in series.state.rows.value] == [700.0, 730.0, 750.0, 775.0]
+    undo.undo()
+    assert series.state.rows.value[1].position_mm == 725.0
+    series.remove(stage[0] / "unknown")
+    assert "Select" in told(series)
+
+
+def test_what_cannot_count_is_left_out_with_its_reason(
+    series: SeriesController, stage: list[Path], tmp_path: Path
+) -> None:
+    arrays = flat_arrays(800.0)
+    small = {name: values[..., :30] for name, values in arrays.items()}
+    save_result(build_result(small, NM, {}), tmp_path / "small 800 mm.zarr")
+    arrays["points_mm"] = np.full_like(arrays["points_mm"], np.nan)
+    save_result(build_result(arrays, NM, {}), tmp_path / "blind 810 mm.zarr")
+    save_result(build_result(flat_arrays(820.0), NM, {}), tmp_path / "somewhere.zarr")
+    series.add(stage)
+    series.add([tmp_path])
+    reasons = {row.name: row.trouble(SeriesKind.STAGE) for row in series.state.rows.value}
+    assert "has no depth" in reasons["blind 810 mm"]
+    assert reasons["small 800 mm"] == "It has 30 × 36 pixels, the first result 48 × 36."
+    assert reasons["somewhere"] == "Type the stage position."
+    assert series.state.test.value is not None
+    assert len(series.state.test.value.positions_mm) == len(stage)
+    series.set_position(tmp_path / "somewhere.zarr", 820.0)
+    assert len(series.state.test.value.positions_mm) == len(stage) + 1
+
+
+def test_a_region_is_read_again(series: SeriesController, undo: UndoStack, stage: list[Path]) -> None:
+    series.add(stage)
+    series.set_region((4, 4, 36, 28))
+    target = series.state.rows.value[0].target
+    assert target is not None
+    assert target.plane.pixels <= 36 * 28
+    assert series.command_line().endswith("--region 4,4,36,28")
+    undo.undo()
+    assert series.state.region.value is None
+
+
+def test_accuracy_over_time_against_one_result(series: SeriesController, tmp_path: Path) -> None:
+    reference, *scans = write_sweep(tmp_path)
+    series.ask(SeriesKind.SWEEP)
+    series.add([reference, *scans])
+    assert "does not say with which rig" in series.state.rows.value[0].point_trouble
+    series.compare_with(reference)
+    assert [point.seconds for point in series.state.points] == [10.0, 30.0, 60.0]
+    assert series.state.rows.value[0].point_trouble == "This is the reference."
+    words = " ".join(str(path) for path in scans)
+    assert series.command_line() == f"dsl-scan sweep {words} --against {reference}"
+    series.write_report(tmp_path / "sweep.html")
+    assert "sweep.html" in told(series)
+    assert "quick" in (tmp_path / "sweep.html").read_text(encoding="utf-8")
+
+
+def test_results_that_come_while_one_is_read_wait_and_a_cancel_says_so(stage: list[Path]) -> None:
+    runner = ManualRunner()
+    series = SeriesController(SeriesState(), runner, RecordingNotifier(), UndoStack())
+    series.add(stage[:2])
+    series.add(stage[2:])
+    assert len(runner.waiting) == 1
+    series.set_position(stage[0], 701.0)
+    runner.run_next()
+    assert series.state.rows.value[0].position_mm == 701.0
+    runner.waiting[0].cancel()
+    runner.run_all()
+    assert series.state.busy.value == ""
+    assert [row.trouble(SeriesKind.STAGE)[:8] for row in series.state.rows.value] == ["", *["Not read"] * 3]

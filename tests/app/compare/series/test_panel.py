@@ -1,0 +1,213 @@
+"""The Compare page's two tabs: what is dropped on a series, its table, plot and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.compare.page import ComparePage
+from dsl_app.compare.pair.controller import PairController
+from dsl_app.compare.pair.state import PairState
+from dsl_app.compare.series.controller import SeriesController
+from dsl_app.compare.series.panel import SeriesPanel
+from dsl_app.compare.series.state import NOTHING, SeriesKind, SeriesState
+from dsl_app.shared.jobs.qt_runner import QtRunner
+from dsl_app.shared.theme import DARK, LIGHT
+from dsl_app.shared.undo import UndoStack
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
+from pytestqt.qtbot import QtBot
+
+from tests.app.support.doubles import RecordingNotifier
+from tests.cases.stage_series import write_stage, write_sweep
+
+POSITIONS = (700.0, 725.0, 750.0, 775.0)
+
+
+@dataclass
+class Bench:
+    page: ComparePage
+    state: SeriesState
+    pair: PairState
+    undo: UndoStack
+
+    @property
+    def panel(self) -> SeriesPanel:
+        return self.page.series
+
+    def see(self) -> SeriesPanel:
+        self.page.tabs.setCurrentIndex(1)
+        return self.panel
+
+    def drop(self, *paths: Path) -> None:
+        data = QMimeData()
+        data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+        left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+        enter = QDragEnterEvent(QPoint(300, 300), Qt.DropAction.CopyAction, data, left, none)
+        QApplication.sendEvent(self.page, enter)
+        assert enter.isAccepted()
+        QApplication.sendEvent(
+            self.page, QDropEvent(QPointF(300, 300), Qt.DropAction.CopyAction, data, left, none)
+        )
+
+
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("stage")
+    return [write_stage(folder, position, seed=i) for i, position in enumerate(POSITIONS)]
+
+
+@pytest.fixture
+def bench(qtbot: QtBot) -> Iterator[Bench]:
+    runner, undo, notifier = QtRunner(), UndoStack(), RecordingNotifier()
+    pair, state = PairState(), SeriesState()
+    page = ComparePage(
+        pair,
+        PairController(pair, runner, notifier),
+        state,
+        SeriesController(state, runner, notifier, undo),
+    )
+    qtbot.addWidget(page)
+    page.apply_theme(LIGHT)
+    page.resize(1180, 700)
+    page.show()
+    yield Bench(page, state, pair, undo)
+    page.release()
+    runner.shut_down()
+
+
+def filled(qtbot: QtBot, bench: Bench, stage: list[Path]) -> SeriesPanel:
+    panel = bench.see()
+    bench.drop(*stage)
+    qtbot.waitUntil(lambda: len(bench.state.counted) == len(stage), timeout=30_000)
+    return panel
+
+
+def test_two_results_dropped_together_are_both_opened(qtbot: QtBot, bench: Bench, stage: list[Path]) -> None:
+    bench.drop(*stage[:2])
+    qtbot.waitUntil(lambda: bench.pair.pair.value is not None, timeout=30_000)
+    pair = bench.pair.pair.value
+    assert pair is not None
+    assert (pair.first.name, pair.second.name) == ("stage 700 mm", "stage 725 mm")
+
+
+def test_an_empty_series_says_what_to_do(qtbot: QtBot, bench: Bench) -> None:
+    panel = bench.see()
+    assert panel.hint.text() == NOTHING[SeriesKind.STAGE]
+    qtbot.waitUntil(panel.hint.isVisible)
+    assert not panel.parts.isVisible()
+    assert not panel.report.isEnabled()
+    panel.kind.setCurrentIndex(1)
+    panel.kind.activated.emit(1)
+    assert panel.hint.text() == NOTHING[SeriesKind.SWEEP]
+    assert bench.page.command_line() == ""
+
+
+def test_results_dropped_together_become_a_depth_test(qtbot: QtBot, bench: Bench, stage: list[Path]) -> None:
+    panel = filled(qtbot, bench, stage)
+    assert not panel.hint.isVisible()
+    assert [panel.table.item(i, 1).text() for i in range(4)] == ["700", "725", "750", "775"]  # type: ignore[union-attr]
+    assert panel.figures.item(0, 0).text() == "Straightness, slope free (RMS)"  # type: ignore[union-attr]
+    assert " ± " in panel.figures.item(2, 1).text()  # type: ignore[union-attr]
+    assert "worst" in panel.plot.legend.text()
+    (low, high), _ = panel.plot.plot.getViewBox().viewRange()
+    assert low < POSITIONS[0] < POSITIONS[-1] < high
+    shown = panel.picture.image.image
+    assert shown.shape == (36, 48)
+    assert np.isfinite(shown).any()
+    assert panel.picture.title.text() == "stage 700 mm: off its plane (mm)"
+    panel.table.selectRow(2)
+    assert panel.picture.title.text() == "stage 750 mm: off its plane (mm)"
+    assert bench.page.command_line().startswith("dsl-scan depth-test ")
+    bench.page.apply_theme(DARK)
+
+
+def test_a_position_is_typed_and_a_row_removed_by_keys(qtbot: QtBot, bench: Bench, stage: list[Path]) -> None:
+    panel = filled(qtbot, bench, stage)
+    item = panel.table.item(1, 1)
+    assert item is not None
+    panel.table.setCurrentItem(item)
+    panel.table.editItem(item)
+    (editor,) = panel.table.findChildren(QLineEdit)
+    editor.setText("730,5")
+    QTest.keyClick(editor, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: bench.state.rows.value[1].position_mm == 730.5)
+    panel.table.setFocus()
+    panel.table.selectRow(1)
+    QTest.mouseClick(panel.remove, Qt.MouseButton.LeftButton)
+    assert [row.position_mm for row in bench.state.rows.value] == [700.0, 750.0, 775.0]
+    bench.undo.undo()
+    bench.undo.undo()
+    assert [row.position_mm for row in bench.state.rows.value] == list(POSITIONS)
+    first = panel.table.item(0, 1)
+    assert first is not None
+    first.setText("far")
+    qtbot.waitUntil(lambda: panel.table.item(0, 1).text() == "700")  # type: ignore[union-attr]
+
+
+def test_the_rectangle_on_the_picture_is_all_that_counts(
+    qtbot: QtBot, bench: Bench, stage: list[Path]
+) -> None:
+    panel = filled(qtbot, bench, stage)
+    QTest.mouseClick(panel.picture.part, Qt.MouseButton.LeftButton)
+    assert bench.state.region.value == (14, 11, 20, 14)
+    qtbot.waitUntil(lambda: len(bench.state.counted) == len(stage), timeout=30_000)
+    target = bench.state.rows.value[0].target
+    assert target is not None
+    assert target.plane.pixels <= 20 * 14
+    panel.picture.rectangle.setSize((24, 20))
+    panel.picture.rectangle.sigRegionChangeFinished.emit(panel.picture.rectangle)
+    assert bench.state.region.value == (14, 11, 24, 20)
+    QTest.mouseClick(panel.picture.part, Qt.MouseButton.LeftButton)
+    assert not panel.picture.part.isChecked()
+    qtbot.waitUntil(lambda: not bench.state.busy.value, timeout=30_000)
+
+
+def test_accuracy_over_time_and_its_report(
+    qtbot: QtBot, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panel = bench.see()
+    paths = write_sweep(tmp_path)
+    panel.kind.setCurrentIndex(1)
+    panel.kind.activated.emit(1)
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path))
+    QTest.mouseClick(panel.add, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: not bench.state.busy.value and bool(bench.state.rows.value), timeout=30_000)
+    at = panel.against.findText("reference")
+    panel.against.setCurrentIndex(at)
+    panel.against.activated.emit(at)
+    qtbot.waitUntil(lambda: len(bench.state.points) == len(paths) - 1, timeout=30_000)
+    remarks = {
+        panel.table.item(i, 0).text(): panel.table.item(i, 5).text()  # type: ignore[union-attr]
+        for i in range(panel.table.rowCount())
+    }
+    assert remarks["good"] == "No faster one is better"
+    assert remarks["slow"] == ""
+    assert remarks["reference"] == "This is the reference."
+    assert not panel.figures.isVisible()
+    bench.page._series_control.remove(paths[0])
+    assert panel.against.currentText() == "reference"
+    panel.figure.setCurrentIndex(1)
+    panel.figure.activated.emit(1)
+    assert "Reflectance" in panel.plot.plot.getPlotItem().getAxis("left").labelText
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "s.html"), ""))
+    QTest.mouseClick(panel.report, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: (tmp_path / "s.html").exists(), timeout=30_000)
+
+
+def test_the_action_leads_to_the_series(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def refuse(_parent: object, title: str) -> str:
+        asked.append(title)
+        return ""
+
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", refuse)
+    bench.page.page_actions()["series_add"]()
+    assert bench.page.tabs.currentIndex() == 1
+    assert asked == ["Add a result, or a folder that contains several"]

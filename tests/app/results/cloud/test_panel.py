@@ -1,0 +1,109 @@
+"""The 3D cloud follows the state: limits, cursor, pins and lasso."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.results.cloud import panel as cloud_panel
+from dsl_app.results.state import ResultView, Tool
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+from pytestqt.qtbot import QtBot
+
+from dsl_core.errors import Cancelled
+from tests.app.results.cloud.test_views import cloud_view, place_of
+from tests.app.support.results_bench import Bench, move
+from tests.app.support.results_bench import bench as bench
+from tests.app.support.small_result import write_small_result
+
+
+def test_without_graphics_the_cloud_is_a_picture_with_a_sentence(
+    bench: Bench, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cloud_panel, "prepare_cloud_view", lambda: False)
+    bench.control.show(ResultView.CLOUD)
+    qtbot.waitUntil(lambda: bench.page.cloud.view is not None)
+    view = bench.page.cloud.view
+    assert view is not None
+    labels = view.findChildren(QLabel)
+    qtbot.waitUntil(lambda: any(not label.pixmap().isNull() for label in labels))
+    assert any("cannot be rotated here" in label.text() for label in labels)
+
+
+def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: Bench, qtbot: QtBot) -> None:
+    view = cloud_view(bench, qtbot)
+    assert view.renderer.shown == 24 * 36 - 1
+    view.renderer.turn(3, 0)
+    qtbot.waitUntil(lambda: view.renderer.is_at_rest)
+    before = view.projection()[:, 0].copy()
+    bench.control.limit_depth((705.0, 710.0))
+    qtbot.waitUntil(lambda: view.renderer.shown == 24 * 11)
+    qtbot.waitUntil(lambda: view.renderer.is_at_rest)
+    np.testing.assert_allclose(view.projection()[:2, 0], before[:2])
+    bench.control.limit_depth((1.0, 2.0))
+    qtbot.waitUntil(lambda: view.renderer.shown == 0)
+    bench.control.limit_depth(None)
+    qtbot.waitUntil(lambda: view.renderer.shown == 24 * 36 - 1)
+
+
+def test_the_cloud_and_the_picture_share_one_cursor(bench: Bench, qtbot: QtBot) -> None:
+    view = cloud_view(bench, qtbot)
+    widget = view
+    middle = QPoint(widget.width() // 2, widget.height() // 2)
+    spot = place_of(bench, view, (20, 8))
+    move(widget, spot)
+    qtbot.waitUntil(lambda: bench.state.cursor.value == (20, 8))
+    QTest.mouseClick(widget, Qt.MouseButton.LeftButton, pos=spot)
+    qtbot.waitUntil(lambda: len(bench.marks) == 1)
+    bench.state.tool.set(Tool.LASSO)
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, pos=middle - QPoint(60, 60))
+    for corner in (QPoint(60, -60), QPoint(60, 60), QPoint(-60, 60)):
+        move(widget, middle + corner, Qt.MouseButton.LeftButton)
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, pos=middle + QPoint(-60, 60))
+    qtbot.waitUntil(lambda: len(bench.marks) == 2)
+    assert bench.marks[1].runs
+
+
+def test_a_3d_view_that_was_cancelled_comes_when_it_is_wanted_again(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(tmp_path)
+    qtbot.addWidget(bench.window)
+    bench.window.show()
+    bench.window.open_path(write_small_result(tmp_path))
+    tries: list[None] = []
+
+    def prepare() -> bool:
+        tries.append(None)
+        if len(tries) == 1:
+            raise Cancelled
+        if len(tries) == 2:
+            raise ImportError("no vtk")
+        return False
+
+    monkeypatch.setattr(cloud_panel, "prepare_cloud_view", prepare)
+    panel = bench.page.cloud
+    for words in ("was cancelled", "could not be prepared: no vtk"):
+        bench.control.show(ResultView.CLOUD)
+        qtbot.waitUntil(lambda words=words: words in panel._hint.text())  # type: ignore[misc]
+        bench.control.show(ResultView.COLOUR)
+    bench.control.show(ResultView.CLOUD)
+    qtbot.waitUntil(lambda: panel.view is not None)
+    bench.window.close()
+
+
+def test_a_result_that_is_closed_leaves_no_copy_behind(bench: Bench, qtbot: QtBot) -> None:
+    bench.control.show(ResultView.CLOUD)
+    qtbot.waitUntil(lambda: bench.page.cloud.view is not None)
+    QTest.qWait(50)
+    bench.control.show(ResultView.COLOUR)
+    result = weakref.ref(bench.state.result.value)
+    assert result() is not None
+    bench.state.result.set(None)
+    gc.collect()
+    assert result() is None

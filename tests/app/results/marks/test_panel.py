@@ -1,0 +1,134 @@
+"""The list of marks, the comparison of the selected one, and libraries."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from dsl_app.results.layers import Layers
+from dsl_app.results.marks.comparison import comparison_html
+from dsl_app.results.marks.library_dialog import LibraryDialog
+from dsl_app.results.state import Mark
+from dsl_app.shared.spectrum import Spectrum
+from dsl_app.shared.theme import DARK as DARK_THEME
+from dsl_app.shared.theme import LIGHT
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QFileDialog
+from pytestqt.qtbot import QtBot
+
+from tests.app.support.results_bench import Bench, select
+from tests.app.support.results_bench import bench as bench
+from tests.app.support.small_result import BLUE, write_reference
+from tests.io.spectra.test_reference_file import write_library
+
+
+def test_the_list_names_hides_and_selects(bench: Bench) -> None:
+    bench.control.marks.pin((10, 10))
+    bench.control.marks.pin((20, 10))
+    tree = bench.page.marks.tree
+    first = tree.topLevelItem(0)
+    assert first is not None
+    first.setText(0, "sky")
+    assert bench.marks[0].name == "sky"
+    again = tree.topLevelItem(0)
+    assert again is not None
+    again.setCheckState(0, Qt.CheckState.Unchecked)
+    assert not bench.marks[0].shown
+    assert bench.marks[0].key not in bench.page.spectra._curves
+    now = tree.topLevelItem(0)
+    assert now is not None
+    tree.setCurrentItem(now)
+    assert bench.state.selected.value == bench.marks[0].key
+
+
+def test_a_mark_that_lost_its_spectrum_says_why_and_is_drawn_nowhere(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = Spectrum(np.empty(0), np.empty(0))
+    bench.control.marks.pin((10, 10))
+    bench.state.marks.set(
+        (
+            *bench.marks,
+            Mark("pin", "far", 1, nothing, pixel=(990, 5), trouble="Pixel 990, 5 has no spectrum here."),
+            Mark("region", "leaf", 2, nothing, runs=((990, 0, 5),), trouble="No pixel."),
+            Mark("reference", "tile", 3, nothing, file=Path("tile.csv"), trouble="tile.csv is gone."),
+        )
+    )
+    tree = bench.page.marks.tree
+    rows = [tree.topLevelItem(row) for row in range(4)]
+    assert [row.text(1) for row in rows if row is not None] == ["10, 10", *["no spectrum"] * 3]
+    assert [row.toolTip(0) for row in rows[2:] if row is not None] == ["No pixel.", "tile.csv is gone."]
+    assert list(bench.page.spectra._curves) == [bench.marks[0].key]
+    assert len(bench.page.image.pins.data) == 1
+    panel, result, drawn = bench.page.cloud, bench.state.result.value, Mock()
+    assert result is not None
+    with monkeypatch.context() as patch:
+        patch.setattr(panel, "isVisible", lambda: True)
+        patch.setattr(panel, "_layers", Layers(result))
+        patch.setattr(panel, "view", drawn)
+        panel._show_pins()
+    assert len(drawn.show_pins.call_args.args[0]) == 1
+    assert "distance" not in comparison_html(select(bench, 0), DARK_THEME)
+    assert "Pixel 990, 5" in comparison_html(select(bench, 1), DARK_THEME)
+    bench.page.marks.remove_selected()
+    assert [mark.name for mark in bench.marks] == ["pin 1", "leaf", "tile"]
+
+
+def test_references_are_dropped_and_compared(bench: Bench, qtbot: QtBot, tmp_path: Path) -> None:
+    bench.control.marks.pin((10, 10))
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(write_reference(tmp_path / "tile <b>.csv", 2 * BLUE)))])
+    drop = QDropEvent(
+        QPointF(50, 50),
+        Qt.DropAction.CopyAction,
+        data,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    bench.window.dropEvent(drop)
+    qtbot.waitUntil(lambda: len(bench.marks) == 2)
+    bench.state.selected.set(bench.marks[0].key)
+    text = comparison_html(bench.state, LIGHT)
+    assert "tile &lt;b&gt;" in text
+    assert "2.000" in text
+    assert "ΔE00" in bench.page.marks.figures.text()
+
+
+def test_a_library_that_is_dropped_asks_which_spectrum(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((10, 10))
+    bench.window.open_path(write_library(tmp_path / "plants.sli"))
+    (dialog,) = bench.page.findChildren(LibraryDialog)
+    assert not dialog.add.isEnabled()
+    assert "2 of 2 listed, 0 selected" in dialog.text.text()
+    dialog.filter.setText("BRI")
+    assert [dialog.list.item(i).isHidden() for i in (0, 1)] == [True, False]
+    dialog.list.selectAll()
+    dialog.add.click()
+    assert [mark.name for mark in bench.marks] == ["pin 1", "Brick"]
+    assert not dialog.isVisible()
+    bench.state.selected.set(bench.marks[0].key)
+    assert "Brick" in bench.page.marks.figures.text()
+    bench.window.open_path(tmp_path / "plants.hdr")
+    again = bench.page.findChildren(LibraryDialog)[-1]
+    again.reject()
+    assert bench.state.library.value is None
+    assert len(bench.marks) == 2
+
+
+def test_spectra_go_to_the_clipboard_and_to_a_file(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench.control.marks.pin((10, 10))
+    bench.page.marks.tree.setFocus()
+    QTest.keyClick(bench.page.marks.tree, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    assert QApplication.clipboard().text().startswith("wavelength_nm\tpin 1: reflectance (1)\t")
+    names = iter([str(tmp_path / "a"), "", str(tmp_path / "a.csv")])
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (next(names), ""))
+    for _ in range(3):
+        bench.window.do("export_spectra")
+    assert "Wrote 1 spectrum" in bench.window.toasts.shown[-1].text
+    assert [path.name for path in tmp_path.glob("a*")] == ["a.csv"]

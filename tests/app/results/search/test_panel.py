@@ -1,0 +1,24 @@
+"""The search panel."""
+
+from __future__ import annotations
+
+from dsl_app.results.state import SearchMode
+
+from tests.app.support.results_bench import Bench
+from tests.app.support.results_bench import bench as bench
+
+
+def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
+    bench.control.point_at((30, 5))
+    panel = bench.page.search
+    panel.start.click()
+    assert "50.06% of the pixels with a spectrum" in panel.text.text()
+    assert bench.page.image.overlay.isVisible()
+    panel.mode.setCurrentIndex(panel.mode.findData(SearchMode.METAMERS))
+    assert "look like pixel 30, 5" in panel.text.text()
+    panel.angle.setValue(0.2)
+    search = bench.state.search.value
+    assert search is not None
+    assert search.within_rad == 0.2
+    panel.clear.click()
+    assert not bench.page.image.overlay.isVisible()

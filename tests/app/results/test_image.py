@@ -1,0 +1,106 @@
+"""The picture of a result by mouse and keys, and what each view paints."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from dsl_app.results.layers import Layers, rgb_of
+from dsl_app.results.state import QualityMap, ResultView, Tool
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from pytestqt.qtbot import QtBot
+
+from tests.app.support.results_bench import Bench
+from tests.app.support.results_bench import bench as bench
+
+
+def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -> None:
+    QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at((10, 10)))
+    qtbot.waitUntil(lambda: len(bench.marks) == 1)
+    assert bench.marks[0].pixel == (10, 10)
+    canvas = bench.page.image.canvas
+    canvas.setFocus()
+    QTest.keyClick(canvas, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(canvas, Qt.Key.Key_Up)
+    QTest.keyClick(canvas, Qt.Key.Key_Return)
+    assert bench.marks[1].pixel == (20, 9)
+    assert "mm" in bench.page.marks.figures.text()
+    QTest.keyClick(canvas, Qt.Key.Key_Delete)
+    assert [mark.pixel for mark in bench.marks] == [(10, 10)]
+    bench.window.do("undo")
+    assert len(bench.marks) == 2
+
+
+def test_regions_are_drawn_with_every_tool(bench: Bench, qtbot: QtBot) -> None:
+    bench.page.bar.tools[Tool.RECTANGLE].click()
+    bench.drag([(2, 6), (4, 8), (7, 10)])
+    assert bench.marks[0].used == 30
+    bench.page.bar.tools[Tool.LASSO].click()
+    bench.drag([(20, 5), (30, 5), (30, 15), (20, 15)])
+    assert bench.marks[1].used == pytest.approx(100, abs=25)
+    bench.page.bar.tools[Tool.POLYGON].click()
+    for corner in ((2, 12), (12, 12), (12, 20)):
+        QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
+        QTest.qWait(1)
+    begun = bench.page.image.box.is_drawing
+    QTest.keyClick(bench.page.image.canvas, Qt.Key.Key_Escape)
+    assert (begun, bench.page.image.box.is_drawing) == (True, False)
+    for corner in ((2, 12), (12, 12), (12, 20)):
+        QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
+        QTest.qWait(1)
+    QTest.keyClick(bench.page.image.canvas, Qt.Key.Key_Return)
+    assert bench.marks[2].used == pytest.approx(40, abs=12)
+
+
+def test_an_ellipse_holds_pi_quarters_of_its_box(bench: Bench) -> None:
+    bench.page.bar.tools[Tool.ELLIPSE].click()
+    bench.drag([(19, 3), (25, 9), (33, 17)])
+    (region,) = bench.marks
+    # A box of 15 x 15 pixels.
+    assert region.used == pytest.approx(np.pi / 4 * 225, rel=0.03)
+    outline = np.array(region.outline_px)
+    np.testing.assert_allclose([outline.min(0), outline.max(0)], [(18.5, 2.5), (33.5, 17.5)], atol=0.02)
+
+
+def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
+    result = bench.state.result.value
+    assert result is not None
+    image = bench.page.image
+    for view, quality in itertools.product(ResultView, QualityMap):
+        bench.state.quality.set(quality)
+        bench.state.view.set(view)
+        layer = Layers(result).layer(bench.state)
+        assert layer is not None
+        assert rgb_of(layer).shape == (24, 36, 3)
+        assert image.legend.isVisible() == bool(layer.keys)
+        assert image.image.image.shape[:2] == (24, 36)
+
+
+def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Bench, qtbot: QtBot) -> None:
+    bar, image = bench.page.bar, bench.page.image
+    bench.control.show(ResultView.COLOUR)
+    assert not bar.near.isVisible()
+    bench.control.show(ResultView.DEPTH)
+    assert (bar.automatic.isChecked(), bar.near.isVisible()) == (True, True)
+    automatic = image.bar.levels()
+    np.testing.assert_allclose((bar.near.value(), bar.far.value()), automatic, atol=0.06)
+    bar.near.setValue(705.0)
+    bar.far.setValue(710.0)
+    assert bench.state.depth_limits.value == (705.0, 710.0)
+    assert not bar.automatic.isChecked()
+    assert image.bar.levels() == (705.0, 710.0)
+    # Columns 10 to 20 have depths from 705 to 710 mm.
+    assert np.isfinite(image.image.image).sum(1).tolist() == [11] * 24
+    image.image.render()
+    painted = image.image.qimage
+    alphas = [painted.pixelColor(x, 8).alpha() for x in (9, 10, 20, 21)]
+    assert alphas == [0, 255, 255, 0]
+    bar.far.setValue(700.0)
+    assert bar.far.value() == 710.0
+    bar.automatic.click()
+    assert bar.automatic.isChecked()
+    assert image.bar.levels() == automatic
+    bench.window.do("undo")
+    assert (bar.near.value(), bar.automatic.isChecked()) == (705.0, False)

@@ -1,0 +1,41 @@
+"""The intensity graph of a pixel."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from dsl_app.results.intensity_window import ticks
+
+from dsl_core.workflows.inspection import IntensityGraph
+from tests.app.support.results_bench import Bench
+from tests.app.support.results_bench import bench as bench
+from tests.app.support.small_result import NM
+
+
+def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
+    frames = np.linspace(60.0, 110.0, NM.size)
+    measured = np.zeros((3, 200))
+    measured[:, 150], measured[1, 80] = 100.0, 2.0
+    graph = IntensityGraph((4, 5), measured, measured + 0.1, measured, 150.0, {1: frames}, NM)
+    bench.state.graph.set(graph)
+    window = bench.page.graph
+    assert window.isVisible()
+    assert "4, 5" in window.windowTitle()
+    assert "First order +1 reaches the pixel" in window.text.text()
+    assert [text for _, text in ticks(graph)] == ["450", "500", "550", "600", "650", "zero order"]
+    assert window.item.viewRange()[1][1] < 5
+    window.faint.setChecked(False)
+    assert window.item.viewRange()[1][1] > 100
+    bench.state.graph.set(replace(graph, model=None, orders={}, zero=None))
+    assert "no model" in window.text.text()
+    bench.state.graph.set(None)
+    assert not window.isVisible()
+
+
+def test_without_its_scan_a_graph_is_refused_in_words(bench: Bench) -> None:
+    bench.window.do("intensity_graph")
+    assert "Point at a pixel" in bench.window.toasts.shown[-1].text
+    bench.control.point_at((3, 3))
+    bench.window.do("intensity_graph")
+    assert "not beside it" in bench.window.toasts.shown[-1].text

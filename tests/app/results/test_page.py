@@ -1,0 +1,69 @@
+"""The Results page: what it shows without a result, its keys and themes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dsl_app.results.state import ResultView
+from dsl_app.shared.theme import DARK as DARK_THEME
+from dsl_app.shared.theme import LIGHT
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+from pytestqt.qtbot import QtBot
+
+from tests.app.support.results_bench import Bench
+from tests.app.support.results_bench import bench as bench
+from tests.app.support.small_result import write_small_result
+
+
+def test_without_a_result_a_sentence_says_what_to_do(qtbot: QtBot, tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    qtbot.addWidget(bench.window)
+    bench.window.show()
+    assert "Open a result" in " ".join(label.text() for label in bench.page.welcome.findChildren(QLabel))
+    assert bench.page.welcome.isVisible()
+    assert not bench.page.welcome.files.isVisible()
+    bench.page.welcome.demo.click()
+    assert bench.asked == ["demo"]
+    bench.state.offer.set(tmp_path / "scan.dsl")
+    assert "scan.dsl has no result yet" in bench.page.offer.message.text()
+    assert bench.page.offer.reconstruct.isVisible()
+
+
+def test_recent_files_are_offered_and_vanished_ones_marked(qtbot: QtBot, tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    qtbot.addWidget(bench.window)
+    bench.window.show()
+    for path in (tmp_path / "gone.zarr", write_small_result(tmp_path)):
+        bench.window.parts.recent.add(path)
+    files = bench.page.welcome.files
+    assert "(missing)" in files.item(1).text()
+    files.setFocus()
+    files.setCurrentRow(1)
+    QTest.keyClick(files, Qt.Key.Key_Return)
+    assert "gone.zarr does not exist any more" in bench.window.toasts.shown[-1].text
+    assert files.count() == 1
+    files.setCurrentRow(0)
+    QTest.keyClick(files, Qt.Key.Key_Return)
+    assert bench.state.result.value is not None
+    assert not bench.page.welcome.isVisible()
+
+
+def test_the_keys_1_to_5_choose_the_view(bench: Bench, qtbot: QtBot) -> None:
+    bench.page.image.canvas.setFocus()
+    keys = (Qt.Key.Key_1, Qt.Key.Key_2, Qt.Key.Key_3, Qt.Key.Key_4, Qt.Key.Key_5)
+    for key, view in zip(keys, ResultView, strict=True):
+        QTest.keyClick(bench.window, key)
+        qtbot.waitUntil(lambda view=view: bench.state.view.value is view)  # type: ignore[misc]
+        assert bench.page.bar.views[view].isChecked()
+    assert bench.page.cloud.isVisible()
+    QTest.keyClick(bench.window, Qt.Key.Key_Period)
+    qtbot.waitUntil(lambda: bench.state.band.value == 24)
+
+
+def test_themes_reach_every_panel(bench: Bench) -> None:
+    bench.control.marks.pin((10, 10))
+    for theme in (LIGHT, DARK_THEME):
+        bench.page.apply_theme(theme)
+        assert bench.page.image.canvas.backgroundBrush().color().name() == theme.base

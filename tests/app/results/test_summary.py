@@ -1,0 +1,60 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from dsl_app.results.controller import ResultsController
+from dsl_app.results.page import ResultsPage
+from dsl_app.results.state import ResultsState
+from dsl_app.results.summary import effects_text
+from dsl_app.results.welcome import Welcome
+from dsl_app.shared.settings import RecentFiles, Settings
+from dsl_app.shared.undo import UndoStack
+from dsl_app.shared.widgets.help_window import help_of
+from pytestqt.qtbot import QtBot
+
+from dsl_core.io.result.result_file import load_result, save_result
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
+from tests.app.support.small_result import write_small_result
+
+NOTE = {
+    "choice": "auto",
+    "tolerance": "1 DN",
+    "frame_s": 0.01,
+    "frame_with_all_s": 0.04,
+    "effects": [
+        {"name": "blur", "what": "blur", "on": True, "bound_dn": 30.0, "why": "Edges."},
+        {"name": "specular", "what": "highlights", "on": False, "bound_dn": 0.0, "why": "Nothing is glossy."},
+    ],
+}
+
+
+def test_effects_are_named_with_what_they_saved() -> None:
+    short, long = effects_text({"effects": json.dumps(NOTE)})
+    assert short == "effects auto within 1 DN: 1 of 2"
+    assert "rendered blur" in long
+    assert "left out specular" in long
+    assert "75 % less" in long
+    chosen = {**NOTE, "choice": "blur,halo"}
+    assert effects_text({"effects": json.dumps(chosen)})[0] == "effects chosen: 1 of 2"
+
+
+@pytest.mark.parametrize("attributes", [{}, {"effects": "{"}, {"effects": 3}])
+def test_nothing_is_said_where_nothing_is_known(attributes: dict[str, object]) -> None:
+    assert effects_text(attributes) == ("", "")
+
+
+def test_the_results_page_says_which_effects_a_scan_had(qtbot: QtBot, tmp_path: Path) -> None:
+    plain = load_result(write_small_result(tmp_path)).load()
+    path = save_result(plain.assign_attrs(effects=json.dumps(NOTE)), tmp_path / "rendered.zarr")
+    state, runner = ResultsState(), InlineRunner()
+    control = ResultsController(state, runner, RecordingNotifier(), UndoStack())
+    welcome = Welcome(RecentFiles(Settings()), lambda _: None, lambda: None)
+    page = ResultsPage(state, control, runner, welcome)
+    qtbot.addWidget(page)
+    control.open(path)
+    assert "effects auto within 1 DN: 1 of 2" in page.about.text()
+    assert "left out specular" in page.about.toolTip()
+    assert help_of(page.pixel_info) == "hard-cases"
+    page.release()
