@@ -68,6 +68,16 @@ def set_aside(path: Path) -> str:
     return f" The old file is kept as {aside}."
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it where they do not exist; raises `StoreError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(
+            f"The folder {folder} cannot be made ({error.strerror}). Check its parent folder's permissions."
+        ) from error
+
+
 def remove_partials(folder: Path) -> None:
     """Delete what an interrupted `write_atomic` left in a folder."""
     for leftover in folder.glob("*" + PARTIAL_SUFFIX):

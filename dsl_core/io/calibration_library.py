@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from dsl_core.errors import DslError, StoreError
-from dsl_core.io.atomic import store_error, write_atomic
+from dsl_core.io.atomic import make_folder, write_atomic
 from dsl_core.io.campaign_folder import now, read_record
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.base import Record
@@ -102,10 +102,7 @@ class CalibrationLibrary:
         check_name(name)
         entry = LibraryEntry(name=name, stored=now(), rig=rig, accepted=accepted, history=history)
         folder = self.home / name / "versions"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise store_error(folder, error) from error
+        make_folder(folder)
         write_atomic(folder / f"{entry.stamp}.json", (entry.model_dump_json(indent=1) + "\n").encode())
         self._set_current(name, entry.stamp)
         return entry

@@ -23,8 +23,8 @@ from pydantic import Field, ValidationError
 
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME
-from dsl_core.io.atomic import write_atomic
-from dsl_core.model.base import Record
+from dsl_core.io.atomic import make_folder, write_atomic
+from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 R = TypeVar("R", bound=Record)
@@ -95,7 +95,7 @@ class CampaignFolder:
 
     def save(self) -> None:
         """Write down with what the campaign was begun; raises `StoreError`."""
-        _make(self.path)
+        make_folder(self.path)
         _write(self.path / CAMPAIGN_NAME, self.info)
 
     def with_settings(self, name: str, values: Mapping[str, str]) -> Self:
@@ -125,7 +125,7 @@ class CampaignFolder:
     def propose(self, fitted: AcceptedCalibration) -> None:
         """Keep a fit until it is accepted or discarded."""
         path = self._candidate_path(fitted.name)
-        _make(path.parent)
+        make_folder(path.parent)
         _write(path, fitted)
 
     def accept(self, name: str) -> AcceptedCalibration:
@@ -139,7 +139,7 @@ class CampaignFolder:
         old = self.accepted(name)
         if old is not None:
             folder = self.path / "history" / name
-            _make(folder)
+            make_folder(folder)
             _write(folder / f"{old.accepted.replace(':', '')}.json", old)
         fresh = candidate.model_copy(update={"accepted": now()})
         _write(self.path / f"{name}.json", fresh)
@@ -174,10 +174,8 @@ def read_record(path: Path, kind: type[R]) -> R:
     except OSError as error:
         raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the file"
         raise StoreError(
-            f"{path} is damaged or from another version: {where}: {first['msg']}."
+            f"{path} is damaged or from another version: {problems_in_words(error)}."
             " Restore it from a copy, or delete it and calibrate again."
         ) from error
 
@@ -191,15 +189,6 @@ def _refuse_other_rig(path: Path, info: CampaignInfo, rig: str | None, options: 
         f"The campaign {path} was begun with the rig {known}. Leave out --rig and --option, or begin a new"
         " campaign for another rig."
     )
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(
-            f"The folder {folder} cannot be made ({error.strerror}). Check its parent folder's permissions."
-        ) from error
 
 
 def _write(path: Path, record: Record) -> None:

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from dsl_core.errors import PlanError
 from dsl_core.io.staging import write_record
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.plan import CapturePlan
 
 _MOST_PROBLEMS = 3
@@ -27,11 +28,7 @@ def load_plan(path: Path) -> CapturePlan:
     try:
         return CapturePlan.model_validate_json(text)
     except ValidationError as error:
-        problems = [
-            f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'].removeprefix('Value error, ')}"
-            for item in error.errors()
-        ]
         raise PlanError(
-            f"The plan {path} is not valid: {'; '.join(problems[:_MOST_PROBLEMS])}."
+            f"The plan {path} is not valid: {problems_in_words(error, _MOST_PROBLEMS)}."
             " Correct it, or write a new one with 'dsl-scan plan'."
         ) from error

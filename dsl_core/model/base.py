@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 
 class Record(BaseModel):
     """A frozen, validated record that round-trips through JSON and rejects unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+def problems_in_words(error: ValidationError, most: int = 1) -> str:
+    """The first fields of a record that are wrong, as ``name.of.field: reason``."""
+    problems = [
+        f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'].removeprefix('Value error, ')}"
+        for item in error.errors()[:most]
+    ]
+    return "; ".join(problems)

@@ -2,22 +2,80 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import CalibrationNote
-from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
-from dsl_core.model.flat_field import FlatField
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.spectral import SpectralCurve
 
+Range = tuple[float, float]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
+
+
+class FlatField(Record):
+    """Relative gain of the camera (vignetting), ``gain[row][column]`` at rising rows and columns (px).
+
+    Bilinear between these nodes and constant outside them. The white scale holds where the gain is one.
+    """
+
+    rows_px: tuple[float, ...]
+    columns_px: tuple[float, ...]
+    gain: tuple[tuple[float, ...], ...]
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if not (self.rows_px and self.columns_px):
+            raise ValueError("a flat field needs at least one row and one column")
+        if np.any(np.diff(self.rows_px) <= 0) or np.any(np.diff(self.columns_px) <= 0):
+            raise ValueError(
+                "rows and columns of a flat field must rise strictly; sort them and drop repeats"
+            )
+        shape = (len(self.rows_px), len(self.columns_px))
+        if len(self.gain) != shape[0] or any(len(row) != shape[1] for row in self.gain):
+            raise ValueError(f"a flat field on these nodes needs {shape[0]} rows of {shape[1]} gains")
+        if not all(0 < value < np.inf for row in self.gain for value in row):
+            raise ValueError("every gain of a flat field must be a number above zero")
+        return self
+
+
+class ColumnResidual(Record):
+    """Columns (px) to add to those of the grating equation: one polynomial for each order.
+
+    Terms are products of Chebyshev polynomials whose degrees ``degrees`` names, in camera column, camera row,
+    inverse depth and wavelength, each mapped from its range to -1..1 and held constant outside it. Without
+    terms the correction is zero: the grating equation was found to be enough. Orders not named have none.
+    """
+
+    orders: tuple[int, ...]
+    column_range_px: Range
+    row_range_px: Range
+    depth_range_mm: Range
+    wavelength_range_nm: Range
+    degrees: tuple[tuple[int, int, int, int], ...] = ()
+    coefficients_px: tuple[tuple[float, ...], ...] = Field(default=())
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for low, high in (
+            self.column_range_px,
+            self.row_range_px,
+            self.depth_range_mm,
+            self.wavelength_range_nm,
+        ):
+            if not low < high:
+                raise ValueError(f"a range must rise, given {low:g} to {high:g}")
+        if len(self.coefficients_px) != len(self.orders) or any(
+            len(row) != len(self.degrees) for row in self.coefficients_px
+        ):
+            raise ValueError("a column residual needs one row of coefficients an order, one for each term")
+        return self
 
 
 class Film(Record):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from dsl_core.model.column_residual import ColumnResidual, Range
+from dsl_core.model.rig import ColumnResidual, Range
 
 
 def residual_columns(

@@ -7,8 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.flat_field import FlatField
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import FlatField, Rig
 
 Floats = NDArray[np.float64]
 

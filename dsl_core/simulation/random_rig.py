@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.flat_field import FlatField
 from dsl_core.model.geometry import Lens, Pose
-from dsl_core.model.rig import Film, Rgb, Rig
+from dsl_core.model.rig import Film, FlatField, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -108,17 +108,6 @@ def read_targets(
 # Sweep ---------------------------------------------------------------------------------------------
 
 
-class Reference(Protocol):
-    """What the scans of a sweep are compared with."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-
-    def judge(self, path: Path, progress: Progress) -> SweepPoint:
-        """Seconds and errors of a result; raises `DecodeError` when it does not fit."""
-
-
 class TruthReference:
     """What the twin knows of the scene; all results must show the same one."""
 
@@ -128,7 +117,7 @@ class TruthReference:
         self._known: dict[object, Truth] = {}
 
     def judge(self, path: Path, progress: Progress) -> SweepPoint:
-        """Seconds and errors against the truth."""
+        """Seconds and errors against the truth; raises `DecodeError` for another scene."""
         from dsl_core.evaluation.summary import evaluate
         from dsl_core.evaluation.time_sweep import point_against_truth
         from dsl_core.io.result.result_file import load_result
@@ -162,7 +151,7 @@ class ResultReference:
         self._arrays = load_arrays(path, progress)
 
     def judge(self, path: Path, progress: Progress) -> SweepPoint:
-        """Seconds and differences from the reference."""
+        """Seconds and differences from the reference; raises `DecodeError` for the reference itself."""
         from dsl_core.evaluation.difference import compare_results, shared_bands
         from dsl_core.evaluation.time_sweep import point_against_result
         from dsl_core.io.result.result_arrays import load_arrays
@@ -179,12 +168,12 @@ class ResultReference:
 
 def read_sweep(
     paths: Sequence[Path], against: Path | None = None, progress: Progress | None = None
-) -> tuple[list[SweepPoint], Reference]:
+) -> tuple[list[SweepPoint], TruthReference | ResultReference]:
     """Points of results of one scene against its truth, or against one result."""
     from dsl_core.evaluation.time_sweep import require_sweep
 
     progress = progress or NoProgress()
-    reference: Reference = TruthReference() if against is None else ResultReference(against, progress)
+    reference = TruthReference() if against is None else ResultReference(against, progress)
     points = []
     for i, path in enumerate(paths):
         progress.report("compare results", i, len(paths))

@@ -14,8 +14,7 @@ import torch
 
 from dsl_core.calibration.film.correspondence import PUBLISHED_NM, fit_grid, sample_grating
 from dsl_core.calibration.film.residual import MAX_DEGREE, WAVELENGTH_RANGE_NM
-from dsl_core.model.column_residual import ColumnResidual
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ColumnResidual, Rig
 from dsl_core.optics.correspondence import Correspondence, GratingModel, GridModel, HybridModel
 from dsl_core.simulation.published_rig import published_rig
 

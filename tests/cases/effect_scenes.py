@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.flat_field import FlatField
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import FlatField, Rig
 from dsl_core.simulation.effects.base import LightPath, Limits, PatternView, make_view
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendered_scene import EffectRequest, Setup

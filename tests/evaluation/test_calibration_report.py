@@ -12,11 +12,9 @@ from dsl_core.evaluation.cost import StageCost
 from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
 from dsl_core.evaluation.report.curves import HEIGHT
 from dsl_core.model.calibration.accepted import AcceptedCalibration
-from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.conditions import CameraConditions, CaptureConditions, ProjectorConditions
 from dsl_core.model.figure import Figure
-from dsl_core.model.flat_field import FlatField
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ColumnResidual, FlatField, Rig
 from tests.cases.small_rig import small_rig
 
 GOOD = Figure(name="gamma", value=2.21, std=0.004, unit="1", low=1.8, high=2.6)

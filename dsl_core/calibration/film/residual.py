@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.film.fit import FLOOR_PX, HUBER_SIGMAS, OrderSamples, fit_film, grating_columns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.depth_stage import HeldOutError
-from dsl_core.model.column_residual import ColumnResidual
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ColumnResidual, Rig
 from dsl_core.optics.column_residual import chebyshev, residual_columns, scaled
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.robust import huber_weights

@@ -19,8 +19,7 @@ from dsl_core.model.calibration.spectralon import (
     Square3,
     WhiteSignals,
 )
-from dsl_core.model.flat_field import FlatField
-from dsl_core.model.rig import Rgb, Rig, Sensor
+from dsl_core.model.rig import FlatField, Rgb, Rig, Sensor
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.flat_field import gain_at_pixels
 from dsl_core.optics.sensor import bayer_channels

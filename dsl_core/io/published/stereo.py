@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.staging import staged
-from dsl_core.model.base import Record
+from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.geometry import Lens, Pose
 
@@ -84,9 +84,8 @@ def load_stereo(path: Path, projector_size_px: Size, camera_size_px: Size | None
             dialect=dialect,
         )
     except ValidationError as error:
-        first = error.errors()[0]
         raise CalibrationError(
-            f"{path} is not a valid calibration: {'.'.join(map(str, first['loc']))}: {first['msg']}."
+            f"{path} is not a valid calibration: {problems_in_words(error)}."
             " Calibrate again or correct the file."
         ) from error
 

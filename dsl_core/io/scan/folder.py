@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import remove_partials
+from dsl_core.io.atomic import make_folder, remove_partials
 from dsl_core.io.scan.capture_log import CaptureLog, LogEntry, read_log
 from dsl_core.io.scan.estimate import check_space
 from dsl_core.io.scan.frame_store import ChunkError, FrameStore, checksum
@@ -206,7 +206,8 @@ class ScanWriter:
         if folder.exists() and not _is_unborn(folder):
             raise StoreError(f"{folder} exists and is not a session. Choose a new name.")
         check_space(folder, plan, plan.shot_count)
-        lock = _make_folder(folder)
+        make_folder(folder)
+        lock = FolderLock(folder / "lock")
         try:
             manifest = describe_scan(plan, rig, notes)
             store_of(folder, plan).create()
@@ -294,13 +295,3 @@ def _is_unborn(folder: Path) -> bool:
     return folder.is_dir() and all(
         path.name in {"lock", FRAMES_NAME} or path.name.startswith(MANIFEST_NAME) for path in folder.iterdir()
     )
-
-
-def _make_folder(folder: Path) -> FolderLock:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return FolderLock(folder / "lock")
-    except OSError as error:
-        raise StoreError(
-            f"The folder {folder} cannot be made ({error.strerror}). Check its parent folder's permissions."
-        ) from error

@@ -16,7 +16,7 @@ from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import write_atomic
-from dsl_core.model.base import Record
+from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -69,10 +69,8 @@ def read_manifest(folder: Path) -> Manifest:
     except OSError as error:
         raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the file"
         raise StoreError(
-            f"{path} is damaged or from another version: {where}: {first['msg']}. Restore it from a copy."
+            f"{path} is damaged or from another version: {problems_in_words(error)}. Restore it from a copy."
         ) from error
 
 

@@ -6,9 +6,8 @@ from typing import Literal
 
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
-from dsl_core.model.column_residual import ColumnResidual
 from dsl_core.model.geometry import Lens, Pose
-from dsl_core.model.rig import CorrespondenceGrid, Film, Rig
+from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Film, Rig
 
 
 class StagePosition(Record):

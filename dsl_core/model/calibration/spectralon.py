@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from dsl_core.model.base import Record
-from dsl_core.model.flat_field import FlatField
-from dsl_core.model.rig import Rgb
+from dsl_core.model.rig import FlatField, Rgb
 from dsl_core.model.spectral import SpectralCurve
 
 Row3 = tuple[float, float, float]

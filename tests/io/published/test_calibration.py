@@ -16,9 +16,7 @@ from dsl_core.io.published import (
     load_tables,
     save_tables,
 )
-from dsl_core.model.column_residual import ColumnResidual
-from dsl_core.model.flat_field import FlatField
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ColumnResidual, FlatField, Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from tests.cases.small_rig import small_rig
 

@@ -20,7 +20,7 @@ from dsl_core.evaluation.time_sweep import SweepFigure, require_sweep
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
-    from dsl_core.workflows.series import Reference
+    from dsl_core.workflows.series import ResultReference, TruthReference
 
 
 class SeriesController:
@@ -28,7 +28,7 @@ class SeriesController:
 
     def __init__(self, state: SeriesState, runner: JobRunner, notifier: Notifier, undo: UndoStack) -> None:
         self.state, self._runner, self._notifier, self._undo = state, runner, notifier, undo
-        self._reference: Reference | None = None
+        self._reference: TruthReference | ResultReference | None = None
 
     # Rows ------------------------------------------------------------------------------------------
 

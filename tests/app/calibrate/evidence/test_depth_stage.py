@@ -20,8 +20,7 @@ from dsl_core.model.calibration.depth_stage import (
     HeldOutError,
     StagePosition,
 )
-from dsl_core.model.column_residual import ColumnResidual
-from dsl_core.model.rig import CorrespondenceGrid
+from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid
 from dsl_core.optics.pinhole import project, rays_at
 from dsl_core.simulation.published_rig import published_rig
 from tests.app.calibrate.evidence_bench import THEMES, bars, items, points, shown

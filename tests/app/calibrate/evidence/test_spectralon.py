@@ -15,7 +15,7 @@ from dsl_core.model.calibration.spectralon import (
     SpectralonCalibration,
     WhiteSignals,
 )
-from dsl_core.model.flat_field import FlatField
+from dsl_core.model.rig import FlatField
 from dsl_core.model.spectral import SpectralCurve
 from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, shown
 
