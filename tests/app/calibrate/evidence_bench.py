@@ -9,6 +9,7 @@ import numpy as np
 import pyqtgraph as pg
 from dsl_app.calibrate.evidence.base import Evidence, make_evidence
 from dsl_app.calibrate.evidence.charts import ChartBox
+from dsl_app.calibrate.wizard.state import Fit
 from dsl_app.shared.theme import DARK, LIGHT, Theme
 from pytestqt.qtbot import QtBot
 
@@ -35,12 +36,12 @@ def shown(
     theme: Theme = LIGHT,
 ) -> Any:
     """The evidence of a recipe with a record in it, on screen, drawn on all of its tabs."""
-    widget: Evidence = make_evidence(name)
+    widget: Evidence[Any] = make_evidence(name)
     qtbot.addWidget(widget)
     widget.resize(700, 500)
     widget.apply_theme(theme)
     fitted = AcceptedCalibration(name=name, title=name.capitalize(), record=record.model_dump(mode="json"))
-    widget.show_fit(fitted, record, session_of({}) if session is None else session)
+    widget.show_fit(Fit(fitted, record, session_of({}) if session is None else session))
     widget.show()
     for box in widget.findChildren(ChartBox):
         assert box.plot is not None

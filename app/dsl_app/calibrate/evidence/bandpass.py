@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from PySide6.QtWidgets import QVBoxLayout
 
@@ -22,11 +20,6 @@ from dsl_core.calibration.orders.efficiency import STANDS_OUT
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
 from dsl_core.model.spectral import SpectralCurve
 
-if TYPE_CHECKING:
-    from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
-
 HEADS = (
     ("Requested, nm", "Nominal centre of the requested filter"),
     ("Passes, nm", "Effective wavelength of what its curve passes"),
@@ -38,12 +31,11 @@ HEADS = (
 )
 
 
-class BandpassEvidence(Evidence):
+class BandpassEvidence(Evidence[BandpassCalibration]):
     """A table of filters above the efficiency of first orders, the bound of second ones, and the response."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self._record: BandpassCalibration | None = None
+        super().__init__(BandpassCalibration)
         self.table = NumberTable("Filters", HEADS, words=(4, 5, 6))
         self.efficiency = ChartBox(
             "Efficiency of first orders",
@@ -71,16 +63,7 @@ class BandpassEvidence(Evidence):
         column.addWidget(stacked(self.table, charts, (180, 260)), 1)
         column.addWidget(self.seconds)
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit."""
-        assert isinstance(record, BandpassCalibration)
-        self._record = record
-        self._draw()
-
-    def _draw(self) -> None:
-        record = self._record
-        if record is None:
-            return
+    def _draw_record(self, record: BandpassCalibration) -> None:
         self.table.fill([_row(each, record.warnings) for each in record.filters])
         self.warnings.setText("\n".join(f"{_sentence(each)}." for each in record.warnings))
         self.warnings.setVisible(bool(record.warnings))

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
 from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_core.model.base import Record
 
 if TYPE_CHECKING:
+    from dsl_app.calibrate.wizard.state import Fit
     from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
+
+R = TypeVar("R", bound=Record)
 
 
 class Themed(Protocol):
@@ -26,8 +28,8 @@ class Themed(Protocol):
         """Take the colours of a theme."""
 
 
-class Evidence(QWidget):
-    """Shows the record of a fit.
+class Evidence(QWidget, Generic[R]):
+    """Shows the record of a fit, which is of one type.
 
     ``settings_requested`` holds settings of the recipe, as texts, that the person changed on the evidence,
     such as ``{"left_out": "pose-03"}``: a fit with them replaces the one that is shown.
@@ -35,15 +37,22 @@ class Evidence(QWidget):
 
     settings_requested = Signal(dict)
 
-    def __init__(self) -> None:
+    def __init__(self, record_type: type[R]) -> None:
         super().__init__()
-        self._theme = DARK
+        self._theme, self._record_type = DARK, record_type
+        self._record: R | None = None
         #: Parts that take the colours of a theme with the widget.
         self._parts: Sequence[Themed] = ()
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit that waits to be accepted; quick enough for the thread of the window."""
-        raise NotImplementedError
+    def show_fit(self, fit: Fit) -> None:
+        """Show a fit; quick enough for the thread of the window."""
+        assert isinstance(fit.record, self._record_type)
+        self._record = fit.record
+        self._begin(fit.record, fit.session)
+        self._draw()
+
+    def _begin(self, record: R, session: CalibrationSession) -> None:
+        """Get ready for another fit; what is slow to read is read in the background."""
 
     def show_captures(self, session: CalibrationSession) -> bool:
         """Show captures that gave no fit, where a person can help by looking; False where not."""
@@ -57,24 +66,28 @@ class Evidence(QWidget):
         self._draw()
 
     def _draw(self) -> None:
-        """Draw the fit in the colours of the theme; nothing before there is one."""
+        if self._record is not None:
+            self._draw_record(self._record)
+
+    def _draw_record(self, record: R) -> None:
+        """Draw a fit in the colours of the theme."""
 
 
-class PlainEvidence(Evidence):
+class PlainEvidence(Evidence[Record]):
     """For a calibration without a widget of its own: its figures say all that is known."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(Record)
         self.words = label("", "muted")
         self.words.setWordWrap(True)
         column = QVBoxLayout(self)
         column.addWidget(self.words)
         column.addStretch(1)
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
+    def show_fit(self, fit: Fit) -> None:
         """Say that the figures are all there is."""
         self.words.setText(
-            f"{fitted.title} has nothing to draw. Its figures, with their limits, say how good it is."
+            f"{fit.fitted.title} has nothing to draw. Its figures, with their limits, say how good it is."
         )
 
 
@@ -89,7 +102,7 @@ _WIDGETS = {
 }
 
 
-def make_evidence(name: str) -> Evidence:
+def make_evidence(name: str) -> Evidence[Any]:
     """The widget for a recipe's name; `PlainEvidence` if it has none of its own."""
     if name not in _WIDGETS:
         return PlainEvidence()

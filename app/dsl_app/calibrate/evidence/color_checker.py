@@ -36,8 +36,6 @@ from dsl_core.model.rig import Rgb
 if TYPE_CHECKING:
     from dsl_core.campaign.color_checker.recipe import ChartView
     from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 #: What a person does where no chart was found.
 HELP = (
@@ -57,12 +55,11 @@ HEADS = (
 )
 
 
-class ColorCheckerEvidence(Evidence):
+class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
     """Three tabs; moved corners become settings of the next fit."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self._record: ColorCheckerCalibration | None = None
+        super().__init__(ColorCheckerCalibration)
         self._before: tuple[Rgb, Rgb] | None = None
         self._view: ChartView | None = None
         self._by_hand: tuple[tuple[float, float], ...] | None = None
@@ -135,15 +132,12 @@ class ColorCheckerEvidence(Evidence):
         tab.setContentsMargins(0, 8, 0, 0)
         return tab
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit; the picture of the chart is read in the background."""
-        assert isinstance(record, ColorCheckerCalibration)
+    def _begin(self, record: ColorCheckerCalibration, session: CalibrationSession) -> None:
         bench, step = session.bench, session.steps[0]
-        self._record, self._view = record, None
+        self._view = None
         self._before = (bench.rig.response, bench.rig.emission)
         self._say("Reading the picture…")
         self._put_back()
-        self._draw()
 
         def read() -> ChartView:
             from dsl_core.campaign.color_checker.recipe import chart_view
@@ -221,14 +215,13 @@ class ColorCheckerEvidence(Evidence):
 
     # Charts ----------------------------------------------------------------------------------------
 
-    def _draw(self) -> None:
-        if self._record is None or self._before is None:
-            return
+    def _draw_record(self, record: ColorCheckerCalibration) -> None:
+        assert self._before is not None
         self._draw_patches()
-        self.residuals.draw(partial(self._draw_residuals, self._record))
+        self.residuals.draw(partial(self._draw_residuals, record))
         for box, after, before in (
-            (self.response, self._record.response, self._before[0]),
-            (self.emission, self._record.emission, self._before[1]),
+            (self.response, record.response, self._before[0]),
+            (self.emission, record.emission, self._before[1]),
         ):
             box.draw(partial(self._draw_pair, box, after, before))
 

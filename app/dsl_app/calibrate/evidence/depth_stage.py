@@ -36,8 +36,6 @@ from dsl_core.model.rig import Film
 if TYPE_CHECKING:
     from dsl_core.calibration.film.depth_stage import StageCurve
     from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 FILM = (
     ("Lines", "lines_per_mm", "1/mm", 2),
@@ -58,12 +56,11 @@ FILM_HEADS = (
 )
 
 
-class DepthStageEvidence(Evidence):
+class DepthStageEvidence(Evidence[DepthStageCalibration]):
     """Three tabs: planes and film, first orders, columns over depth."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self._record: DepthStageCalibration | None = None
+        super().__init__(DepthStageCalibration)
         self._before = Film()
         self._curves: tuple[StageCurve, ...] | Exception | None = None
         self.planes = ChartBox(
@@ -123,12 +120,9 @@ class DepthStageEvidence(Evidence):
         column.addWidget(self.warnings)
         column.addWidget(self.tabs, 1)
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit; columns over depth are computed in the background."""
-        assert isinstance(record, DepthStageCalibration)
+    def _begin(self, record: DepthStageCalibration, session: CalibrationSession) -> None:
         rig = session.bench.rig
-        self._record, self._before, self._curves = record, rig.film, None
-        self._draw()
+        self._before, self._curves = rig.film, None
 
         def read() -> tuple[StageCurve, ...]:
             from dsl_core.calibration.film.depth_stage import stage_curves
@@ -141,10 +135,7 @@ class DepthStageEvidence(Evidence):
         self._curves = curves
         self._draw_later()
 
-    def _draw(self) -> None:
-        record = self._record
-        if record is None:
-            return
+    def _draw_record(self, record: DepthStageCalibration) -> None:
         self.warnings.setText(" ".join(f"{warning}." for warning in record.warnings))
         self.warnings.setVisible(bool(record.warnings))
         self.planes.draw(lambda: self._draw_planes(record))

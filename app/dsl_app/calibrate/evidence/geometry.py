@@ -27,8 +27,6 @@ from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
 
 if TYPE_CHECKING:
     from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 HEADS = (
     ("Pose", "Untick a pose to solve again without it"),
@@ -43,12 +41,11 @@ HEADS = (
 )
 
 
-class GeometryEvidence(Evidence):
+class GeometryEvidence(Evidence[GeometryCalibration]):
     """Coverage and errors above a table of poses; unticked poses are left out when it is solved again."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self._record: GeometryCalibration | None = None
+        super().__init__(GeometryCalibration)
         self._keys: dict[str, str] = {}
         self._unticked: frozenset[str] = frozenset()
         self.coverage = ChartBox(
@@ -89,14 +86,10 @@ class GeometryEvidence(Evidence):
         column.addWidget(stacked(charts, self.table, (260, 200)), 1)
         column.addLayout(foot)
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit."""
-        assert isinstance(record, GeometryCalibration)
-        self._record = record
+    def _begin(self, record: GeometryCalibration, session: CalibrationSession) -> None:
         self._keys = {step.title: step.key for step in session.steps}
         self._unticked = frozenset(each.name for each in record.left_out if each.by_hand)
-        self._fill()
-        self._draw()
+        self._fill(record)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
@@ -107,9 +100,7 @@ class GeometryEvidence(Evidence):
 
     # Poses to leave out ----------------------------------------------------------------------------
 
-    def _fill(self) -> None:
-        record = self._record
-        assert record is not None
+    def _fill(self, record: GeometryCalibration) -> None:
         rows = {pose.name: _row(pose) for pose in record.poses}
         rows |= {each.name: [each.name, *[""] * 7, Cell(each.reason, "warn")] for each in record.left_out}
         order = [*(name for name in self._keys if name in rows), *(n for n in rows if n not in self._keys)]
@@ -159,11 +150,9 @@ class GeometryEvidence(Evidence):
 
     # Charts ----------------------------------------------------------------------------------------
 
-    def _draw(self) -> None:
-        record = self._record
-        if record is not None:
-            self.coverage.draw(self._draw_coverage)
-            self.errors.draw(lambda: self._draw_errors(record))
+    def _draw_record(self, record: GeometryCalibration) -> None:
+        self.coverage.draw(self._draw_coverage)
+        self.errors.draw(lambda: self._draw_errors(record))
 
     def _draw_coverage(self) -> None:
         record = self._record

@@ -29,20 +29,17 @@ from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
 if TYPE_CHECKING:
     from dsl_core.calibration.selftest.record import SelfTestCurves
     from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 #: Drive level below which the light is mostly noise.
 DIM = 0.15
 READING = "Reading the means of the frames…"
 
 
-class SelfTestEvidence(Evidence):
+class SelfTestEvidence(Evidence[SelfTest]):
     """Four plots; what the record does not hold is read from the captures in another thread."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self._record: SelfTest | None = None
+        super().__init__(SelfTest)
         self._curves: SelfTestCurves | Exception | None = None
         self.linearity = ChartBox(
             "Linearity of the camera",
@@ -80,11 +77,8 @@ class SelfTestEvidence(Evidence):
             grid.setRowStretch(index // 2, 1)
             grid.setColumnStretch(index % 2, 1)
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit; its captures are read in the background."""
-        assert isinstance(record, SelfTest)
-        self._record, self._curves = record, None
-        self._draw()
+    def _begin(self, record: SelfTest, session: CalibrationSession) -> None:
+        self._curves = None
         folder = session.bench.step_folder(session.steps[0])
 
         def read() -> SelfTestCurves:
@@ -99,10 +93,8 @@ class SelfTestEvidence(Evidence):
         self._curves = curves
         self._draw()
 
-    def _draw(self) -> None:
-        record, curves = self._record, self._curves
-        if record is None:
-            return
+    def _draw_record(self, record: SelfTest) -> None:
+        curves = self._curves
         self.beat.draw(lambda: self._draw_beat(record.cycle))
         if curves is None or isinstance(curves, Exception):
             words = READING if curves is None else str(curves)

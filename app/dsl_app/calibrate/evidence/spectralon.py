@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
@@ -20,11 +20,6 @@ from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 
-if TYPE_CHECKING:
-    from dsl_core.campaign.session import CalibrationSession
-    from dsl_core.model.base import Record
-    from dsl_core.model.calibration.accepted import AcceptedCalibration
-
 HEADS = (
     ("Channel", "Channel of the camera"),
     *(
@@ -38,12 +33,11 @@ HEADS = (
 )
 
 
-class SpectralonEvidence(Evidence):
+class SpectralonEvidence(Evidence[SpectralonCalibration]):
     """Emission with its bands next to the flat field, the signals of white below."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self._record: SpectralonCalibration | None = None
+        super().__init__(SpectralonCalibration)
         self.emission = ChartBox(
             "Emission of the LEDs",
             "Relative spectral radiance of each LED at full drive with its 95 % band.",
@@ -84,23 +78,14 @@ class SpectralonEvidence(Evidence):
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(stacked(charts, below, (330, 170)))
 
-    def show_fit(self, fitted: AcceptedCalibration, record: Record, session: CalibrationSession) -> None:
-        """Show a fit."""
-        assert isinstance(record, SpectralonCalibration)
-        self._record = record
-        self._draw()
-
     def _theme_bar(self) -> None:
         for side in ("left", "right") if self.bar is not None else ():
             axis = self.bar.getAxis(side)
             axis.setTextPen(self._theme.muted)
             axis.setPen(self._theme.line)
 
-    def _draw(self) -> None:
+    def _draw_record(self, record: SpectralonCalibration) -> None:
         self._theme_bar()
-        record = self._record
-        if record is None:
-            return
         self.emission.draw(lambda: self._draw_emission(record))
         self.field.draw(lambda: self._draw_field(record))
         self.table.fill(_rows(record))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
@@ -24,7 +26,7 @@ class FitPage(QWidget):
     def __init__(self, state: WizardState) -> None:
         super().__init__()
         self._state, self._theme = state, DARK
-        self._evidence: Evidence | None = None
+        self._evidence: Evidence[Any] | None = None
         self._due: Fit | None = None
         self.verdict = label("", "heading")
         self.verdict.setWordWrap(True)
@@ -95,11 +97,11 @@ class FitPage(QWidget):
         fit, self._due = self._due, None
         if fit is not None:
             made = self._evidence or self._make_evidence()
-            made.show_fit(fit.fitted, fit.record, fit.session)
+            made.show_fit(fit)
             made.setVisible(True)
 
     @property
-    def evidence(self) -> Evidence | None:
+    def evidence(self) -> Evidence[Any] | None:
         """What the fit rests on; None while there is nothing to show."""
         self._show_due()
         return self._evidence
@@ -111,7 +113,7 @@ class FitPage(QWidget):
         made = self._evidence or self._make_evidence()
         made.setVisible(made.show_captures(session))
 
-    def _make_evidence(self) -> Evidence:
+    def _make_evidence(self) -> Evidence[Any]:
         self._evidence = made = make_evidence(self._state.name)
         made.apply_theme(self._theme)
         made.settings_requested.connect(self.settings_requested)

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 from dsl_app.calibrate.evidence.base import BackgroundReader, PlainEvidence, make_evidence
+from dsl_app.calibrate.wizard.state import Fit
 from PySide6.QtWidgets import QLabel, QPushButton, QTableWidget, QTabWidget, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -52,7 +53,7 @@ def test_everything_has_a_name_and_a_tip(qtbot: QtBot, name: str) -> None:
 def test_a_calibration_without_evidence_says_so(qtbot: QtBot) -> None:
     widget = make_evidence("of another package")
     qtbot.addWidget(widget)
-    widget.show_fit(AcceptedCalibration(name="other", title="Other"), Record(), session_of({}))
+    widget.show_fit(Fit(AcceptedCalibration(name="other", title="Other"), Record(), session_of({})))
     assert "Other has nothing to draw" in widget.findChildren(QLabel)[0].text()
 
 

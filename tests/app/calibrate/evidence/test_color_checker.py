@@ -12,6 +12,7 @@ import pytest
 from dsl_app.calibrate.evidence.base import make_evidence
 from dsl_app.calibrate.evidence.chart_picture import patch_outlines, screen_colours
 from dsl_app.calibrate.evidence.color_checker import ColorCheckerEvidence
+from dsl_app.calibrate.wizard.state import Fit
 from dsl_app.shared.theme import Theme
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent
@@ -209,9 +210,8 @@ def test_corners_are_set_by_hand_where_no_chart_was_found(qtbot: QtBot, session:
     assert widget.show_captures(unfitted(session, wanted))
     qtbot.waitUntil(lambda: not widget._reader.is_busy, timeout=20_000)
     assert np.allclose(widget.chart.corners_px, corners + np.eye(4, 2) * (1, 0), atol=0.01)
-    widget.show_fit(
-        AcceptedCalibration(name="color-checker", title=""), calibration(session.bench.rig), session
-    )
+    fitted = AcceptedCalibration(name="color-checker", title="")
+    widget.show_fit(Fit(fitted, calibration(session.bench.rig), session))
     assert np.allclose(widget.chart.corners_px, CORNERS)
     qtbot.waitUntil(lambda: not widget._reader.is_busy, timeout=20_000)
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from dsl_app.calibrate.evidence import selftest as selftest_evidence
 from dsl_app.calibrate.evidence.base import make_evidence
+from dsl_app.calibrate.wizard.state import Fit
 from dsl_app.shared.theme import Theme
 from PySide6.QtCore import QThreadPool
 from pytestqt.qtbot import QtBot
@@ -90,7 +91,7 @@ def test_a_widget_closed_while_it_reads_does_no_harm(
     qtbot: QtBot, session: CalibrationSession, record: SelfTest
 ) -> None:
     widget = make_evidence("selftest")
-    widget.show_fit(AcceptedCalibration(name="selftest", title="Self-test"), record, session)
+    widget.show_fit(Fit(AcceptedCalibration(name="selftest", title="Self-test"), record, session))
     widget.deleteLater()
     qtbot.wait(200)
     assert QThreadPool.globalInstance().waitForDone(10_000)

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dsl_app.calibrate.wizard.state import Fit
 from dsl_app.shared.theme import Theme
 from pytestqt.qtbot import QtBot
 
+from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.calibration.spectralon import (
     MeasuredEmission,
     PlaneQuality,
@@ -17,7 +19,7 @@ from dsl_core.model.calibration.spectralon import (
 )
 from dsl_core.model.rig import FlatField
 from dsl_core.model.spectral import SpectralCurve
-from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, shown
+from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, session_of, shown
 
 EVEN = FlatField(rows_px=(50.0,), columns_px=(80.0,), gain=((1.0,),))
 GAIN = ((0.98, 1.0, 0.98), (1.0, 1.04, 1.0))
@@ -69,5 +71,5 @@ def test_an_even_camera_is_said_in_words(qtbot: QtBot) -> None:
     widget = shown(qtbot, "spectralon", calibration(flat_field=EVEN))
     assert widget.field.sentence.isVisible()
     assert "sees evenly" in widget.field.sentence.text()
-    widget.show_fit(None, calibration(), None)
+    widget.show_fit(Fit(AcceptedCalibration(name="spectralon", title=""), calibration(), session_of({})))
     qtbot.waitUntil(lambda: not widget.field.sentence.isVisible())
