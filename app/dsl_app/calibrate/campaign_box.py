@@ -45,8 +45,7 @@ class NewCampaignDialog(QDialog):
         self.browse = QPushButton("Choose…")
         self.browse.setToolTip("Choose the folder of campaigns")
         self.browse.clicked.connect(self._browse)
-        self._text = label("", "warn")
-        self._text.setWordWrap(True)
+        self._text = label("", "warn", wraps=True)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
         self.begin.setToolTip("Make the folder and begin the campaign")
@@ -99,9 +98,8 @@ class CampaignBox(QFrame):
     ) -> None:
         super().__init__()
         self._state, self._rig, self._commands, self._home = state, rig, commands, home
-        self._name, self._where = label("", "title"), label("", "muted")
+        self._name, self._where = label("", "title"), label("", "muted", wraps=True)
         self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._where.setWordWrap(True)
         self.new = push_button("&New campaign…", "Begin a campaign of the chosen rig in a new folder")
         self.open = push_button("&Open campaign…", "Continue a campaign that was begun before")
         self.everything = push_button(

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 
 from dsl_app.calibrate.calibrate_all import CANNOT_PLACE, CalibrateAll, products_text
-from dsl_app.calibrate.campaign import CampaignController, CampaignLock
 from dsl_app.calibrate.campaign_status import Kinds
 from dsl_app.calibrate.library import LibraryController
-from dsl_app.calibrate.state import ABOUT, CalibrateState, CampaignFacts
+from dsl_app.calibrate.state import ABOUT, CalibrateState, CampaignFacts, Row
 from dsl_app.calibrate.wizard.controller import WizardController
 from dsl_app.calibrate.wizard.state import WizardState
 from dsl_app.connection.controller import RIG, RigController
+from dsl_app.connection.state import RigChoice
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
 from dsl_core.campaign.guide import calibrated_rig
 from dsl_core.campaign.products import Products, write_products
+from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import DslError
 from dsl_core.io import CAMPAIGN_NAME
+from dsl_core.io.atomic import store_error
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.scan.lock import FolderLock
 from dsl_core.progress import Progress
 
 NO_CAMPAIGN = "No campaign is open. Begin one, or open one that was begun."
@@ -42,12 +46,15 @@ class CalibrateController:
     ) -> None:
         self.state, self._rig, self._runner, self._notifier = state, rig, runner, notifier
         self._kinds = kinds or Kinds()
-        self._campaign = CampaignController(state, rig, runner, notifier, self._kinds)
         self._store = library or CalibrationLibrary()
         self.library = LibraryController(state, rig, runner, notifier, self._store)
         self.wizard_ready: Event[tuple[WizardState, WizardController]] = Event()
         self._wizard: WizardController | None = None
         self._lock = CampaignLock()
+        self._stops = [
+            rig.state.devices.changed.connect(lambda _: self.refresh()),
+            rig.state.choice.changed.connect(lambda _: self.refresh()),
+        ]
         self._everything = CalibrateAll(state, rig, self._kinds, self._store, self._ended)
 
     # Campaign --------------------------------------------------------------------------------------
@@ -66,16 +73,48 @@ class CalibrateController:
     def open_campaign(self, folder: Path) -> None:
         """Open a campaign that was begun before; a wrong folder is named."""
         if not self._is_busy():
-            self._campaign.open(folder)
+            self._take(lambda: CampaignFolder.open(folder))
 
     def begin_campaign(self, folder: Path) -> None:
         """Begin a campaign of the chosen rig in a new folder."""
+        choice = self._rig.state.choice.value
         if not self._is_busy():
-            self._campaign.begin(folder)
+            self._take(lambda: CampaignFolder.begin(folder, choice.name, dict(choice.options)))
+
+    def _take(self, make: Callable[[], CampaignFolder]) -> None:
+        try:
+            campaign = make()
+        except DslError as error:
+            self._notifier.tell("error", str(error))
+            return
+        info = campaign.info
+        rig = RigChoice(info.rig, tuple(info.options.items()))
+        self.state.note.set("")
+        self.state.campaign.set(CampaignFacts(campaign.path.absolute(), rig))
+        self.refresh()
 
     def refresh(self) -> None:
         """Read again where every calibration stands."""
-        self._campaign.refresh()
+        facts, devices = self.state.campaign.value, self._rig.state.devices.value
+        self.state.foreign.set(facts is not None and devices is not None and not self._fits(facts))
+        self.state.trouble.set(self._obstacle())
+        if facts is None:
+            return
+        conditions = current_conditions(devices) if devices is not None and self._fits(facts) else None
+
+        def work(progress: Progress) -> tuple[Row, ...]:
+            progress.report("read the campaign", 0, 0)
+            return self._kinds.rows(facts.path, conditions)
+
+        def done(rows: tuple[Row, ...]) -> None:
+            if self.state.campaign.value == facts:
+                self.state.rows.set(rows)
+
+        self._runner.submit(Job("Read the campaign", work, done, self._tell, is_minor=True))
+
+    def _fits(self, facts: CampaignFacts) -> bool:
+        choice = self._rig.state.choice.value
+        return (choice.name, dict(choice.options)) == (facts.rig.name, dict(facts.rig.options))
 
     def connect_rig(self) -> None:
         """Connect the rig that the campaign was begun with."""
@@ -186,11 +225,24 @@ class CalibrateController:
         facts = self.state.campaign.value
         if self._is_busy():
             return None
-        trouble = NO_CAMPAIGN if facts is None else self._campaign.obstacle()
+        trouble = NO_CAMPAIGN if facts is None else self._obstacle()
         if trouble:
             self._notifier.tell("warning", trouble)
             return None
         return facts
+
+    def _obstacle(self) -> str:
+        """Why nothing can be calibrated now, empty if it can."""
+        facts, devices = self.state.campaign.value, self._rig.state.devices.value
+        if facts is None:
+            return ""
+        if devices is not None and not self._fits(facts):
+            mine, known = self._rig.state.choice.value.words, facts.rig.words
+            return (
+                f"This campaign was begun with the rig {known}, but {mine} is connected. Connect the"
+                " campaign's rig, or open another campaign."
+            )
+        return NO_RIG if devices is None else ""
 
     def _is_busy(self) -> bool:
         """Whether a calibration runs; then the person is told which."""
@@ -229,7 +281,8 @@ class CalibrateController:
 
     def close(self) -> None:
         """Stop what runs, and following the rig."""
-        self._campaign.close()
+        for stop in self._stops:
+            stop()
         if self._wizard is not None:
             self._wizard.leave()
         self.cancel_everything()
@@ -244,3 +297,23 @@ def library_name(folder: Path) -> str:
     """
     name = re.sub(r"[^\w .+-]", "-", folder.name).lstrip(" .+-")
     return name or "campaign"
+
+
+class CampaignLock:
+    """One writer for each campaign, among all windows and commands of this computer."""
+
+    def __init__(self) -> None:
+        self._lock: FolderLock | None = None
+
+    def take(self, folder: Path) -> None:
+        """Lock it; raises `StoreError` when another process writes it, or the folder is read-only."""
+        try:
+            self._lock = FolderLock(folder / "lock")
+        except OSError as error:
+            raise store_error(folder / "lock", error) from error
+
+    def release(self) -> None:
+        """Unlock it; a second call does nothing."""
+        if self._lock is not None:
+            self._lock.release()
+            self._lock = None

@@ -58,8 +58,7 @@ class LibraryPanel(QGroupBox):
         self.details = QTextBrowser()
         self.details.setAccessibleName("Details of the calibration")
         self.details.setToolTip("Conditions, dates and figures of the selected calibration")
-        self._note = label("", "muted")
-        self._note.setWordWrap(True)
+        self._note = label("", "muted", wraps=True)
         self.use = push_button("&Use for scans", "Scan with this calibration from now on")
         self.report = push_button("Show &report", "Open its report in the browser")
         self.restore = push_button("Ma&ke current", "Make this older version the current one; none is lost")
@@ -226,10 +225,10 @@ class DriftWindow(QDialog):
         column = QVBoxLayout(self)
         column.addWidget(label(verdict.sentence, "good" if verdict.passed else "bad"))
         if verdict.overridden:
-            column.addWidget(_wrapped(f"Checked although {'; '.join(verdict.overridden)}.", "warn"))
+            column.addWidget(label(f"Checked although {'; '.join(verdict.overridden)}.", "warn", wraps=True))
         column.addWidget(self.table, 1)
         if not verdict.passed:
-            column.addWidget(_wrapped(WHAT_TO_DO, "muted"))
+            column.addWidget(label(WHAT_TO_DO, "muted", wraps=True))
         column.addWidget(self._buttons(not verdict.passed))
 
     def _buttons(self, has_drifted: bool) -> QDialogButtonBox:
@@ -245,12 +244,6 @@ class DriftWindow(QDialog):
             button.clicked.connect(self.accept)
             button.setVisible(has_drifted)
         return buttons
-
-
-def _wrapped(text: str, role: str) -> QWidget:
-    made = label(text, role)
-    made.setWordWrap(True)
-    return made
 
 
 def _table() -> ReadTable:

@@ -12,7 +12,6 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
-    QLabel,
     QPushButton,
     QScrollArea,
     QSplitter,
@@ -166,12 +165,10 @@ class CalibrationRow(QFrame):
         super().__init__()
         self.setProperty("role", "card")
         self._title = label(f"{number}   {row.about.title}", "heading")
-        self._purpose = _small("muted")
-        self._purpose.setText(row.about.purpose)
-        self._state, self._figure, self._date = label(""), label(""), label("", "muted")
-        self._figure.setWordWrap(True)
+        self._purpose = label(row.about.purpose, "muted", wraps=True)
+        self._state, self._figure, self._date = label(""), label("", wraps=True), label("", "muted")
         self._date.setToolTip("When it was accepted")
-        self._reason = _small("muted")
+        self._reason = label("", "muted", wraps=True)
         self.run = QPushButton()
         self.run.clicked.connect(lambda: self.run_requested.emit(row.name))
         self._lay_out()
@@ -211,9 +208,3 @@ class CalibrationRow(QFrame):
         show_button(self.run, shown.run)
         self.run.setAccessibleName(shown.run_name)
         self.setAccessibleName(shown.accessible_name)
-
-
-def _small(role: str) -> QLabel:
-    made = label("", role)
-    made.setWordWrap(True)
-    return made

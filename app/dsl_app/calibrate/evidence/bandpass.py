@@ -50,10 +50,8 @@ class BandpassEvidence(Evidence[BandpassCalibration]):
             "Response",
             "Wavelength (nm)",
         )
-        self.seconds = label("", "muted")
-        self.warnings = label("", "warn")
-        for words in (self.seconds, self.warnings):
-            words.setWordWrap(True)
+        self.seconds = label("", "muted", wraps=True)
+        self.warnings = label("", "warn", wraps=True)
         self._parts = (self.table, self.efficiency, self.response)
         charts = side_by_side(self.efficiency, self.response)
         charts.setContentsMargins(0, 6, 0, 0)

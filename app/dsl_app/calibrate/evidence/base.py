@@ -78,8 +78,7 @@ class PlainEvidence(Evidence[Record]):
 
     def __init__(self) -> None:
         super().__init__(Record)
-        self.words = label("", "muted")
-        self.words.setWordWrap(True)
+        self.words = label("", "muted", wraps=True)
         column = QVBoxLayout(self)
         column.addWidget(self.words)
         column.addStretch(1)

@@ -13,7 +13,7 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QShowEvent
-from PySide6.QtWidgets import QLabel, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedLayout, QVBoxLayout, QWidget
 
 from dsl_app.shared.spectrum import Spectrum
 from dsl_app.shared.theme import DARK, Theme
@@ -56,12 +56,10 @@ class ChartBox(QWidget):
         self._draw: Callable[[], object] | None = None
         self._is_next = False
         self.title = label(title, "heading")
-        self.legend = QLabel()
-        self.legend.setWordWrap(True)
+        self.legend = label("", wraps=True)
         self.legend.setTextFormat(Qt.TextFormat.RichText)
         self.legend.setAccessibleName(f"Legend of {title}")
-        self.sentence = label("", "muted")
-        self.sentence.setWordWrap(True)
+        self.sentence = label("", "muted", wraps=True)
         self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._stack = QStackedLayout()
         self._stack.addWidget(self.sentence)

@@ -65,8 +65,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         self._by_hand: tuple[tuple[float, float], ...] | None = None
         self.chart = ChartPicture()
         self.swatches = Swatches()
-        self.words = label("", "muted")
-        self.words.setWordWrap(True)
+        self.words = label("", "muted", wraps=True)
         self.again = push_button(
             "Fit with these corners", "Measure the patches again at the current corners, and refine again"
         )

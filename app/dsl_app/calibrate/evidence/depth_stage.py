@@ -103,8 +103,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
             "Depth (mm)",
             left_width=60,
         )
-        self.warnings = label("", "warn")
-        self.warnings.setWordWrap(True)
+        self.warnings = label("", "warn", wraps=True)
         self._reader = BackgroundReader(self)
         boxes = (self.planes, self.steps, self.held_out, self.shifts, self.curve, self.difference)
         self._parts = (*boxes, self.film)

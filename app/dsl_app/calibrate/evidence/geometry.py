@@ -63,8 +63,7 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
             left_width=60,
         )
         self.table = NumberTable("Poses", HEADS, words=(0, 8))
-        self.diagnosis = label("", "muted")
-        self.diagnosis.setWordWrap(True)
+        self.diagnosis = label("", "muted", wraps=True)
         self.again = push_button(
             "Solve again", "Fit lenses and pose again with the ticked poses; captures of the others are kept"
         )

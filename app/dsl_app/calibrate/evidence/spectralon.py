@@ -54,8 +54,7 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         self.image = pg.ImageItem(axisOrder="row-major")
         self.bar: Any = None
         self.table = NumberTable("Signals of white", HEADS)
-        self.words = label("", "muted")
-        self.words.setWordWrap(True)
+        self.words = label("", "muted", wraps=True)
         self._lay_out()
 
     def _prepare_field(self, plot: Any) -> None:

@@ -28,8 +28,7 @@ class FitPage(QWidget):
         self._state, self._theme = state, DARK
         self._evidence: Evidence[Any] | None = None
         self._due: Fit | None = None
-        self.verdict = label("", "heading")
-        self.verdict.setWordWrap(True)
+        self.verdict = label("", "heading", wraps=True)
         self.verdict.setAccessibleName("Verdict on the fit")
         self.figures = FiguresTable("Key figures of the fit")
         self.figures.setMinimumHeight(120)

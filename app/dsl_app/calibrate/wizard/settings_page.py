@@ -42,10 +42,8 @@ class SettingsPage(QWidget):
         super().__init__()
         self._shown: tuple[SettingRow, ...] = ()
         self.fields: dict[str, QLineEdit | QCheckBox | BoardEdit] = {}
-        self._intro = label(INTRODUCTION, "muted")
-        self._intro.setWordWrap(True)
-        self._trouble = label("", "bad")
-        self._trouble.setWordWrap(True)
+        self._intro = label(INTRODUCTION, "muted", wraps=True)
+        self._trouble = label("", "bad", wraps=True)
         self._trouble.setAccessibleName("What is wrong with the settings")
         content = QWidget()
         self._form = QFormLayout(content)
@@ -93,8 +91,7 @@ class SettingsPage(QWidget):
             self.fields[row.key] = field
             self._form.addRow(name, field)
             if row.doc:
-                doc = label(row.doc, "muted")
-                doc.setWordWrap(True)
+                doc = label(row.doc, "muted", wraps=True)
                 self._form.addRow("", doc)
 
     def _field(self, row: SettingRow, name: str) -> QLineEdit | QCheckBox | BoardEdit:

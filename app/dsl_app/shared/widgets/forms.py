@@ -101,9 +101,10 @@ class ChoiceBox(CalmWheel, QComboBox):
             self.activated.emit(self.currentIndex())
 
 
-def label(text: str, role: str = "", parent: QWidget | None = None) -> QLabel:
-    """A label in a role of the style sheet: muted, title, heading, good, warn, bad."""
+def label(text: str, role: str = "", parent: QWidget | None = None, wraps: bool = False) -> QLabel:
+    """A label in a role of the style sheet (muted, title, heading, good, warn, bad); may break its lines."""
     made = QLabel(text, parent)
+    made.setWordWrap(wraps)
     if role:
         made.setProperty("role", role)
     return made
