@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Set dsl-scan up in a virtual environment and run it; needs only Python 3.11 to 3.13 and a network.
+"""Set up dsl-scan in a virtual environment and run it; needs only Python 3.11 to 3.13 and a network.
 
 python3 packaging/run.py demo [...]       a scan on the digital twin, from patterns to a report
-python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest (-n 0: in one process)
+python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest (-n 0: one process)
 python3 packaging/run.py dsl-scan [...]   the command line of the project
 python3 packaging/run.py shell            a shell inside the environment
-python3 packaging/run.py lock             write packaging/constraints.txt anew (for maintainers)
+python3 packaging/run.py lock             write packaging/constraints.txt again (for maintainers)
 """
 
 import argparse
@@ -21,7 +21,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-# Before the first annotation that an old Python cannot read, so that this sentence is what one sees.
+# Before the first annotation that an old Python cannot read, so that this sentence is what the user sees.
 if not (3, 11) <= sys.version_info[:2] <= (3, 13):  # a newer one lacks wheels of torch
     sys.exit(
         "dsl-scan needs Python 3.11, 3.12 or 3.13; this is {}.{}. Start the script with one of those, "
@@ -55,7 +55,7 @@ CHECKS = (
     ("mypy", ("mypy",)),
     ("import contracts", ("lint-imports", "--no-cache")),
 )
-#: Tests of a file share what they prepare and stay together. More processes would want more memory than time.
+#: Tests of a file share what they prepare and stay together. More processes would cost too much memory.
 #: Files go out in the order of their names: by their numbers of tests, the longest would come last and alone.
 SHARED = ("-n", "logical", "--maxprocesses", "4", "--dist", "loadfile", "--no-loadscope-reorder")
 
@@ -71,7 +71,7 @@ def say(text: str) -> None:
 
 @contextlib.contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Name a step before it starts and tell its seconds when it is done."""
+    """Name a step before it starts and print its seconds when it is done."""
     say(f"{what} ...")
     start = time.monotonic()
     yield
@@ -90,7 +90,7 @@ def missing_packages(
 
 
 def install_system_libraries(with_tests: bool) -> None:
-    """Install what Qt and VTK need as root on Debian, else print the line; never stops the setup."""
+    """Install what Qt and VTK need as root on Debian, otherwise print the command; never stops the setup."""
     ldconfig = shutil.which("ldconfig", path=os.environ.get("PATH", "") + ":/sbin:/usr/sbin")
     if ldconfig is None:  # Windows and macOS: the wheels bring everything
         return
@@ -108,7 +108,7 @@ def install_system_libraries(with_tests: bool) -> None:
             environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
             done = subprocess.run(["sh", "-c", f"{{ {line}; }} >/dev/null"], env=environment, check=False)
         if done.returncode != 0:
-            say(f"That failed; windows and 3D views may not work. Try by hand: {line}")
+            say(f"That failed; windows and 3D views may not work. Run it yourself: {line}")
 
 
 def venv_program(venv: Path, name: str) -> Path:
@@ -143,7 +143,7 @@ def find_links(settings: dict[str, list[str]]) -> list[str]:
 
 
 def torch_options(choice: str, links: Sequence[str], platform: str = sys.platform) -> list[str]:
-    """Options of ``uv pip install`` for the build of torch that was asked for.
+    """Options of ``uv pip install`` for the requested build of torch.
 
     The registry's default is a CUDA build on Linux and a CPU build elsewhere. Raises `SetupError` for
     CUDA on macOS, which has none.
@@ -151,16 +151,16 @@ def torch_options(choice: str, links: Sequence[str], platform: str = sys.platfor
     local = [option for link in links for option in ("--find-links", link)]
     if choice == "default":
         return local
-    anew = ["--reinstall-package", "torch"]  # the other build has the same version and would be kept
+    again = ["--reinstall-package", "torch"]  # the other build has the same version and would be kept
     linux = platform.startswith("linux")
     if choice == "cuda":
         if platform == "darwin":
             raise SetupError("There is no CUDA build of torch for macOS; leave out --torch cuda.")
         # Local wheels are left out: one of the CPU build would win over the registry's.
-        return anew if linux else [*anew, "--torch-backend", "cu130"]
+        return again if linux else [*again, "--torch-backend", "cu130"]
     has_local_cpu = any(list(Path(link).glob("torch-*+cpu-*.whl")) for link in links)
     backend = ["--torch-backend", "cpu"] if linux and not has_local_cpu else []
-    return [*anew, *local, *backend]
+    return [*again, *local, *backend]
 
 
 def digest(torch: str) -> str:
@@ -180,7 +180,7 @@ def read_stamp(venv: Path) -> dict[str, str]:
 
 
 def make_venv(venv: Path) -> None:
-    """Make the virtual environment; one made by another Python is made anew, anything else is left alone."""
+    """Make the virtual environment; one made by another Python is replaced, anything else is left alone."""
     config = venv / "pyvenv.cfg"
     if venv.exists() and not config.exists() and (not venv.is_dir() or any(venv.iterdir())):
         raise SetupError(f"{venv} is not a virtual environment. Name another folder with --venv.")
@@ -188,7 +188,7 @@ def make_venv(venv: Path) -> None:
     python = venv_program(venv, "python")
     command = [sys.executable, "-m", "venv", "--clear", str(venv)]
     if config.exists() and python.exists() and f" = {version}." in config.read_text():
-        command = [str(python), "-m", "ensurepip"]  # does nothing, unless the making was broken off
+        command = [str(python), "-m", "ensurepip"]  # does nothing, unless an earlier setup was interrupted
     with timed(f"Preparing the virtual environment in {venv}"):
         made = subprocess.run(command, capture_output=True, text=True, check=False)
     if made.returncode != 0:
@@ -224,7 +224,7 @@ def install(venv: Path, torch: str) -> None:
     if done.returncode != 0:
         raise SetupError(
             "The installation failed; the lines above say why. It needs a network, or PIP_FIND_LINKS with a "
-            "folder of wheels; behind a proxy set HTTPS_PROXY. Then give the same command again."
+            "folder of wheels; behind a proxy set HTTPS_PROXY. Then run the same command again."
         )
 
 
@@ -232,21 +232,21 @@ def prepare(venv: Path, torch: str | None, with_tests: bool) -> None:
     """Bring the environment up to date; does nothing when it already is."""
     stamp = read_stamp(venv)
     torch = torch or stamp.get("torch", "default")
-    wanted = {"digest": digest(torch), "torch": torch}
-    fresh = stamp == wanted and venv_program(venv, "python").exists()
+    current = {"digest": digest(torch), "torch": torch}
+    fresh = stamp == current and venv_program(venv, "python").exists()
     if not fresh or with_tests:
         install_system_libraries(with_tests)
     if not fresh:
         make_venv(venv)
         (venv / STAMP).unlink(missing_ok=True)
         install(venv, torch)
-        (venv / STAMP).write_text(json.dumps(wanted))
+        (venv / STAMP).write_text(json.dumps(current))
 
 
 def run(command: Sequence[str], variables: dict[str, str], folder: Path | None = None) -> tuple[int, bool]:
     """Run a command; return its exit code and whether Ctrl-C was pressed meanwhile.
 
-    The terminal sends Ctrl-C to the command too, which needs its time to put things in order.
+    The terminal sends Ctrl-C to the command too, which needs time to clean up.
     """
     process = subprocess.Popen(list(command), env=variables, cwd=folder)
     interrupted = False
@@ -278,7 +278,7 @@ def test(venv: Path, arguments: Sequence[str]) -> int:
 
 
 def lock(venv: Path) -> int:
-    """Write the constraints anew: one set of versions for all Pythons and systems."""
+    """Write the constraints again: one set of versions for all Pythons and systems."""
     command = [str(venv_program(venv, "python")), "-m", "uv", "pip", "compile", "--universal", "--upgrade"]
     command += ["--fork-strategy", "fewest", "--python-version", "3.11", "--no-annotate", "--quiet"]
     command += ["--custom-compile-command", "python3 packaging/run.py lock"]
@@ -305,7 +305,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def dispatch(command: str, venv: Path, arguments: Sequence[str]) -> int:
-    """Run what was asked for inside the environment."""
+    """Run the requested command inside the environment."""
     if command == "test":
         return test(venv, arguments)
     if command == "lock":
@@ -331,7 +331,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(str(error))
         return 2
     except KeyboardInterrupt:
-        say("Stopped. Give the same command again to go on.")
+        say("Stopped. Run the same command again to continue.")
         return 130
     if asked.command in ("demo", "test"):
         say(f"{asked.command} took {time.monotonic() - start:.1f} s, exit code {code}")

@@ -1,7 +1,7 @@
 """``dsl-scan``: a thin command for each function of the pipeline.
 
-Figures and findings go to standard output, progress and complaints to standard error. Exit codes: 0 all is
-well, 1 a bug, 2 wrong input (one sentence says what to do), 130 stopped by the user.
+Figures and findings go to standard output, progress and errors to standard error. Exit codes: 0
+success, 1 a bug, 2 wrong input (one sentence says what to do), 130 stopped by the user.
 """
 
 from __future__ import annotations

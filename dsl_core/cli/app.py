@@ -17,7 +17,6 @@ from dsl_core.cli import (
     gui,
     results,
     scans,
-    series,
     tradeoff,
 )
 
@@ -40,8 +39,8 @@ for command in (
     results.reconstruct,
     results.evaluate,
     compare.compare,
-    series.depth_test,
-    series.sweep,
+    compare.depth_test,
+    compare.sweep,
     results.export,
 ):
     app.command()(command)
@@ -53,8 +52,8 @@ app.add_typer(calibrate.calibrate, name="calibrate")
 app.add_typer(calibrations.calibrations, name="calibrations")
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         typer.echo(f"dsl-scan {dsl_core.__version__}")
         raise typer.Exit
 
@@ -63,7 +62,7 @@ def _print_version(wanted: bool) -> None:
 def _globally(
     version: Annotated[
         bool,
-        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and end."),
+        typer.Option("--version", is_eager=True, callback=_print_version, help="Print the version and exit."),
     ] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
 ) -> None:

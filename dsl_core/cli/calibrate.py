@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.guidance import ConsoleGuide, figures_json, going_on_with, opened_campaign
-from dsl_core.cli.guided import Guided
+from dsl_core.cli.guidance import ConsoleGuide, Guided, figures_json, opened_campaign, resumed_by
 from dsl_core.cli.options import Force, Json, RigOptions, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.cli.pictures import BoardOptions, PictureOptions, calibrate_pictures
@@ -19,20 +18,25 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 calibrate = typer.Typer(
-    help="Calibrate a rig step by step; a campaign's folder keeps all captures.", no_args_is_help=True
+    help="Calibrate a rig step by step; the folder of a campaign keeps all captures.", no_args_is_help=True
 )
 
-Campaign = Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="Folder of the campaign, new or begun.")]
+Campaign = Annotated[
+    Path, typer.Argument(metavar="CAMPAIGN", help="Folder of the campaign, new or existing.")
+]
 CampaignRig = Annotated[
-    str | None, typer.Option("--rig", help="Name of a rig; the campaign's own, for a new one the twin.")
+    str | None,
+    typer.Option(
+        "--rig", help="Name of a rig; the default is the campaign's, or the twin for a new campaign."
+    ),
 ]
 Set = Annotated[
     list[str], typer.Option("--set", help="Setting of the calibration as key=value; may be repeated.")
 ]
-Redo = Annotated[list[str], typer.Option("--redo", help="A step to capture anew; may be repeated.")]
-Yes = Annotated[bool, typer.Option("--yes", help="Ask nobody: every target is in place when it is needed.")]
+Redo = Annotated[list[str], typer.Option("--redo", help="A step to capture again; may be repeated.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Do not ask: every target is in place when it is needed.")]
 AcceptFailed = Annotated[
-    bool, typer.Option("--accept-failed", help="Go on although figures are outside their limits.")
+    bool, typer.Option("--accept-failed", help="Continue although figures are outside their limits.")
 ]
 
 _HELP = {
@@ -45,7 +49,7 @@ _HELP = {
 
 def selftest(
     campaign: Annotated[
-        Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign to keep the outcome in.")
+        Path | None, typer.Argument(metavar="[CAMPAIGN]", help="Campaign to save the outcome in.")
     ] = None,
     rig: CampaignRig = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
@@ -53,23 +57,25 @@ def selftest(
     yes: Yes = False,
     json: Json = False,
 ) -> None:
-    """Test camera and projector before anything else: each figure passes or says what to do."""
+    """Test the camera and projector first: each figure passes or says what to do."""
     with tempfile.TemporaryDirectory(prefix="dsl-selftest-") as spare:
         folder = campaign or Path(spare) / "campaign"
-        Guided("selftest", folder, rig, option, set_, yes, json, anew=True).run()
+        Guided("selftest", folder, rig, option, set_, yes, json, again=True).run()
 
 
 @calibrate.command()
 def geometry(
     folder: Annotated[
-        Path, typer.Argument(metavar="FOLDER", help="Folder of the campaign; with --pictures, of pictures.")
+        Path, typer.Argument(metavar="FOLDER", help="Folder of the campaign, or of pictures with --pictures.")
     ],
     board: Annotated[
-        str | None, typer.Option(help="COLUMNSxROWS of inner corners; with --marker-mm, of squares.")
+        str | None, typer.Option(help="COLUMNSxROWS of inner corners, or of squares with --marker-mm.")
     ] = None,
-    square_mm: Annotated[float | None, typer.Option(help="Side of a printed square, measured.")] = None,
-    marker_mm: Annotated[float | None, typer.Option(help="Side of a marker: the board is a ChArUco.")] = None,
-    dictionary: Annotated[str, typer.Option(help="Markers of a ChArUco board.")] = "DICT_5X5_100",
+    square_mm: Annotated[float | None, typer.Option(help="Measured side of a printed square.")] = None,
+    marker_mm: Annotated[
+        float | None, typer.Option(help="Side of a marker; makes the board a ChArUco board.")
+    ] = None,
+    dictionary: Annotated[str, typer.Option(help="Marker dictionary of a ChArUco board.")] = "DICT_5X5_100",
     rig: CampaignRig = None,
     option: RigOptions = [],  # noqa: B006
     set_: Set = [],  # noqa: B006
@@ -77,27 +83,28 @@ def geometry(
     yes: Yes = False,
     accept_failed: AcceptFailed = False,
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="FOLDER holds a folder of numbered pictures for each pose.")
+        bool, typer.Option("--pictures", help="FOLDER contains a folder of numbered pictures for each pose.")
     ] = False,
     projector: Annotated[str, typer.Option(help="Pictures: WIDTHxHEIGHT of the projector, px.")] = "640x360",
-    binning: Annotated[float, typer.Option(help="Pictures: sensor pixels a camera pixel spans.")] = 1.0,
+    binning: Annotated[float, typer.Option(help="Pictures: sensor pixels per camera pixel.")] = 1.0,
     bayer: Annotated[str | None, typer.Option(help="Pictures: mosaic, RGGB, BGGR, GRBG, GBRG.")] = None,
     baseline_mm: Annotated[
-        float | None, typer.Option(help="Pictures: distance of camera and projector, checks the print.")
+        float | None,
+        typer.Option(help="Pictures: distance from camera to projector, to check the printed size."),
     ] = None,
     target: Annotated[Path | None, typer.Option("--output", help="Pictures: GEOMETRY.json to write.")] = None,
     xml: Annotated[Path | None, typer.Option(help="Pictures: published XML or YAML to write.")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Find lenses and pose of camera and projector from a board under Gray code, film off."""
+    """Find the lenses and the pose of camera and projector from a board under Gray code, film off."""
     printed = BoardOptions(board, square_mm, marker_mm, dictionary)
     if pictures:
         options = PictureOptions(projector, binning, bayer, baseline_mm, target, xml, force)
         calibrate_pictures(Output(json), folder, printed, options)
         return
     if target is not None or xml is not None:
-        raise CalibrationError("--output and --xml go with --pictures; 'calibrate all' writes the rig.")
+        raise CalibrationError("--output and --xml need --pictures; 'calibrate all' writes the rig.")
     found = printed.build()
     own = [] if found is None else [f"board={found.model_dump_json()}"]
     Guided("geometry", folder, rig, option, [*own, *set_], yes, json, redo, accept_failed).run()
@@ -134,32 +141,33 @@ def all_(
         list[str], typer.Option("--set", help="Setting as CALIBRATION.key=value; may be repeated.")
     ] = [],  # noqa: B006
     name: Annotated[
-        str | None, typer.Option(help="Name in the library; that of the campaign's folder if not given.")
+        str | None,
+        typer.Option(help="Name in the library; the default is the name of the campaign's folder."),
     ] = None,
     library: Annotated[
-        bool, typer.Option("--library/--no-library", help="Keep the rig in the library.")
+        bool, typer.Option("--library/--no-library", help="Store the rig in the library.")
     ] = True,
     yes: Yes = False,
     accept_failed: AcceptFailed = False,
     json: Json = False,
 ) -> None:
-    """Calibrate everything in order: from an unknown rig to a calibrated one, with a report."""
+    """Run every calibration in order: from an unknown rig to a calibrated one, with a report."""
     from dsl_core.campaign.guide import calibrate_all
     from dsl_core.campaign.products import write_products
     from dsl_core.campaign.recipes import load_recipe
     from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.calibration_library import check_name
 
-    output, timer, wanted = Output(json), StageTimer(), _settings_by_name(set_)
+    output, timer, settings = Output(json), StageTimer(), _settings_by_name(set_)
     name = name or campaign.absolute().name
     if library:
-        check_name(name)  # told before anything is captured
-    for each, values in wanted.items():
-        load_recipe(each, values)  # wrong settings are told before anything is written
+        check_name(name)  # reported before anything is captured
+    for each, values in settings.items():
+        load_recipe(each, values)  # wrong settings are reported before anything is written
     guide = ConsoleGuide(output, yes, accept_failed)
     with (
-        going_on_with(f"dsl-scan calibrate all {campaign}"),
-        opened_campaign(campaign, rig, parse_options(option), wanted) as (folder, devices),
+        resumed_by(f"dsl-scan calibrate all {campaign}"),
+        opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
     ):
         with output.progress() as progress:
             calibrated = calibrate_all(
@@ -172,7 +180,7 @@ def all_(
             )
         made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)
     output.costs(timer.stages)
-    output.say(f"The calibrated rig lies in {made.rig}, its report in {made.report}.")
+    output.say(f"The calibrated rig is saved in {made.rig}, its report in {made.report}.")
     if made.entry is not None:
         output.say(f"In the library: {made.entry}. Next: dsl-scan scan SCAN.dsl --calibration {made.entry}")
     output.put(rig=made.rig, report=made.report, library=made.entry)
@@ -187,7 +195,8 @@ def _settings_by_name(texts: list[str]) -> dict[str, dict[str, str]]:
         name, dot, setting = key.partition(".")
         if not dot:
             raise CalibrationError(
-                f"--set must be like bandpass.line_px=5 here, a calibration's name first, not {key}={value}."
+                "--set must start with a calibration's name here, like bandpass.line_px=5, not"
+                f" {key}={value}."
             )
         found.setdefault(name, {})[setting] = value
     return found

@@ -1,4 +1,4 @@
-"""Commands around the library of calibrated rigs: ``calibrations list|show|check|restore|export|import``."""
+"""Commands for the library of calibrated rigs: ``calibrations list|show|check|restore|export|import``."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Name = Annotated[str, typer.Argument(metavar="NAME", help="A calibration's name,
 
 @calibrations.command("list")
 def list_(json: Json = False) -> None:
-    """List every version of every calibration, damaged ones with the reason."""
+    """List every version of every calibration, and why a damaged one cannot be read."""
     from dsl_core.io.calibration_library import CalibrationLibrary
 
     output, library = Output(json), CalibrationLibrary()
@@ -40,11 +40,11 @@ def list_(json: Json = False) -> None:
 @calibrations.command()
 def show(
     name: Name,
-    report: Annotated[Path | None, typer.Option(help="HTML page to write as well.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Also write this HTML page.")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Say what a calibration holds: conditions, dates, figures with uncertainties."""
+    """Show what a calibration contains: conditions, dates, figures with uncertainties."""
     from dsl_core.campaign.products import write_calibration_report
     from dsl_core.io.calibration_library import CalibrationLibrary
     from dsl_core.io.staging import check_targets
@@ -59,25 +59,25 @@ def show(
         output.say(f"{note.title}, accepted {note.accepted[:16]}")
         print_figures(output, note.figures)
     if report is not None:
-        output.say(f"The report lies in {report}")
+        output.say(f"The report is saved in {report}")
     output.put(name=entry.name, version=entry.stamp, report=report, rig=entry.rig.model_dump(mode="json"))
     output.finish()
 
 
 @calibrations.command()
 def check(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A name of the library, or a rig's file.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="A name in the library, or a rig's file.")],
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     spectralon: Annotated[
         bool, typer.Option("--spectralon/--any-target", help="The flat target is the Spectralon.")
     ] = True,
-    keep: Annotated[Path | None, typer.Option(help="Folder to keep the frames in.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Folder to save the frames in.")] = None,
     override: OverrideCalibration = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Ask nobody: the target is in place.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask: the target is in place.")] = False,
     json: Json = False,
 ) -> None:
-    """Check by one quick shot of a flat target whether the rig still is as it was calibrated."""
+    """Check with one quick shot of a flat target whether the rig still matches its calibration."""
     import tempfile
 
     from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
@@ -103,22 +103,22 @@ def check(
     wrong = failures(figures)
     if wrong:
         clauses = "; ".join(f"{figure}. {figure.advice}".rstrip(". ") for figure in wrong)
-        raise CalibrationError(f"The rig is not as {name} says: {clauses}.")
-    output.say(f"The rig is as {name} says.")
+        raise CalibrationError(f"The rig no longer matches {name}: {clauses}.")
+    output.say(f"The rig matches {name}.")
     output.finish()
 
 
 @calibrations.command()
 def restore(
     name: Annotated[str, typer.Argument(metavar="NAME")],
-    version: Annotated[str, typer.Argument(metavar="DATE", help="A version, or how it begins.")],
+    version: Annotated[str, typer.Argument(metavar="DATE", help="A version, or the start of one.")],
     json: Json = False,
 ) -> None:
-    """Make an older version the current one; the one that was stays in the library."""
+    """Make an older version the current one; the previous one stays in the library."""
     from dsl_core.io.calibration_library import CalibrationLibrary
 
     output, entry = Output(json), CalibrationLibrary().restore(name, version)
-    output.say(f"{name} is version {entry.stamp} from now on.")
+    output.say(f"The current version of {name} is now {entry.stamp}.")
     output.put(name=name, version=entry.stamp)
     output.finish()
 
@@ -128,12 +128,12 @@ def export(
     name: Name,
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
     form: Annotated[
-        str, typer.Option(help="entry (all there is), rig (its file), or published (XML and .npy).")
+        str, typer.Option(help="entry (everything), rig (its file), or published (XML and .npy).")
     ] = "entry",
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Write a calibration for another computer or program."""
+    """Export a calibration for another computer or program."""
     from dsl_core.campaign.products import export_entry
     from dsl_core.io.calibration_library import CalibrationLibrary
 
@@ -147,12 +147,12 @@ def export(
 @calibrations.command("import")
 def import_(
     source: Annotated[
-        Path, typer.Argument(metavar="FILE", help="What 'export' wrote, or a rig's JSON file.")
+        Path, typer.Argument(metavar="FILE", help="A file written by 'export', or a rig's JSON file.")
     ],
-    name: Annotated[str | None, typer.Option(help="Name in the library; its own if not given.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name in the library; the default is its own.")] = None,
     json: Json = False,
 ) -> None:
-    """Take a calibration into the library, as the current version of its name."""
+    """Import a calibration into the library as the current version of its name."""
     from dsl_core.campaign.products import import_entry
     from dsl_core.io.calibration_library import CalibrationLibrary
 
@@ -184,7 +184,7 @@ def _facts(line: LibraryLine) -> dict[str, object]:
 
 def _say_conditions(output: Output, rig: Rig) -> None:
     if rig.conditions is None:
-        output.say("Nobody noted under which settings it was captured.")
+        output.say("The settings under which it was captured are not known.")
         return
     for name, part in (("camera", rig.conditions.camera), ("projector", rig.conditions.projector)):
         values = ", ".join(

@@ -24,10 +24,10 @@ PUBLISHED = {"spectral_rmse": 0.038, "spectral_angle_rad": 0.138}
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder to write; a number is added if it is taken.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder to write; a number is added if it exists.")] = Path(
         "dsl-demo"
     ),
-    size: Annotated[str, typer.Option(help="Camera pixels; 890x580 is the published rig's.")] = "445x290",
+    size: Annotated[str, typer.Option(help="Camera pixels; the published rig has 890x580.")] = "445x290",
     scene: Annotated[
         str, typer.Option(help="A scene of the twin; 'dsl-scan scenes' lists them.")
     ] = "color-checker",
@@ -36,7 +36,7 @@ def demo(
     open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the report in a browser.")] = False,
     json: Json = False,
 ) -> None:
-    """Scan, reconstruct and evaluate a Color Checker on the digital twin, ending in a report."""
+    """Scan, reconstruct and evaluate a Color Checker on the digital twin, and write a report."""
     from dsl_core.evaluation.cost import StageTimer
 
     output, timer = Output(json), StageTimer()
@@ -47,7 +47,7 @@ def demo(
         _capture(output, timer, folder, options)
         result = _reconstruct(output, timer, folder)
     except (KeyboardInterrupt, Cancelled):
-        raise Cancelled(f"Stopped; 'dsl-scan demo --out {out}' goes on where it was.") from None
+        raise Cancelled(f"Stopped; 'dsl-scan demo --out {out}' resumes.") from None
     figures = _evaluate(output, timer, folder, result)
     output.costs(timer.stages)
     for name, line in _lines(folder).items():
@@ -58,14 +58,14 @@ def demo(
         typer.launch((folder / REPORT).absolute().as_uri())
 
 
-def _choose_folder(wanted: Path, options: dict[str, str]) -> Path:
-    """The first of the name and its numbered neighbours that is free, or holds this demo unfinished."""
+def _choose_folder(given: Path, options: dict[str, str]) -> Path:
+    """The first of the name and its numbered variants that is free, or has this demo unfinished."""
     from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.manifest import read_manifest
     from dsl_core.io.scan.origin import rig_notes
 
     for number in itertools.count(1):
-        folder = wanted if number == 1 else wanted.with_name(f"{wanted.name}-{number}")
+        folder = given if number == 1 else given.with_name(f"{given.name}-{number}")
         if not folder.exists():
             return folder
         started = (folder / SCAN / MANIFEST_NAME).is_file() and not (folder / RESULT).exists()

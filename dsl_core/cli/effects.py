@@ -1,4 +1,4 @@
-"""Which effects of the twin a scene calls for, and what the others would cost."""
+"""Which effects of the twin a scene needs, and what the others would cost."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def effects(
     plan: PlanFile = None,
     json: Json = False,
 ) -> None:
-    """Say which effects of light a scene calls for, and why: what each changes at most, and its cost."""
+    """Show which effects of light a scene needs, and why: how much each changes at most, and its cost."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import load_plan
     from dsl_core.model.plan import CapturePlan
@@ -72,7 +72,7 @@ def _row(decision: Decision) -> tuple[str, ...]:
 
 def _left_out(plan: EffectPlan) -> str:
     bound = f"{in_words(plan.left_out_bound)} {plan.tolerance.unit}"
-    return f"What is off changes no pixel of any picture by more than {bound}; allowed are {plan.tolerance}."
+    return f"The effects left out change no pixel by more than {bound}; the tolerance is {plan.tolerance}."
 
 
 def _saved(plan: EffectPlan, frames: int) -> str:
@@ -80,5 +80,5 @@ def _saved(plan: EffectPlan, frames: int) -> str:
     saved, share = everything - rendered, 100 * (1 - rendered / everything)
     return (
         f"A frame with a line takes about {1e3 * rendered:.0f} ms to compute, {1e3 * everything:.0f} ms with"
-        f" everything: {share:.0f} %, or {frames * saved:.0f} s of {frames} frames, are saved."
+        f" all effects: {frames} frames take {frames * saved:.0f} s ({share:.0f} %) less."
     )

@@ -1,4 +1,4 @@
-"""Commands around files of others and our own: import, info."""
+"""Commands for files, those of other programs and our own: import, info."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def import_(
     target: Annotated[
         Path | None,
         typer.Option(
-            "--output", "-o", help="SCAN.dsl or RIG.json to write; without it, only check the folder."
+            "--output", "-o", help="SCAN.dsl or RIG.json to write; if not given, the folder is only checked."
         ),
     ] = None,
     base: Annotated[
         Path | None,
         typer.Option(
-            "--calibration", help="Rig with film, sensor and scales; the published rig if not given."
+            "--calibration", help="Rig with film, sensor and scales; the default is the published rig."
         ),
     ] = None,
     camera_size: Annotated[
@@ -39,7 +39,7 @@ def import_(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Read the published dataset or calibration layout; say what is missing or misnamed."""
+    """Import a published dataset or calibration; list what is missing or misnamed."""
     from dsl_core.io.published import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
@@ -62,7 +62,7 @@ def import_(
 
 
 def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig) -> None:
-    """The table comes first, so that it is there when the import is refused."""
+    """The table comes first, so that it is printed even when the import is refused."""
     from dsl_core.workflows import exchange
 
     _print_files(output, "dataset", exchange.import_scan(source, None, rig))
@@ -72,18 +72,18 @@ def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig)
 
 
 def _print_files(output: Output, kind: str, records: Sequence[FileRecord]) -> None:
-    """Everything that is not as it should be, and how much is."""
+    """Every entry that is not as published, and how many are."""
     from dsl_core.io.published.layout import as_published
 
     told = [record for record in records if record.status != "ok"]
-    good, wanted = as_published(records)
-    output.say(f"A published {kind}: {good} of {wanted} entries are as published.")
+    good, total = as_published(records)
+    output.say(f"A published {kind}: {good} of {total} entries are as published.")
     if told:
         output.table(
             ("expected", "found", "status", "what to do"),
             [(r.expected or "-", r.found or "-", r.status, r.advice) for r in told],
         )
-    output.put(kind=kind, as_published=good == wanted, files=[vars(record) for record in records])
+    output.put(kind=kind, as_published=good == total, files=[vars(record) for record in records])
 
 
 def info(
@@ -91,7 +91,7 @@ def info(
     verify: Annotated[bool, typer.Option("--verify", help="Also read every frame of a scan.")] = False,
     json: Json = False,
 ) -> None:
-    """Say what a folder or file holds and whether it is complete."""
+    """Show what a folder or file contains and whether it is complete."""
     from dsl_core.io.describe import describe
 
     output, facts = Output(json), describe(path, verify)

@@ -1,4 +1,4 @@
-"""Opens the window. It is another package, so it is started by its entry point and never imported here."""
+"""Open the window, which is another package: it is started by its entry point and never imported here."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def gui(
     path: Annotated[
         Path | None, typer.Argument(help="A scan, result, reference or calibration to open.")
     ] = None,
-    rig: Annotated[str | None, typer.Option(help="Rig to connect instead of the last one.")] = None,
+    rig: Annotated[str | None, typer.Option(help="Rig to connect instead of the last one used.")] = None,
     option: RigOptions = [],  # noqa: B006
     demo: Annotated[bool, typer.Option("--demo", help="Open a finished scan of the twin.")] = False,
-    theme: Annotated[Theme | None, typer.Option(help="Colours, instead of those used last.")] = None,
+    theme: Annotated[Theme | None, typer.Option(help="Colours to use instead of the last ones.")] = None,
 ) -> None:
     """Open the window: scan, calibrate and read spectra by hand."""
     words = [] if path is None else [str(path)]

@@ -1,4 +1,4 @@
-"""A person at the terminal, or nobody, beside a calibration: what is asked and told."""
+"""Calibrations at the terminal: what a person is asked and told, and one calibration as a command."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_core.cli.options import parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError, Cancelled
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 class ConsoleGuide:
     """Asks on standard error and reads answers from standard input, so that JSON stays alone on output.
 
-    ``unattended`` takes every target as placed; ``tolerant`` goes on although figures are outside limits.
+    ``unattended`` assumes that every target is placed; ``tolerant`` continues although figures are outside
+    their limits.
     """
 
     output: Output
@@ -32,12 +34,12 @@ class ConsoleGuide:
     tolerant: bool = False
 
     def begins(self, session: CalibrationSession, missing: int) -> None:
-        """Say what is to come, and why captures that are there are not good enough."""
+        """Say what follows, and why existing captures are not good enough."""
         steps = len(session.steps)
         self.output.say(f"{session.recipe.title}: {missing} of {steps} steps to capture, then the fit.")
         for each in session.statuses():
             if each.state == "refused":
-                self.output.say(f"  {each.step.title} is captured anew: {each.reason}")
+                self.output.say(f"  {each.step.title} is captured again: {each.reason}")
 
     def place(self, step: Step) -> None:
         """Ask a person to place the target."""
@@ -45,10 +47,10 @@ class ConsoleGuide:
         if self.unattended:
             self.output.say(ask)
         else:
-            answer(self.output, f"{ask} Then press Enter (Ctrl-C stops, everything captured is kept): ")
+            answer(self.output, f"{ask} Then press Enter (Ctrl-C stops; everything captured is kept): ")
 
     def looked(self, step: Step, figures: Sequence[Figure]) -> bool:
-        """Tell what a look found; where it is not good, a person decides."""
+        """Report what a look found; where it is not good, a person decides."""
         from dsl_core.model.figure import failures
 
         wrong = failures(tuple(figures))
@@ -59,7 +61,7 @@ class ConsoleGuide:
         advice = " ".join(f"{figure}: {figure.advice}" for figure in wrong)
         if self.unattended:
             raise CalibrationError(f"The step {step.title!r} does not look right: {advice}")
-        said = answer(self.output, f"{advice} Enter looks again, 'go' goes on as it is: ")
+        said = answer(self.output, f"{advice} Press Enter to look again, or type 'go' to continue anyway: ")
         return said.strip().lower() == "go"
 
     def judge(self, fitted: AcceptedCalibration) -> bool:
@@ -73,7 +75,7 @@ class ConsoleGuide:
 def print_figures(output: Output, figures: Sequence[Figure]) -> None:
     """A table of figures with their limits and verdicts."""
     rows = [(str(figure), figure.limits, verdict(figure)) for figure in figures]
-    output.table(("figure", "wanted", ""), rows)
+    output.table(("figure", "limits", ""), rows)
 
 
 def verdict(figure: Figure) -> str:
@@ -110,20 +112,81 @@ def opened_campaign(
 
 
 @contextmanager
-def going_on_with(command: str) -> Iterator[None]:
-    """Ctrl-C ends in the command that goes on."""
+def resumed_by(command: str) -> Iterator[None]:
+    """Turn Ctrl-C into a sentence with the command that resumes."""
     try:
         yield
     except (KeyboardInterrupt, Cancelled):
-        raise Cancelled(f"Stopped; everything captured is stored. Go on with: {command}") from None
+        raise Cancelled(f"Stopped; everything captured is stored. Resume with: {command}") from None
 
 
 def answer(output: Output, question: str) -> str:
-    """The line a person answers; raises `CalibrationError` when there is nobody."""
+    """The line that a person types; raises `CalibrationError` when standard input has ended."""
     line = output.ask(question)
     if not line:
         raise CalibrationError(
-            "Nobody answers: standard input has ended. Run it in a terminal, or with --yes where every target"
-            " is placed by itself."
+            "There is no answer: standard input has ended. Run the command in a terminal, or add --yes if"
+            " every target is placed automatically."
         )
     return line
+
+
+@dataclass(frozen=True)
+class Guided:
+    """One calibration as the command line describes it.
+
+    ``redo`` names steps to capture again; ``again`` repeats every step that was captured before.
+    """
+
+    name: str
+    campaign: Path
+    rig: str | None
+    option: Sequence[str]
+    settings: Sequence[str]
+    unattended: bool
+    json: bool
+    redo: Sequence[str] = ()
+    tolerant: bool = False
+    again: bool = False
+
+    def run(self) -> None:
+        """Go through the steps that lack captures, fit, and accept; print the figures."""
+        from dsl_core.campaign.guide import run_calibration
+        from dsl_core.campaign.recipes import load_recipe
+        from dsl_core.campaign.session import CalibrationSession
+
+        output = Output(self.json)
+        command = f"dsl-scan {self._verb} {self.campaign}"
+        settings = {self.name: parse_options(self.settings)}
+        load_recipe(self.name, settings[self.name])  # wrong settings are reported before anything is written
+        with (
+            resumed_by(command),
+            opened_campaign(self.campaign, self.rig, parse_options(self.option), settings) as (
+                campaign,
+                devices,
+            ),
+        ):
+            recipe = load_recipe(self.name, campaign.info.settings.get(self.name))
+            session = CalibrationSession(recipe, devices, campaign)
+            before = session.accepted()
+            redo = self._captured(session) if self.again else self.redo
+            guide = ConsoleGuide(output, self.unattended, self.tolerant)
+            with output.progress() as progress:
+                accepted = run_calibration(session, guide, progress, redo)
+        if accepted == before:
+            output.say(
+                f"{accepted.title} was accepted before ({accepted.accepted[:16]}); --redo STEP captures a"
+                " step again."
+            )
+        else:
+            output.say(f"{accepted.title} is accepted.")
+        output.put(name=accepted.name, accepted=accepted.accepted, figures=figures_json(accepted.figures))
+        output.put(campaign=self.campaign)
+        output.finish()
+
+    @property
+    def _verb(self) -> str:
+        return self.name if self.name == "selftest" else f"calibrate {self.name}"
+
+    def _captured(self, session: CalibrationSession) -> tuple[str, ...]:
+        return tuple(each.step.key for each in session.statuses() if each.state == "captured")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 RigName = Annotated[str, typer.Option("--rig", help="Name of a rig; 'dsl-scan rigs' lists them.")]
 RigOptions = Annotated[
     list[str], typer.Option("--option", "-o", help="Option of the rig as key=value; may be repeated.")
@@ -27,19 +27,23 @@ RigOptions = Annotated[
 Effects = Annotated[
     str | None,
     typer.Option(
-        "--effects", help="What the twin renders: auto, all, none, usual, or effects by name, with commas."
+        "--effects",
+        help="What the twin renders: auto, all, none, usual, or names of effects separated by commas.",
     ),
 ]
 Tolerance = Annotated[
     str | None,
-    typer.Option("--tolerance", help="How far --effects auto may be from all, like 1DN or 0.5sigma."),
+    typer.Option("--tolerance", help="How far --effects auto may differ from all, like 1DN or 0.5sigma."),
 ]
 CalibrationName = Annotated[
     str | None,
     typer.Option("--calibration", help="A calibration: its name in the library, NAME@DATE, or a rig's file."),
 ]
 OverrideCalibration = Annotated[
-    bool, typer.Option("--override-calibration", help="Use it although camera or projector settings differ.")
+    bool,
+    typer.Option(
+        "--override-calibration", help="Use the calibration although camera or projector settings differ."
+    ),
 ]
 PlanFile = Annotated[Path | None, typer.Option("--plan", help="A plan written by 'dsl-scan plan'.")]
 Code = Annotated[
@@ -47,15 +51,15 @@ Code = Annotated[
     typer.Option(
         "--code",
         help="Binary code: 'full' (columns and rows) or 'columns'; 'xor-04' and 'ensemble-04' for surfaces"
-        " that light each other, with stripes of 2 px as 'xor-02' and 'ensemble-02', with rows"
-        " as 'full-xor-04'.",
+        " that light each other, 'xor-02' and 'ensemble-02' with stripes of 2 px; 'full-xor-04' with"
+        " rows.",
     ),
 ]
 Lines = Annotated[
-    str | None, typer.Option("--lines", help="One line a frame, as WIDTHxSTEP in projector px, like 5x2.")
+    str | None, typer.Option("--lines", help="One line per frame, as WIDTHxSTEP in projector px, like 5x2.")
 ]
 Comb = Annotated[
-    str | None, typer.Option("--comb", help="Several lines a frame, as WIDTHxSTEPxPERIOD, like 5x2x106.")
+    str | None, typer.Option("--comb", help="Several lines per frame, as WIDTHxSTEPxPERIOD, like 5x2x106.")
 ]
 Settings = Annotated[
     list[str],
@@ -65,7 +69,7 @@ Settings = Annotated[
 
 @dataclass(frozen=True)
 class PlanChoice:
-    """What the command line says of a plan."""
+    """The plan that the options of a command describe."""
 
     file: Path | None = None
     code: str | None = None
@@ -74,7 +78,7 @@ class PlanChoice:
     settings: Sequence[str] = ()
 
     def build(self) -> CapturePlan:
-        """The plan; raises `PlanError` when the choices contradict each other or make no sense."""
+        """The plan; raises `PlanError` when the choices contradict each other or are impossible."""
         from dsl_core.io.plan_file import load_plan
         from dsl_core.model.plan import CapturePlan
 
@@ -87,7 +91,7 @@ class PlanChoice:
         given = [name for name, value in details.items() if value is not None]
         if self.file is not None:
             if given:
-                raise PlanError(f"--plan holds the whole plan; leave out {', '.join(given)}, or --plan.")
+                raise PlanError(f"--plan gives the whole plan; leave out {', '.join(given)}, or --plan.")
             return load_plan(self.file)
         return _checked("plan", lambda: CapturePlan.model_validate(self._fields()))
 
@@ -112,7 +116,7 @@ class PlanChoice:
         from dsl_core.model.plan import LineComb, ScanLines
 
         if self.lines is not None and self.comb is not None:
-            raise PlanError("--lines and --comb exclude each other; choose one.")
+            raise PlanError("--lines and --comb cannot be combined; choose one.")
         if self.lines is not None:
             width, step = _numbers("--lines", self.lines, "WIDTHxSTEP", 2)
             return _checked("--lines", lambda: ScanLines(width_px=width, step_px=step))
@@ -132,7 +136,7 @@ def parse_options(texts: Sequence[str]) -> dict[str, str]:
     for text in texts:
         key, sign, value = text.partition("=")
         if not (key and sign):
-            raise DeviceError(f"An option must be like key=value, for instance scene=plane, not {text!r}.")
+            raise DeviceError(f"An option must be key=value, like scene=plane, not {text!r}.")
         if key in options:
             raise DeviceError(
                 f"The option {key!r} is given twice: {options[key]!r} and {value!r}. Choose one."
@@ -188,7 +192,7 @@ def parse_size(name: str, text: str) -> tuple[int, int]:
 
 
 def parse_numbers(name: str, text: str) -> list[float]:
-    """Finite numbers with commas between them; raises `PlanError`.
+    """Finite numbers separated by commas; raises `PlanError`.
 
     >>> parse_numbers("--positions", "695.2, 707")
     [695.2, 707.0]
@@ -198,7 +202,7 @@ def parse_numbers(name: str, text: str) -> list[float]:
     except ValueError:
         numbers = []
     if not numbers or not all(math.isfinite(number) for number in numbers):
-        raise PlanError(f"{name} must be numbers with commas, like 695.2,707,719, not {text!r}.")
+        raise PlanError(f"{name} must be numbers separated by commas, like 695.2,707,719, not {text!r}.")
     return numbers
 
 

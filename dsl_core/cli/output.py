@@ -1,4 +1,4 @@
-"""What a command says, and where: findings (or one JSON object) to standard output, progress to error."""
+"""What a command prints, and where: findings or one JSON object to standard output, progress to error."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _WIDE = 200
 
 
 class Output:
-    """Speaks to a person, or collects one JSON object for a program."""
+    """Prints for a person, or collects one JSON object for a program."""
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
@@ -74,7 +74,7 @@ class Output:
         self._data.update(values)
 
     def finish(self) -> None:
-        """Print the JSON object, if that was asked for."""
+        """Print the JSON object, if it was requested."""
         if self.as_json:
             print(json.dumps(_plain(self._data)), flush=True)
 
@@ -91,7 +91,7 @@ class Output:
             self._bars.close()
 
     def ask(self, question: str) -> str:
-        """Ask a person on standard error and return the line answered, empty when input has ended."""
+        """Ask a person on standard error and return the line typed, empty when input has ended."""
         self._bars.close()
         print(question, end="", file=sys.stderr, flush=True)
         return sys.stdin.readline()
@@ -111,7 +111,7 @@ class _Lines:
 
 
 class _Bars:
-    """A bar for each stage, from the first report until something else is said."""
+    """A bar for each stage, from the first report until something else is printed."""
 
     def __init__(self) -> None:
         self._bars: RichBars | None = None
@@ -125,7 +125,7 @@ class _Bars:
         bars.update(self._tasks[stage], completed=done)
 
     def close(self) -> None:
-        """Take the bars away, so that what is said next is not mixed with them."""
+        """Remove the bars, so that they do not mix with what is printed next."""
         if self._bars is not None:
             self._bars.stop()
         self._bars, self._tasks = None, {}
@@ -139,7 +139,7 @@ class _Bars:
         return self._bars
 
     def _make_room(self, bars: RichBars) -> None:
-        """Let finished bars go when there are many."""
+        """Remove finished bars when there are many."""
         if len(self._tasks) < _MOST_BARS:
             return
         done = {task.id for task in bars.tasks if task.finished}
@@ -148,7 +148,7 @@ class _Bars:
 
 
 def _plain(value: Any) -> Any:
-    """A value that every JSON reader takes: no NaN, no infinity, paths as text."""
+    """A value that every JSON reader accepts: no NaN, no infinity, paths as text."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

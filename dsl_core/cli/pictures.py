@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BoardOptions:
-    """What the command line says of the printed board."""
+    """The printed board that the options describe."""
 
     board: str | None
     square_mm: float | None
@@ -26,7 +26,7 @@ class BoardOptions:
     dictionary: str
 
     def build(self) -> Checkerboard | Charuco | None:
-        """The board, None when nothing was said; raises `CalibrationError` when it is impossible."""
+        """The board, None without these options; raises `CalibrationError` when it is impossible."""
         if self.board is None and self.square_mm is None and self.marker_mm is None:
             return None
         if self.board is None or self.square_mm is None:
@@ -36,7 +36,7 @@ class BoardOptions:
 
 @dataclass(frozen=True)
 class PictureOptions:
-    """What the command line says of the pictures and where the outcome goes."""
+    """The pictures that the options describe, and where to write the outcome."""
 
     projector: str
     binning: float
@@ -48,7 +48,7 @@ class PictureOptions:
 
 
 def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, options: PictureOptions) -> None:
-    """Calibrate from a folder of pose folders, print what was found and write it where asked."""
+    """Calibrate from a folder of pose folders, print what was found and write the files requested."""
     from dsl_core.io.published.stereo import save_stereo, stereo_of
     from dsl_core.io.staging import check_targets, write_record
     from dsl_core.workflows.pictures import calibrate_geometry
@@ -68,7 +68,9 @@ def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, option
     if options.xml is not None:
         save_stereo(stereo_of(found), options.xml, overwrite=options.force)
     print_geometry(output, found)
-    output.say(f"Written: {', '.join(map(str, files))}" if files else "Nothing is written without --output.")
+    output.say(
+        f"Written: {', '.join(map(str, files))}" if files else "Nothing was written: --output is not given."
+    )
     output.put(calibration=found.model_dump(mode="json"), files=[str(path) for path in files])
     output.finish()
 
@@ -95,7 +97,9 @@ def _bayer(text: str | None) -> BayerPattern | None:
     match text:
         case None | "RGGB" | "BGGR" | "GRBG" | "GBRG":
             return text
-    raise CalibrationError(f"--bayer must be RGGB, BGGR, GRBG or GBRG, not {text!r}. Leave it out for mono.")
+    raise CalibrationError(
+        f"--bayer must be RGGB, BGGR, GRBG or GBRG, not {text!r}. Leave it out for a monochrome camera."
+    )
 
 
 def print_geometry(output: Output, found: GeometryCalibration) -> None:

@@ -1,4 +1,4 @@
-"""Commands around results: reconstruct, evaluate, export."""
+"""Commands for results: reconstruct, evaluate, export."""
 
 from __future__ import annotations
 
@@ -31,16 +31,18 @@ Result = Annotated[Path, typer.Argument(metavar="RESULT.zarr", help="A result of
 def reconstruct(
     session: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="A complete scan.")],
     target: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Folder to write; SCAN.zarr if not given.")
+        Path | None, typer.Option("--output", "-o", help="Folder to write; the default is SCAN.zarr.")
     ] = None,
     calibration: CalibrationName = None,
     override: OverrideCalibration = False,
     bands: Annotated[str, typer.Option(help="START:STOP:STEP in nm.")] = "430:660:5",
     model: Annotated[str, typer.Option(help="Correspondence: auto, grating, hybrid or grid.")] = "auto",
     solver: Annotated[str, typer.Option(help="best, published, nearest-line or colour-basis.")] = "best",
-    refine: Annotated[bool, typer.Option("--refine/--no-refine", help="Columns below one pixel.")] = True,
-    depth_only: Annotated[bool, typer.Option("--depth-only", help="No spectra.")] = False,
-    device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda where there is one.")] = "cpu",
+    refine: Annotated[
+        bool, typer.Option("--refine/--no-refine", help="Find columns to a fraction of a pixel.")
+    ] = True,
+    depth_only: Annotated[bool, typer.Option("--depth-only", help="Leave out the spectra.")] = False,
+    device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda if available.")] = "cpu",
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -68,7 +70,7 @@ def reconstruct(
             save_result(result, target, overwrite=force)
     output.costs(timer.stages)
     share = coverage(result)
-    output.say(f"{share:.1%} of the pixels have a depth. The result lies in {target}")
+    output.say(f"{share:.1%} of the pixels have a depth. The result is saved in {target}")
     output.put(result=target, pixels_with_depth=share)
     output.finish()
 
@@ -76,16 +78,16 @@ def reconstruct(
 def evaluate(
     path: Result,
     truth_rig: Annotated[
-        str | None, typer.Option(help="Rig that knows the truth, if not the scan's.")
+        str | None, typer.Option(help="Rig that knows the truth; the default is the scan's.")
     ] = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     report: Annotated[
-        Path | None, typer.Option(help="HTML page to write; RESULT.html beside the result if not given.")
+        Path | None, typer.Option(help="HTML page to write; the default is RESULT.html next to the result.")
     ] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Compare a result with known truth, in figures and one self-contained HTML page."""
+    """Compare a result with the known truth, in figures and in one self-contained HTML page."""
     from dsl_core import pipeline
     from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import deviations, figures
@@ -100,7 +102,7 @@ def evaluate(
     evaluation = pipeline.evaluate(result, truth)
     pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
     print_figures(output, evaluation)
-    output.say(f"The report lies in {report}")
+    output.say(f"The report is saved in {report}")
     output.put(report=report, figures=figures(evaluation), deviations=deviations(evaluation))
     output.finish()
 
@@ -110,7 +112,7 @@ def export(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A result; a scan for 'dataset'; a rig's file, scan or name for 'calibration'.",
+            help="A result; a scan for 'dataset'; a rig's file, a scan or a name for 'calibration'.",
         ),
     ],
     form: Annotated[
@@ -118,11 +120,11 @@ def export(
         typer.Argument(metavar="FORMAT", help="ply, envi, exr, csv, png, tiff, npy, dataset or calibration."),
     ],
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
-    pixel: Annotated[list[str], typer.Option(help="x,y of a pixel for csv; may be repeated.")] = [],  # noqa: B006
+    pixel: Annotated[list[str], typer.Option(help="x,y of a pixel, for csv only; may be repeated.")] = [],  # noqa: B006
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Write a result for other programs, or a scan or rig in the published layout."""
+    """Export a result for other programs, or a scan or rig in the published layout."""
     output = Output(json)
     files = _export(output, path, form, target, parse_pixels(pixel), force)
     shown = [str(file) for file in files[:10]] + (["..."] if len(files) > 10 else [])
@@ -144,7 +146,7 @@ def _export(
     from dsl_core.workflows.scans import calibration_of
 
     if pixels and form != "csv":
-        raise PlanError(f"--pixel is for csv; {form} holds all pixels. Leave it out.")
+        raise PlanError(f"--pixel is for csv only; {form} contains all pixels. Leave it out.")
     if form == "dataset":
         with output.progress() as progress:
             return exchange.export_scan(path, target, force, progress)
@@ -163,12 +165,12 @@ def coverage(result: xr.Dataset) -> float:
 
 
 def print_figures(output: Output, evaluation: Evaluation) -> None:
-    """Every figure of an evaluation, one a line."""
+    """Every figure of an evaluation, one per line."""
     from dsl_core.evaluation.verdict import verdicts
 
     output.table(("figure", "value", "unit"), [(v.figure, v.words, v.unit) for v in verdicts(evaluation)])
 
 
-def _require_one_of(option: str, given: str, wanted: tuple[str, ...]) -> None:
-    if given not in wanted:
-        raise PlanError(f"{option} must be one of {', '.join(wanted)}, not {given!r}.")
+def _require_one_of(option: str, given: str, choices: tuple[str, ...]) -> None:
+    if given not in choices:
+        raise PlanError(f"{option} must be one of {', '.join(choices)}, not {given!r}.")

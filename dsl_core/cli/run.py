@@ -1,4 +1,4 @@
-"""From a command line to an exit code: what goes wrong becomes a sentence, never a traceback unasked."""
+"""From a command line to an exit code: an error becomes a sentence, and a traceback only on request."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WrongUse: type[BaseException] = typer.BadParameter.__mro__[2]
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit code."""
     debug = "--debug" in arguments
-    # A global option may stand anywhere, also behind the command.
+    # A global option may be anywhere, also after the command.
     arguments = [a for a in arguments if a != "--debug"]
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
     if not debug:
@@ -65,16 +65,16 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return (error.code if isinstance(error.code, int) else BUG), ""
     return BUG, (
         f"This is a bug in dsl-scan ({type(error).__name__}: {error})."
-        " Give the command again with --debug and report what it prints."
+        " Run the command again with --debug and report what it prints."
     )
 
 
 def _usage(error: BaseException) -> str:
-    """What was wrong with the command line, and which help to ask for."""
+    """What was wrong with the command line, and which help to read."""
     message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "dsl-scan"
-    return f"{message.rstrip('.')}. '{command} --help' lists what is possible."
+    return f"{message.rstrip('.')}. See '{command} --help'."
 
 
 def _of_system(error: OSError) -> str:
@@ -92,6 +92,6 @@ def _complain(code: int, sentence: str, kind: str, as_json: bool) -> int:
 
 
 def _leave_quietly() -> int:
-    """The reader of our output went away, as ``head`` does: not a fault."""
+    """The reader of our output has closed it, as ``head`` does: not an error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return OK

@@ -1,4 +1,4 @@
-"""Commands around capture: rigs, scenes, plan, scan, resume."""
+"""Commands for capture: rigs, scenes, plan, scan, resume."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 
 def rigs(json: Json = False) -> None:
-    """List the rigs that are installed, and their options."""
+    """List the installed rigs and their options."""
     from dataclasses import asdict
 
     from dsl_core.devices.registry import list_rigs
@@ -79,7 +79,7 @@ def plan(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Write down what to capture, with frames, minutes and bytes."""
+    """Write a plan of what to capture; show its frames, minutes and bytes."""
     from dsl_core.capture.preflight import require_possible
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
@@ -92,7 +92,9 @@ def plan(
         require_possible(devices, made)
         _state(output, made, target.parent, devices)
     save_plan(made, target, overwrite=force)
-    output.say(f"The plan lies in {target}. Next: dsl-scan scan SCAN.dsl --plan {target} and the same rig.")
+    output.say(
+        f"The plan is saved in {target}. Next: dsl-scan scan SCAN.dsl --plan {target} and the same rig."
+    )
     output.put(plan=target)
     output.finish()
 
@@ -112,7 +114,7 @@ def scan(
     tolerance: Tolerance = None,
     json: Json = False,
 ) -> None:
-    """Capture a plan; every frame is safe on disk before the next is taken."""
+    """Capture a plan; every frame is stored on disk before the next is taken."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
     from dsl_core.io import MANIFEST_NAME
@@ -122,8 +124,8 @@ def scan(
     choice = PlanChoice(plan, code, lines, comb, setting).build()
     if (target / MANIFEST_NAME).exists():
         raise StoreError(
-            f"{target} already holds a scan."
-            f" Go on with it by 'dsl-scan resume {target}', or choose a new name."
+            f"{target} already contains a scan."
+            f" Resume it with 'dsl-scan resume {target}', or choose a new name."
         )
     with open_rig(rig, options) as devices:
         calibrated, overridden = _calibrate(output, devices, calibration, override)
@@ -138,14 +140,16 @@ def scan(
 
 def resume(
     target: Annotated[Path, typer.Argument(metavar="SCAN.dsl", help="Folder of the scan.")],
-    rig: Annotated[str | None, typer.Option("--rig", help="Another rig than the one the scan notes.")] = None,
+    rig: Annotated[
+        str | None, typer.Option("--rig", help="Rig to use instead of the one recorded in the scan.")
+    ] = None,
     option: RigOptions = [],  # noqa: B006
     drift: Annotated[
-        bool, typer.Option("--drift-check/--no-drift-check", help="Compare two old frames before going on.")
+        bool, typer.Option("--drift-check/--no-drift-check", help="Compare two old frames before resuming.")
     ] = True,
     json: Json = False,
 ) -> None:
-    """Go on with a scan that was stopped, or killed, at its next missing frame."""
+    """Resume a scan that was stopped or killed, at its next missing frame."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.workflows import scans
 
@@ -212,10 +216,10 @@ def _done(output: Output, target: Path, frames: int, seconds: float) -> None:
 
 @contextmanager
 def _resumable(target: Path) -> Iterator[None]:
-    """Ctrl-C ends in the command that goes on."""
+    """Turn Ctrl-C into a sentence with the command that resumes."""
     try:
         yield
     except (KeyboardInterrupt, Cancelled):
         raise Cancelled(
-            f"Stopped; every frame taken so far is stored. Go on with: dsl-scan resume {target}"
+            f"Stopped; every frame taken so far is stored. Resume with: dsl-scan resume {target}"
         ) from None

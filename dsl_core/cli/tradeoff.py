@@ -1,4 +1,4 @@
-"""Commands about what accuracy costs in time: tradeoff, design."""
+"""Commands that weigh accuracy against time: tradeoff, design."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 
 def tradeoff(
     budget: Annotated[
-        str | None, typer.Option("--budget", help="Most time for the capture, like 60s or 2min.")
+        str | None, typer.Option("--budget", help="Longest time for the capture, like 60s or 2min.")
     ] = None,
     error: Annotated[
-        float | None, typer.Option("--error", help="Reflectance error of a pixel that is good enough.")
+        float | None, typer.Option("--error", help="Reflectance error of a pixel that is accurate enough.")
     ] = None,
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     calibration: CalibrationName = None,
     look: Annotated[
-        Path | None, typer.Option("--look", help="Result of a quick scan of the scene, to plan for it.")
+        Path | None, typer.Option("--look", help="Result of a quick scan of the scene to plan for.")
     ] = None,
-    plan: Annotated[Path | None, typer.Option("--plan", help="Write the chosen plan into this file.")] = None,
-    report: Annotated[Path | None, typer.Option("--report", help="Write all plans as a page.")] = None,
+    plan: Annotated[Path | None, typer.Option("--plan", help="Write the chosen plan to this file.")] = None,
+    report: Annotated[Path | None, typer.Option("--report", help="Write all plans as an HTML page.")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Choose the plan that is most accurate in a budget of time, or quickest for an error; predicted."""
+    """Choose the plan predicted to be most accurate in a time budget, or fastest for an error."""
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
     from dsl_core.planning.choice import choose, pareto, possible_plans, weigh
@@ -60,18 +60,20 @@ def tradeoff(
     if plan is not None:
         save_plan(chosen.plan, plan, overwrite=force)
         output.put(plan_file=plan)
-        output.say(f"The plan lies in {plan}. Next: dsl-scan scan SCAN.dsl --plan {plan} and the same rig.")
+        output.say(
+            f"The plan is saved in {plan}. Next: dsl-scan scan SCAN.dsl --plan {plan} and the same rig."
+        )
     output.finish()
 
 
 def design(
     target: Annotated[Path, typer.Argument(metavar="SET.json", help="File to write.")],
-    frames: Annotated[int, typer.Option("--frames", help="How many patterns, 8 to 160.")] = 32,
+    frames: Annotated[int, typer.Option("--frames", help="Number of patterns, 8 to 160.")] = 32,
     rig: RigName = "twin",
     option: RigOptions = [],  # noqa: B006
     calibration: CalibrationName = None,
     orders: Annotated[
-        int, typer.Option("--orders", help="Orders tried of the best lines; more take longer.", min=1)
+        int, typer.Option("--orders", help="Orderings of the best lines to try; more take longer.", min=1)
     ] = 24,
     plan: Annotated[
         Path | None, typer.Option("--plan", help="Also write a plan with these patterns.")
@@ -79,7 +81,7 @@ def design(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Design patterns for a calibrated rig: the least expected error for so many frames."""
+    """Design patterns for a calibrated rig: the least expected error for a number of frames."""
     from dsl_core.capture.preflight import require_possible
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
@@ -93,7 +95,7 @@ def design(
         known = _calibration(devices, calibration)
         base = sized(CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False)), known)
         if plan is not None:
-            require_possible(replace(devices, calibration=None), base)  # told before the search
+            require_possible(replace(devices, calibration=None), base)  # reported before the search
     with output.progress() as progress:
         found = search(known, base, frames, orders=orders, progress=progress)
     made = DesignedSet(
@@ -109,8 +111,8 @@ def design(
     )
     save_design(made, target, overwrite=force)
     output.say(
-        f"{frames} patterns lie in {target}: {made.lines}; expected error {made.error:.4f},"
-        f" of the best comb {made.comb_error:.4f}."
+        f"{frames} patterns are saved in {target}: {made.lines}; expected error {made.error:.4f},"
+        f" {made.comb_error:.4f} with the best comb."
     )
     output.put(set=target, lines=made.lines, comb_error=made.comb_error, error=made.error)
     if plan is not None:
@@ -142,7 +144,7 @@ def _calibration(devices: DeviceRig, name: str | None) -> Rig:
     known = load_calibration(name) if name else devices.calibration
     if known is None:
         raise CalibrationError(
-            f"The rig {devices.name!r} has no calibration to predict from. Name one with --calibration."
+            f"The rig {devices.name!r} has no calibration to predict with. Name one with --calibration."
         )
     return known
 
@@ -169,7 +171,7 @@ def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
         )
         for each in front
     ]
-    output.say("Plans that none beats in both time and expected error:")
+    output.say("Plans that no other beats in both time and expected error:")
     output.table(("", "plan", "frames", "s", "error of a pixel", "angle rad", "depth mm"), rows)
     e = chosen.expected
     output.say(

@@ -165,7 +165,7 @@ CASES = (
         "pose of another rig among these",
         "geometry, before anything is captured",
         ("geometry",),
-        r"Pose 2 is captured anew: .* the camera's serial number was TWIN-C5 and is TWIN-C4",
+        r"Pose 2 is captured again: .* the camera's serial number was TWIN-C5 and is TWIN-C4",
         prepare=_pose_of_another_rig,
         code=0,
         touched=("geometry", "geometry.json"),
@@ -218,7 +218,7 @@ CASES = (
         "wrong filter",
         "look through the filter",
         _redo("bandpass", "filter-450"),
-        r"'Filter of 450 nm' does not look right: filter by its colours .* nm from the one asked for",
+        r"'Filter of 450 nm' does not look right: filter by its colours .* nm from the one requested",
         {"wrong_filter_nm": "600"},
     ),
     BadInput(

@@ -195,7 +195,7 @@ def test_frames_that_show_nothing(
         ("scan", "Missing argument 'SCAN.dsl'"),
         ("scan a.dsl --rigg twin", "No such option: --rigg"),
         ("scan a.dsl --rig twinn", "no rig 'twinn'; installed rigs: "),
-        ("scan a.dsl -o scene", "must be like key=value"),
+        ("scan a.dsl -o scene", "must be key=value"),
         ("scan a.dsl -o scene=plane -o scene=box", "is given twice"),
         ("scan a.dsl -o scene=plain", "no scene 'plain'"),
         ("scan a.dsl -o sise=112x72", "no option sise"),
@@ -203,7 +203,7 @@ def test_frames_that_show_nothing(
         ("scan a.dsl -o noise=maybe", "must be 'on' or 'off'"),
         ("scan a.dsl -o size=112x72 --lines 5", "--lines must be WIDTHxSTEP"),
         ("scan a.dsl -o size=112x72 --lines 5x9", "leave columns between them dark"),
-        ("scan a.dsl -o size=112x72 --lines 5x2 --comb 5x2x50", "exclude each other"),
+        ("scan a.dsl -o size=112x72 --lines 5x2 --comb 5x2x50", "cannot be combined"),
         ("scan a.dsl -o size=112x72 --comb 50x2x50", "narrower than its period"),
         ("scan a.dsl -o size=112x72 --code rows", "one of full, columns, xor-04"),
         ("scan a.dsl -o size=112x72 --setting 100", "--setting must be EXPOSURE_MS@LEVEL"),
@@ -276,7 +276,7 @@ def test_a_bug_is_called_one(give: Give, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_a_result_is_not_replaced_unasked(give: Give, finished: Path) -> None:
     before = (finished / "scan.zarr" / "zarr.json").stat().st_mtime_ns
     assert "exists already" in give("reconstruct", finished / "scan.dsl").sentence
-    assert "already holds a scan" in give("scan", finished / "scan.dsl", *SMALL_RIG).sentence
+    assert "already contains a scan" in give("scan", finished / "scan.dsl", *SMALL_RIG).sentence
     assert (finished / "scan.zarr" / "zarr.json").stat().st_mtime_ns == before
 
 

@@ -102,7 +102,7 @@ def test_an_interrupted_campaign_goes_on(give: Give, tmp_path: Path, monkeypatch
     monkeypatch.setattr(fake_recipe.FakeRecipe, "capture", stop)
     ending = give("calibrate", "all", folder, *TWIN, "--yes")
     assert ending.code == 130
-    assert f"Go on with: dsl-scan calibrate all {folder}" in ending.sentence
+    assert f"Resume with: dsl-scan calibrate all {folder}" in ending.sentence
     first = (folder / "selftest" / "dim" / "scan.dsl" / "manifest.json").stat().st_mtime_ns
     monkeypatch.setattr(fake_recipe.FakeRecipe, "capture", capture)
     ending = give("calibrate", "all", folder, "--yes", "--json")
@@ -119,12 +119,12 @@ def test_a_person_is_asked_to_place_and_to_look_again(
     ending = give("selftest", folder, *TWIN)
     assert ending.code == 2
     assert "Place the dim target. Then press Enter" in ending.err
-    assert "Nobody answers" in ending.err
+    assert "There is no answer" in ending.err
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n\ngo\n"))
     ending = give("selftest", folder, *TWIN, "--set", "good_look=4", "--json")
     assert ending.code == 0, ending.err
     # Enter for the first target and two more looks; by the second look at the second target it is right.
-    assert ending.err.count("Move the target closer. Enter looks again") == 3
+    assert ending.err.count("Move the target closer. Press Enter to look again") == 3
     assert ending.json["name"] == "selftest"
 
 
@@ -175,9 +175,9 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
         (["selftest", "--set", "good_look=many"], "The setting good_look of selftest is wrong"),
         (["selftest", "c", "--rig", "nothing"], "There is no rig 'nothing'"),
         (["selftest", "c", "-o", "size=1x1"], "The twin's size must be"),
-        (["calibrate", "geometry", "c", "--output", "x.json"], "--output and --xml go with --pictures"),
+        (["calibrate", "geometry", "c", "--output", "x.json"], "--output and --xml need --pictures"),
         (["calibrate", "geometry", "c", "--board", "9x7"], "A board needs both"),
-        (["calibrate", "all", "c", "--set", "scale=3"], "a calibration's name first, not scale=3"),
+        (["calibrate", "all", "c", "--set", "scale=3"], "like bandpass.line_px=5, not scale=3"),
         (["calibrate", "all", "c", "--set", "geometry.colour=3"], "geometry has no setting colour"),
         (["calibrate", "bandpass", "c"], "There is no calibration 'bandpass'; choose selftest, geometry"),
     ],

@@ -89,4 +89,4 @@ def test_a_quick_shot_says_whether_the_rig_has_changed(give: Give, library: Cali
     library.store("lab", calibrated(1.1))
     ending = give("calibrations", "check", "lab", "--yes", *PLANE)
     assert ending.code == 2
-    assert "The rig is not as lab says: white signal, red" in ending.sentence
+    assert "The rig no longer matches lab: white signal, red" in ending.sentence

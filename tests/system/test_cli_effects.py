@@ -13,7 +13,7 @@ from dsl_core.io.scan.manifest import read_manifest
 SMALL = ["-o", "size=64x42"]
 
 
-def test_effects_says_what_a_scene_calls_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_effects_says_what_a_scene_needs(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["effects", "--scene", "wax", *SMALL, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     on = {effect["name"]: effect["on"] for effect in found["effects"]}
@@ -24,7 +24,7 @@ def test_effects_says_what_a_scene_calls_for(capsys: pytest.CaptureFixture[str])
     assert main(["effects", "--scene", "plane", *SMALL]) == 0
     text = capsys.readouterr().out
     assert "No surface in view faces another." in text
-    assert "with everything" in text
+    assert "with all effects" in text
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_an_interrupted_scan_says_how_to_resume_and_does(
     code, complaint = _interrupted(["scan", str(scan), *SCAN], scan / "frames.jsonl", lines)
     assert code == 130, complaint
     assert without_progress(complaint).count("\n") == 1, complaint
-    assert f"Go on with: dsl-scan resume {scan}" in complaint
+    assert f"Resume with: dsl-scan resume {scan}" in complaint
     assert lines <= FRAMES - len(ScanReader(scan).missing()) < FRAMES
     assert give("reconstruct", scan).code == 2
     assert give("resume", scan, "--json").json["state"] == "finished"
