@@ -109,7 +109,7 @@ def _maps(rig: Rig, code: DecodedCode, white: MergedFrame) -> tuple[Floats, Floa
     """Decoded columns and rows, and depth (mm), NaN where unknown, each (rows, columns)."""
     import torch
 
-    from dsl_core.reconstruction.depth import triangulate
+    from dsl_core.optics.correspondence import triangulate
     from dsl_core.reconstruction.geometry import LIT_SIGMAS
 
     assert code.row is not None

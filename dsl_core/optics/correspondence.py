@@ -23,6 +23,8 @@ from dsl_core.optics.pinhole import pixel_rays, project
 
 #: Chebyshev nodes over the wavelength range; the interpolation error stays below 1e-3 px.
 NODES = 6
+#: Steps that refine a triangulated depth.
+NEWTON_STEPS = 4
 #: Pixels solved at once.
 CHUNK = 8192
 
@@ -69,6 +71,41 @@ def projector_points(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> Vectors:
 def zero_order(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tensor]:
     """Projector column and row (px) of the zero order: conventional structured light, seed Eq. (11)."""
     return project(rig.projector, *projector_points(rig, pixels, depth_mm))
+
+
+def triangulate(rig: Rig, pixels: Tensor, column_px: Tensor) -> tuple[Tensor, Tensor]:
+    """Depth (mm) at flat pixel indices from projector columns (px), and its slope (mm per px).
+
+    The start is the closed form without projector distortion (seed Eqs. 9 to 11 solved for z); Newton
+    steps with the full model follow. NaN where ray and column do not meet in front of the camera.
+    """
+    z = _closed_form(rig, pixels, column_px)
+    low, high = rig.depth_range_mm
+    z = z.clip(0.3 * low, 3 * high)
+    for _ in range(NEWTON_STEPS):
+        here, slope = _column_and_slope(rig, pixels, z)
+        # A column is nearly linear in inverse depth, whatever the baseline: Newton's step is taken there.
+        nearer = 1 + (here - column_px) / (slope * z)
+        z = (z / nearer.clip(min=0.01)).clip(0.1 * low, 10 * high)
+    here, slope = _column_and_slope(rig, pixels, z)
+    met = (here - column_px).abs() < 0.01
+    return torch.where(met, z, torch.nan), 1 / slope.abs()
+
+
+def _column_and_slope(rig: Rig, pixels: Tensor, z: Tensor) -> tuple[Tensor, Tensor]:
+    """Zero-order column (px) at a depth and its change per mm."""
+    here = zero_order(rig, pixels, z)[0]
+    ahead = zero_order(rig, pixels, z + 1.0)[0]
+    slope = ahead - here
+    return here, torch.where(slope.abs() < 1e-6, torch.full_like(slope, -1e-6), slope)
+
+
+def _closed_form(rig: Rig, pixels: Tensor, column_px: Tensor) -> Tensor:
+    far = projector_points(rig, pixels, torch.ones_like(column_px))
+    tx, _, tz = rig.pose.translation_mm
+    ray_x, ray_z = far.x - tx, far.z - tz
+    u = (column_px - rig.projector.cx_px) / rig.projector.fx_px
+    return (u * tz - tx) / (ray_x - u * ray_z)
 
 
 def chebyshev_nodes(start_nm: float, stop_nm: float, count: int = NODES) -> NDArray[np.float64]:

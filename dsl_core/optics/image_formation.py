@@ -43,6 +43,11 @@ class OrderPath:
     band_px: float
 
 
+def one_if_grey(profiles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Profiles (frames, width, LEDs) of one LED for all, where patterns are grey."""
+    return profiles[..., :1] if bool((profiles == profiles[..., :1]).all()) else profiles
+
+
 class BlurredProfiles:
     """Column profiles of a pattern set, blurred, looked up at columns."""
 
@@ -82,9 +87,9 @@ class ImageFormation:
         shading: Tensor,
     ) -> None:
         """``profiles`` (frames, width, LEDs): radiance relative to full drive; ``shading`` is (pixels,)."""
-        if bool((profiles == profiles[..., :1]).all()):
+        profiles = one_if_grey(profiles)
+        if profiles.shape[2] == 1:
             # Grey patterns light all LEDs alike: one stands for their sum.
-            profiles = profiles[..., :1]
             paths = [replace(path, moments=path.moments.sum(1, keepdims=True)) for path in paths]
         self.paths, self.shading, self.frames = paths, shading, len(profiles)
         self.bands = max(path.moments.shape[2] for path in paths)
@@ -97,7 +102,7 @@ class ImageFormation:
         out = torch.zeros(
             (3, self.frames, len(self.shading)), device=reflectance.device, dtype=reflectance.dtype
         )
-        for bands, light, moments in self._terms():
+        for bands, light, moments in self.terms():
             # Response of each LED to the reflectance of these bands, (3, LEDs, pixels).
             seen = torch.einsum("clj,jp->clp", moments, reflectance[bands])
             out += torch.einsum("clp,plf->cfp", seen, light)
@@ -106,7 +111,7 @@ class ImageFormation:
     def adjoint(self, signals: Tensor) -> Tensor:
         """The transposed operator: from (3, frames, pixels) to (bands, pixels)."""
         out = torch.zeros((self.bands, len(self.shading))).to(signals)
-        for bands, light, moments in self._terms():
+        for bands, light, moments in self.terms():
             seen = torch.einsum("cfp,plf->clp", signals, light)
             out[bands] += torch.einsum("clj,clp->jp", moments, seen)
         return out
@@ -114,11 +119,11 @@ class ImageFormation:
     def matrix(self) -> Tensor:
         """The operator of each pixel, (pixels, 3, frames, bands)."""
         out = torch.zeros((len(self.shading), 3, self.frames, self.bands)).to(self.shading)
-        for bands, light, moments in self._terms():
+        for bands, light, moments in self.terms():
             out[..., bands] += torch.einsum("plf,clj->pcfj", light, moments)
         return out
 
-    def _terms(self) -> Iterator[tuple[slice, Tensor, Tensor]]:
+    def terms(self) -> Iterator[tuple[slice, Tensor, Tensor]]:
         """Bands that share a column, their light (pixels, LEDs, frames) with shading, their moments."""
         for path in self.paths:
             moments, blurred = like(path.moments, self.shading), self._light[path.band_px]

@@ -1,12 +1,27 @@
-"""Spectral response of the whole chain: LED emission, film efficiency, camera response."""
+"""Spectral response of the whole chain (LED emission, film efficiency, camera) and the bands of a model."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
 
+if TYPE_CHECKING:
+    from torch import Tensor
+
+ORDERS = (1, -1)
+#: Orders of a few percent of the first: lines are too far away to mix with them, free patterns are not.
+SECOND_ORDERS = (2, -2)
+#: Internal bands beyond each end of the grid.
+PAD_NM = 15.0
+#: Bands are as wide in columns as their dispersion to this, px per nm, so that pixels share tables of light.
+SLOPE_STEP = 0.02
 #: Light this far beyond the bands still counts in the zero order.
 BEYOND_NM = 40.0
 
@@ -58,3 +73,41 @@ def _beyond(rig: Rig, end_nm: float, side: int, step_nm: float) -> NDArray[np.fl
     distance_nm = np.arange(0, BEYOND_NM, 0.25)
     outside = np.clip(distance_nm / step_nm, 0, 1)
     return np.asarray((chain_response(rig, 0, end_nm + side * distance_nm) * outside).sum(-1) * 0.25)
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Internal bands of a forward model and the response of each order there."""
+
+    centres_nm: NDArray[np.float64]
+    step_nm: float
+    reported: slice
+    moments: dict[int, NDArray[np.float64]]  # order -> (3 channels, 3 LEDs, bands), DN per ms
+    centroids_nm: dict[int, NDArray[np.float64]]
+
+    @classmethod
+    def of(cls, rig: Rig, grid: WavelengthGrid) -> Bands:
+        """Extend a grid and integrate the rig's response over its bands."""
+        pad = math.ceil(PAD_NM / grid.step_nm)
+        step = grid.step_nm
+        centres = np.asarray(grid.start_nm + step * np.arange(-pad, grid.count + pad), np.float64)
+        moments, centroids = {}, {}
+        for order in (0, *ORDERS, *SECOND_ORDERS):
+            moments[order], centroids[order] = hat_moments(rig, order, centres, step)
+        return cls(centres, step, slice(pad, pad + grid.count), moments, centroids)
+
+    @property
+    def count(self) -> int:
+        """Number of internal bands."""
+        return len(self.centres_nm)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """First orders, and second ones where the rig knows their efficiency."""
+        return ORDERS + tuple(m for m in SECOND_ORDERS if self.moments[m].any())
+
+    def half_width_px(self, columns_px: Tensor) -> float:
+        """Half width (px) of a band's triangle: mean dispersion of columns (bands, pixels), in steps."""
+        span_nm = float(self.centres_nm[-1] - self.centres_nm[0])
+        slope = float((columns_px[-1] - columns_px[0]).abs().mean()) / span_nm
+        return max(round(slope / SLOPE_STEP), 1) * SLOPE_STEP * self.step_nm

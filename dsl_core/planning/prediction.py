@@ -19,13 +19,13 @@ from dsl_core.model.base import Record
 from dsl_core.model.plan import CapturePlan, NoSpectral
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import Bands
 from dsl_core.planning import references
 from dsl_core.planning.references import References
 from dsl_core.planning.views import View, plane_view
 from dsl_core.planning.virtual import Outcome, VirtualPixels
-from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
-from dsl_core.reconstruction.spectral.system import Bands
 from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]
@@ -225,6 +225,6 @@ def core_seconds_per_megapixel(plan: CapturePlan, grid: WavelengthGrid) -> float
     """
     share = grid.count / BANDS
     lines = LineSet.of(plan)
-    if lines is not None and lines.lines == lines.frames:
+    if lines is not None and lines.single:
         return LINES_S * share + EXPOSURE_S * plan.shot_count
     return (DENSE_S + PATTERN_S * plan.spectral_count) * share**2

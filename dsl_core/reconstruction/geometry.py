@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import DEPTH_INVALID, Flag
 from dsl_core.model.rig import Rig
+from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
@@ -17,7 +18,6 @@ from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_d
 from dsl_core.reconstruction.columns.maps import WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
-from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.surface import Surface, reconstruct_surface
 

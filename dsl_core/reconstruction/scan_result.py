@@ -13,7 +13,8 @@ from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.reconstruction.geometry import Geometry
-from dsl_core.reconstruction.spectral.spectra import Pixels, SpectralMaps
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
 
 if TYPE_CHECKING:
     import xarray as xr

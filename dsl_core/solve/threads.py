@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import torch
+
+_lock = threading.Lock()
+#: How deep each thread is in such blocks; how many threads are; and what torch had before the first came.
+_own, _threads, _before = threading.local(), 0, 1
 
 
 @contextmanager
@@ -14,10 +19,38 @@ def one_kernel_thread() -> Iterator[None]:
 
     Kernels of a millisecond lose more by meeting at barriers than they gain by sharing: a little on a quiet
     machine, a factor of ten and more on a busy one, where waiting threads keep the cores from working ones.
+    Blocks may be nested, and may overlap in several threads: the last to end restores what was there before
+    the first began.
     """
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
+    _enter()
     try:
         yield
     finally:
-        torch.set_num_threads(before)
+        _leave()
+
+
+def _enter() -> None:
+    global _threads, _before
+    with _lock:
+        _own.depth = getattr(_own, "depth", 0) + 1
+        if _own.depth > 1:
+            return
+        if _threads == 0:
+            _before = torch.get_num_threads()
+        _threads += 1
+        torch.set_num_threads(1)
+
+
+def _leave() -> None:
+    global _threads
+    with _lock:
+        _own.depth -= 1
+        if _own.depth > 0:
+            return
+        _threads -= 1
+        # Torch keeps a number for each thread that has called it, and one for threads still to come.
+        torch.set_num_threads(_before)
+        if _threads > 0:
+            later = threading.Thread(target=torch.set_num_threads, args=(1,))
+            later.start()
+            later.join()

@@ -184,11 +184,9 @@ def _expected(
     from dsl_core.io.scan.origin import model_of_notes
     from dsl_core.model.spectral import WavelengthGrid
     from dsl_core.optics.correspondence import correspondence
-    from dsl_core.optics.image_formation import ImageFormation, OrderPath
-    from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
-    from dsl_core.reconstruction.line_set import LineSet
-    from dsl_core.reconstruction.spectral.spectra import EDGE_PX
-    from dsl_core.reconstruction.spectral.system import ORDERS, Bands, band_halfwidth_px
+    from dsl_core.optics.pixel_model import demosaic_blur_px
+    from dsl_core.optics.spectra import ORDERS
+    from dsl_core.reconstruction.spectral.spectra import model_of_plan
 
     depth, column = (float(result.at(name, pixel)) for name in ("depth_mm", "column_px"))
     if not (np.isfinite(depth) and np.isfinite(column)):
@@ -196,44 +194,24 @@ def _expected(
     rig, nm = block.rig, result.wavelengths_nm
     step = float(nm[1] - nm[0]) if len(nm) > 1 else 5.0
     grid = WavelengthGrid(start_nm=nm[0], stop_nm=nm[-1], step_nm=step) if len(nm) > 1 else WavelengthGrid()
-    bands, lines = Bands.of(rig, grid), LineSet.of(block.plan)
-    single = lines is not None and lines.frames == lines.lines
-    size = block.plan.projector_size_px
-    flat = torch.tensor([pixel[1] * result.shape[1] + pixel[0]])
-    distance, column_px = torch.tensor([depth]), torch.tensor([[column]])
-    model, orders = correspondence(rig, model_of_notes(result.attributes)[1]), {}
-    paths = [OrderPath(column_px, torch.ones_like(column_px, dtype=torch.bool), bands.moments[0], 0.0)]
-    for order in ORDERS:
-        seen = model.trace(flat, distance, order, bands.centroids_nm[order])
-        half = band_halfwidth_px(seen.columns, step, bands.centres_nm)
-        paths.append(
-            OrderPath(seen.columns, seen.inside(*size, margin_px=EDGE_PX), bands.moments[order], half)
-        )
-        if single and lines is not None:
-            shown = model.trace(flat, distance, order, grid.centres_nm)
-            frame = (shown.columns - lines.first_px) / lines.step_px
-            orders[order] = np.where(shown.inside(*size), frame, np.nan)[:, 0].astype(np.float64)
-    zero = (column - lines.first_px) / lines.step_px if single and lines is not None else None
+    model = model_of_plan(rig, block.plan, grid, correspondence(rig, model_of_notes(result.attributes)[1]))
+    flat = pixel[1] * result.shape[1] + pixel[0]
+    place = torch.tensor([flat]), torch.tensor([depth], dtype=torch.float64)
+    traced = model.trace(*place, torch.tensor([column], dtype=torch.float64))
+    zero, orders = None, {}
+    if model.single and model.lines is not None:
+        zero = model.lines.position(column)
+        for order in ORDERS:
+            seen = model.correspondence.trace(*place, order, grid.centres_nm)
+            frame = model.lines.position(seen.columns)
+            inside = model.inside(seen, margin_px=0.0)
+            orders[order] = np.where(inside, frame, np.nan)[:, 0]
     spectrum = result.at("reflectance", pixel) if result.has_spectra else np.array([np.nan])
     shading = float(result.at("shading", pixel)) if "shading" in result.arrays else np.nan
     if not np.isfinite(spectrum).all() or not np.isfinite(shading):
         return None, zero, orders
-    # Demosaicing averages neighbours, which widens every line a little more.
-    blur_px = float(np.hypot(rig.projector_response.blur_px, _demosaic_blur_px(result, pixel)))
-    response = rig.projector_response.model_copy(update={"blur_px": blur_px})
-    profiles = radiance_profiles(rig, block.plan)
-    formation = ImageFormation(response, profiles, paths, torch.tensor([shading]))
-    reflectance = np.interp(bands.centres_nm, nm, spectrum).astype(np.float32)
-    signals = formation.forward(torch.as_tensor(reflectance)[:, None])[..., 0]
-    return signals.double().numpy(), zero, orders
-
-
-def _demosaic_blur_px(result: ResultArrays, pixel: tuple[int, int]) -> float:
-    """Spread of the projector columns that demosaicing averages around a pixel, px."""
-    from dsl_core.reconstruction.spectral.spectra import DEMOSAIC_SPREAD
-
     x, y = pixel
-    near = result["column_px"][max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3]
-    change = np.abs(np.diff(near, axis=1))
-    finite = change[np.isfinite(change)]
-    return float(np.sqrt(DEMOSAIC_SPREAD) * np.median(finite)) if finite.size else 0.0
+    blur_px = demosaic_blur_px(result["column_px"][max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3])
+    reflectance = np.interp(model.bands.centres_nm, nm, spectrum)
+    operator = model.operator(traced, torch.tensor([shading], dtype=torch.float64), blur_px)
+    return operator.forward(torch.as_tensor(reflectance)[:, None])[..., 0].numpy(), zero, orders

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-import torch
-
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.rig import Rig
 from dsl_core.simulation.published_rig import published_rig
@@ -34,14 +29,3 @@ def cropped_twin(scene: str, corner_px: tuple[int, int], size_px: tuple[int, int
     """The twin with all its effects, looking at a window of a scene."""
     setup = Setup(cropped_rig(corner_px, size_px))
     return assemble(World(setup, scene_at=lambda position_mm: make_scene(scene)))
-
-
-@contextmanager
-def one_torch_thread() -> Iterator[None]:
-    """Small images are rendered several times faster without handing pieces to other threads."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

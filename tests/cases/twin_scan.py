@@ -15,7 +15,7 @@ from dsl_core.pipeline import fit_plan
 from dsl_core.reconstruction.geometry import reconstruct_geometry
 from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
 from dsl_core.reconstruction.scan_result import known_pixels
-from dsl_core.reconstruction.spectral.spectra import Pixels
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.sim_devices import open_twin
 
 

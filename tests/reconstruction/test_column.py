@@ -8,12 +8,11 @@ import torch
 
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
 from dsl_core.model.rig import ProjectorResponse, Rig
-from dsl_core.optics.correspondence import zero_order
+from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.reconstruction.columns.column import dark_offset, halo_of_line, refine
-from dsl_core.reconstruction.depth import triangulate
-from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scenes.catalogue import make_scene

@@ -9,21 +9,22 @@ import torch
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, ScanLines, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.image_formation import BlurredProfiles
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.image_formation import BlurredProfiles, one_if_grey
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.spectra import Bands
 from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.noise import own_channel
 from dsl_core.planning.views import plane_view
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.reconstruction.columns.column import Column
-from dsl_core.reconstruction.columns.first_orders import first_order_share
 from dsl_core.reconstruction.columns.pattern_column import (
-    one_if_grey,
+    first_order_share,
     radiance_profiles,
     refine_by_profiles,
     rounding_error,
 )
-from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.spectral.system import Bands, direct_light
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.small_rig import small_rig
 
@@ -118,9 +119,9 @@ def test_an_led_that_is_dark_spoils_no_frame() -> None:
     plan = CapturePlan(
         spectral=LineComb(width_px=6, step_px=4, period_px=96, shifts_px=(0, 32, 64)), code=GrayCode()
     )
-    light = BlurredProfiles(rig.projector_response, radiance_profiles(rig, plan), 0.0, torch.zeros(1))
+    model = PixelModel(rig, bands, radiance_profiles(rig, plan), correspondence(rig))
     white = torch.as_tensor(bands.moments[0].sum((1, 2)), dtype=torch.float32)[:, None]
-    found = direct_light(light, bands, torch.tensor([2.5]), white)
+    found = model.direct_light(model.zero_light(white), torch.tensor([2.5]), white)
     red, blue = found[0, :, 0] / white[0], found[2, :, 0] / white[2]
     assert float(red[0]) > 0.5
     assert float(blue[0]) < 0.1

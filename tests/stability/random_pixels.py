@@ -13,8 +13,9 @@ from torch import Tensor
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.spectral.system import ORDERS, BandedAccumulator, Bands
+from dsl_core.optics.line_equations import LineEquations
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.banded import factorise, multiply
 from tests.stability.double_double import Floats
@@ -35,12 +36,12 @@ def random_equations(count: int, seed: int, dtype: torch.dtype) -> Equations:
     noise = np.geomspace(6e-3, 6, 64)[rng.integers(0, 64, count)]
     weight_of_noise = torch.as_tensor(1 / (noise**2 + (0.01 * rng.uniform(0, 1, (3, 1, count))) ** 2))
     weight = weight_of_noise.expand(-1, plan.spectral_count, -1).to(dtype)
-    system = BandedAccumulator(rig, bands, lines, count, depth)
+    system = LineEquations(bands, lines, rig.projector_response.blur_px, count, depth)
     nothing = torch.zeros((3, plan.spectral_count, count), dtype=dtype)
     for order in ORDERS:
         footprint = GratingModel(rig).trace(pixels, depth, order, bands.centroids_nm[order])
         inside = footprint.inside(*plan.projector_size_px)
-        system.add(order, footprint.columns, inside, nothing, weight, 0, 0.0)
+        system.add(order, footprint.columns, inside, nothing, weight, 0)
     data = system.positive_matrix()
     truth = torch.as_tensor(_spectra(bands.centres_nm, count, rng)).to(dtype)
     right = multiply(data, truth) + _noise(data, rng).to(dtype)

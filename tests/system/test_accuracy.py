@@ -20,8 +20,9 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.spectral import spectra
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.solve.threads import one_kernel_thread
 from dsl_core.workflows import scans
-from tests.cases.crop import cropped_twin, one_torch_thread
+from tests.cases.crop import cropped_twin
 from tests.cases.twin_scan import MemoryScan, capture, solver_input, twin_scan
 
 GRID = WavelengthGrid()
@@ -47,7 +48,7 @@ def scan(
     scene: str, corner_px: tuple[int, int], plan: CapturePlan, size_px: tuple[int, int] = (64, 48)
 ) -> Scanned:
     devices = cropped_twin(scene, corner_px, size_px)
-    with one_torch_thread():
+    with one_kernel_thread():
         frames = capture(devices, plan)
     truth = scans.twin_truth(devices, GRID)
     assert truth is not None
@@ -169,7 +170,7 @@ def test_bright_frames_of_a_coarse_camera_are_solved(step_px: int) -> None:
         settings=(Setting(exposure_ms=1000.0 / 3.0, level=0.8),),
         code_settings=(0,),
     )
-    with one_torch_thread():
+    with one_kernel_thread():
         devices, frames = twin_scan(plan, scene="color-checker", size="48x32")
     assert devices.calibration is not None
     result = pipeline.reconstruct(frames, devices.calibration)

@@ -16,18 +16,20 @@ from numpy.typing import NDArray
 from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
-from dsl_core.optics.correspondence import Footprint, correspondence
-from dsl_core.optics.image_formation import ImageFormation, OrderPath
-from dsl_core.optics.spectra import hat_moments
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS, Bands
 
 Floats = NDArray[np.float64]
 
 LIGHT_LIMIT, FILM_LIMIT_PX, EFFICIENCY_LIMIT = 0.03, 0.2, 0.05
-STEP_NM = 5.0
-BANDS_NM = np.arange(415.0, 691.0, STEP_NM)
+#: Bands of the prediction, without those that the model adds beyond both ends.
+GRID = WavelengthGrid(start_nm=430.0, stop_nm=675.0, step_nm=5.0)
 #: First orders may be displaced by this much for the slopes of the prediction, projector px.
 _SLOPE_PX = 0.5
 _MIN_SIGNALS = 200
+_EVERY = (0, *ORDERS, *SECOND_ORDERS)
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class PlaneSignals:
 
 def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figure]:
     """Measured over predicted white signal of each colour, for a target of known reflectance."""
-    expected = _expected(rig, white, reflectance)[0]
+    expected = _Plane(rig, white, reflectance).signals()[0]
     usable = np.isfinite(white.std[0]) & (expected > 0.2 * np.median(expected))
     figures = []
     for colour, name in enumerate(("red", "green", "blue")):
@@ -82,17 +84,16 @@ def film_drift(rig: Rig, lines: PlaneSignals, reflectance: float) -> list[Figure
 
     ``reflectance`` is only a scale: the brightness is divided by that of the zero order.
     """
-    zero = _expected(rig, lines, reflectance, orders=(0,))
+    plane = _Plane(rig, lines, reflectance)
+    zero = plane.signals((0,))
     every = np.isfinite(lines.std)
     brightness = _scale(lines, zero, every & (zero > 0.5 * zero.max(0)))
     figures: list[Figure] = []
-    for order in (1, -1):
-        here, ahead, behind = (
-            _expected(rig, lines, reflectance, (order,), shift) for shift in (0.0, _SLOPE_PX, -_SLOPE_PX)
-        )
+    for order in ORDERS:
+        here, ahead, behind = (plane.signals((order,), shift) for shift in (0.0, _SLOPE_PX, -_SLOPE_PX))
         slope = (ahead - behind) / (2 * _SLOPE_PX)
         # Only where this order is nearly all there is, so that errors of the zero order's halo do not count.
-        other = _expected(rig, lines, reflectance, (0, -order))
+        other = plane.signals((0, -order))
         mine = every & (here > 0.02 * here.max()) & (other < 0.02 * here)
         if mine.sum() < _MIN_SIGNALS:
             raise CalibrationError(
@@ -160,32 +161,23 @@ def _shift(data: Floats, model: Floats, slope: Floats, std: Floats) -> tuple[flo
     return float(answer[0] / gain), gain, float(std_shift / gain), float(std_gain)
 
 
-def _expected(
-    rig: Rig,
-    signals: PlaneSignals,
-    reflectance: float,
-    orders: tuple[int, ...] = (0, 1, -1, 2, -2),
-    shift_px: float = 0.0,
-) -> Floats:
-    """Predicted signals (frames, P) in each pixel's own colour, DN per ms; first orders displaced."""
-    model = correspondence(rig)
-    pixels, depth = torch.as_tensor(signals.pixels), torch.as_tensor(signals.depth_mm)
-    paths = []
-    for order in orders:
-        moments, centroids = hat_moments(rig, order, BANDS_NM, STEP_NM)
-        footprint = model.trace(pixels, depth, order, centroids if order else centroids[:1])
-        inside = footprint.inside(rig.projector.width_px, rig.projector.height_px, 20.0)
-        columns = footprint.columns + (shift_px if order else 0.0)
-        paths.append(OrderPath(columns, inside, moments, _band_px(footprint) if order else 0.0))
-    profiles = np.repeat(signals.profiles[:, :, None], 3, axis=2)
-    formation = ImageFormation(rig.projector_response, profiles, paths, torch.as_tensor(signals.shading))
-    target = torch.full((len(BANDS_NM), len(signals.pixels)), reflectance, dtype=torch.float64)
-    every_colour = formation.forward(target).numpy()
-    return np.asarray(every_colour[signals.colours, :, np.arange(len(signals.pixels))].T)
+class _Plane:
+    """What the calibration expects of a plane of known reflectance under the patterns shown."""
 
+    def __init__(self, rig: Rig, signals: PlaneSignals, reflectance: float) -> None:
+        profiles = np.repeat(signals.profiles[:, :, None], 3, axis=2)
+        self.model = PixelModel(rig, Bands.of(rig, GRID), profiles, correspondence(rig))
+        place = torch.as_tensor(signals.pixels), torch.as_tensor(signals.depth_mm)
+        self.traced = self.model.trace(*place, orders=_EVERY[1:])
+        self.shading, self.colours, self.reflectance = signals.shading, signals.colours, reflectance
 
-def _band_px(footprint: Footprint) -> float:
-    """Mean half width of a band in projector columns."""
-    usable = torch.isfinite(footprint.columns).all(0)
-    span = (footprint.columns[-1] - footprint.columns[0])[usable].abs().mean()
-    return max(float(span) / (len(BANDS_NM) - 1), 0.05)
+    def signals(self, orders: tuple[int, ...] = _EVERY, shift_px: float = 0.0) -> Floats:
+        """Signals (frames, P) through some orders in each pixel's own colour, DN per ms.
+
+        ``shift_px`` displaces all but the zero order.
+        """
+        shading = torch.as_tensor(self.shading)
+        operator = self.model.operator(self.traced.displaced(shift_px), shading, orders=orders)
+        target = torch.full((self.model.bands.count, len(shading)), self.reflectance).to(shading)
+        every_colour = operator.forward(target).numpy()
+        return np.asarray(every_colour[self.colours, :, np.arange(len(shading))].T)

@@ -79,7 +79,7 @@ def read_uniform(source: FrameSource, rig: Rig, progress: Progress) -> TargetPic
     """Merge the uniform pictures of a scan and triangulate its code; raises `DecodeError`, `StoreError`."""
     import torch
 
-    from dsl_core.reconstruction.depth import triangulate
+    from dsl_core.optics.correspondence import triangulate
     from dsl_core.reconstruction.geometry import LIT_SIGMAS
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns
     from dsl_core.solve.threads import one_kernel_thread

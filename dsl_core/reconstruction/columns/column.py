@@ -16,7 +16,7 @@ from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.light_path import zero_order_profile
-from dsl_core.reconstruction.line_set import LineSet
+from dsl_core.optics.line_set import LineSet
 
 ITERATIONS = 6
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
@@ -53,7 +53,7 @@ def refine(
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
     q = coarse_px.clone()
     brightest = amplitude = y.amax(0)
-    error = MODEL_ERROR if lines.frames == lines.lines else COMB_ERROR
+    error = MODEL_ERROR if lines.single else COMB_ERROR
     for _ in range(ITERATIONS):
         g, slope = _profile(q - centres, lines.width_px, response)
         weight = 1 / (variance + (error * amplitude) ** 2)
@@ -97,7 +97,7 @@ def dark_offset(
     pattern set or the film leaves no frame unlit.
     """
     first, last = math.floor(unlit_px[0] / lines.step_px), math.ceil(unlit_px[1] / lines.step_px)
-    if lines.frames != lines.lines or unlit_px[1] <= unlit_px[0]:
+    if not lines.single or unlit_px[1] <= unlit_px[0]:
         return torch.zeros_like(column_px), torch.full_like(column_px, torch.inf)
     total = torch.zeros_like(column_px)
     weight = torch.zeros_like(column_px)

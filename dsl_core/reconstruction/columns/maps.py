@@ -10,16 +10,17 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import triangulate
+from dsl_core.optics.image_formation import one_if_grey
+from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.column import Column, dark_offset, refine
-from dsl_core.reconstruction.columns.first_orders import first_order_share
-from dsl_core.reconstruction.columns.pattern_column import one_if_grey, refine_by_profiles
-from dsl_core.reconstruction.depth import triangulate
+from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.hdr import MergedFrame
-from dsl_core.reconstruction.line_set import LineSet
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.solve.many import Check, work_through
+from dsl_core.solve.threads import one_kernel_thread
 
 CHUNK = 16384
 Floats = NDArray[np.float32]
@@ -90,12 +91,8 @@ class ColumnFinder:
             std = None if start_std_px is None else start_std_px[part]
             maps.put(part, self._chunk(pixels[part], start_px[part], std))
 
-        before = torch.get_num_threads()
-        torch.set_num_threads(1)
-        try:
+        with one_kernel_thread():
             work_through(work, range(0, len(pixels), CHUNK), 2, "columns", progress or NoProgress())
-        finally:
-            torch.set_num_threads(before)
         return maps
 
     def _chunk(self, pixels: Indices, start_px: Floats, std_px: Floats | None) -> ColumnMaps:

@@ -19,7 +19,12 @@ from torch import Tensor
 
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import ProjectorResponse, Rig
-from dsl_core.optics.image_formation import BlurredProfiles
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence, like, triangulate
+from dsl_core.optics.image_formation import BlurredProfiles, one_if_grey
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.patterns.images import drive_levels, spectral_profiles
 from dsl_core.reconstruction.columns.column import MAX_CHI_SQUARE, Column
 from dsl_core.reconstruction.hdr import setting_gains_ms
@@ -32,6 +37,8 @@ DIRECT_ERROR = 0.02
 BRIGHT_SHARE = 0.05
 #: Keeps the amplitudes of LEDs apart that a set cannot tell apart, relative to its strongest.
 RIDGE = 1e-4
+#: Bands that the first orders' light of a grey surface is summed over.
+GRID = WavelengthGrid(step_nm=10.0)
 
 
 def radiance_profiles(rig: Rig, plan: CapturePlan) -> NDArray[np.float64]:
@@ -68,11 +75,6 @@ def _shown(rig: Rig, plan: CapturePlan) -> Iterator[NDArray[np.float64]]:
     profiles, response = spectral_profiles(plan), rig.projector_response
     for setting in plan.settings:
         yield response.radiance(drive_levels(profiles, setting.level) / 255.0) - response.radiance(0.0)
-
-
-def one_if_grey(profiles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Profiles (frames, width, LEDs) of one LED for all, where patterns are grey."""
-    return profiles[..., :1] if bool((profiles == profiles[..., :1]).all()) else profiles
 
 
 def refine_by_profiles(
@@ -137,3 +139,27 @@ def _fit(light: Tensor, y: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
     amplitude = torch.linalg.solve(normal, right)
     residual = y - torch.einsum("pl,plf->pf", amplitude, light)
     return (weight * residual**2).sum(1), amplitude.sum(1)
+
+
+def first_order_share(rig: Rig, profiles: NDArray[np.float64], pixels: Tensor, column_px: Tensor) -> Tensor:
+    """First orders of a grey surface over its zero order under one LED, (pixels, LEDs, frames).
+
+    ``pixels`` are flat indices of the mosaic, each seen in its own colour, lit directly from ``column_px``;
+    ``profiles`` (frames, width, LEDs) are radiances relative to full drive, of one LED where all are alike.
+    Zero where the column meets no ray.
+    """
+    depth, _ = triangulate(rig, pixels, column_px.double())
+    met = torch.isfinite(depth)
+    depth = torch.where(met, depth, sum(rig.depth_range_mm) / 2)
+    y, x = pixels // rig.camera.width_px, pixels % rig.camera.width_px
+    own = torch.as_tensor(bayer_channels(rig.sensor.bayer, 2, 2)).to(pixels.device)[y % 2, x % 2].long()
+    model = PixelModel(rig, Bands.of(rig, GRID), profiles, correspondence(rig))
+    traced = model.trace(pixels, depth, column_px, ORDERS)
+    operator = model.operator(traced, met.to(column_px), orders=ORDERS)
+    zero = like(model.bands.moments[0].sum(2), column_px)
+    if profiles.shape[2] == 1:
+        zero = zero.sum(1, keepdim=True)
+    found = torch.zeros((len(pixels), profiles.shape[2], len(profiles))).to(column_px)
+    for _, light, moments in operator.terms():
+        found += light * (moments[..., 0] / zero)[own][..., None]
+    return found

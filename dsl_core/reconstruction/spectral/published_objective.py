@@ -27,13 +27,14 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import Correspondence, Footprint
 from dsl_core.optics.demosaic import demosaic
 from dsl_core.optics.light_path import step_edge
-from dsl_core.optics.spectra import chain_response, hat_moments
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.line_set import LineSet
-from dsl_core.reconstruction.spectral.spectra import Pixels, SpectralMaps
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.solve.many import Check, work_through
+from dsl_core.solve.threads import one_kernel_thread
 
-ORDERS = (1, -1)
 #: Rows of frames that are demosaiced at once; even, to keep the Bayer phase.
 STRIP = 32
 #: Pixels that are fitted at once: their arrays stay in the processor's cache.
@@ -71,7 +72,7 @@ class Measured:
 def require_single_lines(plan: CapturePlan) -> LineSet:
     """The lines of a plan that shows one line a frame; raises `PlanError` for any other."""
     lines = LineSet.of(plan)
-    if lines is None or lines.frames != lines.lines:
+    if lines is None or not lines.single:
         raise PlanError(
             f"The published reconstruction reads one line per frame; the plan {plan.name!r} projects"
             f" {plan.spectral.kind!r}. Scan with single lines, or use the best solver."
@@ -124,12 +125,8 @@ class PublishedReconstruction:
             self._store(out, flat[part], order[part], reached[:, part], self.fit(measured))
 
         starts = range(0, flat.size, CHUNK)
-        before = torch.get_num_threads()
-        torch.set_num_threads(1)
-        try:
+        with one_kernel_thread():
             work_through(work, starts, threads, "spectra", progress)
-        finally:
-            torch.set_num_threads(before)
         return out
 
     def fit(self, measured: Measured) -> Tensor:

@@ -12,7 +12,8 @@ from dsl_core.progress import Progress
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.spectral.nearest_line import ColourBasis, NearestLine
 from dsl_core.reconstruction.spectral.published_objective import PublishedReconstruction, require_single_lines
-from dsl_core.reconstruction.spectral.spectra import Pixels, SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
 
 _KINDS = {"published": PublishedReconstruction, "nearest-line": NearestLine}
 

@@ -16,9 +16,8 @@ from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.correspondence import GratingModel, correspondence, zero_order
+from dsl_core.optics.correspondence import GratingModel, correspondence, triangulate, zero_order
 from dsl_core.progress import NoProgress
-from dsl_core.reconstruction.depth import triangulate
 from tests.cases.board_calibrated import board_calibrated
 from tests.cases.film_bench import film_bench, take, take_all, truth_of, without
 

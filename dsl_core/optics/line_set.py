@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TypeVar
 
 from torch import Tensor
 
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
+
+Place = TypeVar("Place", float, Tensor)
 
 
 @dataclass(frozen=True)
@@ -30,9 +34,23 @@ class LineSet:
                 return cls(w, s, (w - 1) / 2, -(-(width - w // 2) // s), p // s)
         return None
 
+    @property
+    def single(self) -> bool:
+        """Whether every frame shows one line only."""
+        return self.frames == self.lines
+
+    def near(self, low_px: float, high_px: float) -> range:
+        """Virtual lines centred between two columns, and the next one on either side."""
+        first, last = self.position(low_px), self.position(high_px)
+        return range(max(math.floor(first), 0), min(math.ceil(last) + 1, self.lines))
+
+    def position(self, column_px: Place) -> Place:
+        """Columns (px) in lines: virtual line ``i`` is at ``i``."""
+        return (column_px - self.first_px) / self.step_px
+
     def nearest(self, column_px: Tensor) -> Tensor:
         """Virtual line nearest to columns (px), int64, not limited to the frame."""
-        return ((column_px - self.first_px) / self.step_px).round().long()
+        return self.position(column_px).round().long()
 
     def centre_px(self, line: Tensor) -> Tensor:
         """Column of the centre of virtual lines (px)."""
@@ -41,7 +59,7 @@ class LineSet:
     def frame(self, line: Tensor) -> Tensor:
         """Frame that shows virtual lines; lines outside the projector are clamped (give them no weight)."""
         clamped = line.clip(0, self.lines - 1)
-        return clamped if self.frames == self.lines else clamped % self.frames
+        return clamped if self.single else clamped % self.frames
 
     def exists(self, line: Tensor) -> Tensor:
         """Whether virtual lines are on the projector, bool."""

@@ -1,0 +1,160 @@
+"""Normal equations of single scan lines: a line lights only a few neighbouring bands through one order.
+
+So their matrix is banded. Lines' light over a band comes from a table that pixels of like dispersion share.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from dsl_core.optics.correspondence import like
+from dsl_core.optics.line_profile import SAMPLES, ProfileTable
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import Bands
+
+#: How much closer than their mean spacing bands may lie, because the response moves their centroids.
+CENTROID_SLACK_PX = 0.5
+#: Bands of usable first orders are never closer, px per nm; evanescent ones, far outside, may coincide.
+MIN_DISPERSION = 0.1
+#: Diagonals whose sum is below this share of the main one are left out.
+DROPPED = 2e-5
+#: Bands that share one window of lines while the normal equations are added up.
+GROUP = 3
+
+
+#: A tabulated profile of a width, blur and half width of a band (px), shared by all that ask for it.
+_table = lru_cache(maxsize=64)(ProfileTable)
+
+
+class LineEquations:
+    """Adds the first orders of scan lines, one order and band at a time, over all pixels of a tile."""
+
+    def __init__(
+        self, bands: Bands, lines: LineSet, blur_px: float, pixels: int, other: Tensor, offsets: bool = False
+    ) -> None:
+        """``blur_px`` is that of a line; ``offsets`` adds up as well what an offset of all frames does."""
+        self.bands, self.lines, self.blur_px = bands, lines, blur_px
+        self.matrix = torch.zeros((1, bands.count, pixels), device=other.device, dtype=other.dtype)
+        self.right = torch.zeros_like(self.matrix[0])
+        #: Right side of an offset of one DN per ms in each colour, (3, bands, pixels), if it is asked for.
+        self.offset = torch.zeros((3, bands.count, pixels)).to(other) if offsets else None
+        #: Bound of the diagonals left out, relative to the main one.
+        self.dropped = 1e-6
+        #: Weighted sum of squares of the data that entered, and their number, (pixels,).
+        self.square, self.samples = torch.zeros_like(self.right[0]), torch.zeros_like(self.right[0])
+
+    def add(
+        self,
+        order: int,
+        columns: Tensor,
+        inside: Tensor,
+        radiance: Tensor,
+        weight: Tensor,
+        first_line: int,
+    ) -> None:
+        """Add one order: ``radiance`` and ``weight`` are (3, frames, pixels), frame 0 being ``first_line``.
+
+        Bands are taken in groups that share one window of lines, so that data are gathered once a group.
+        """
+        half = self.bands.half_width_px(columns)
+        blur = round(self.blur_px, 2)
+        table = _table(self.lines.width_px, blur, half, columns.device, columns.dtype)
+        # On the table's grid a band has the same profile in every group, and the matrix is a true square.
+        columns = (columns * SAMPLES).round() / SAMPLES
+        spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(
+            min=MIN_DISPERSION * self.bands.step_nm
+        )
+        tails = table.overlaps(float(spacing), CENTROID_SLACK_PX)[::-1].cumsum()[::-1]
+        bandwidth = max(min(int((tails > DROPPED).sum()), self.bands.count - 1), 1)
+        # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels
+        # would not be positive definite.
+        self.dropped = max(self.dropped, 2 * float(tails[bandwidth:].max(initial=0)))
+        if self.matrix.shape[0] < bandwidth + 1:
+            self.matrix = torch.nn.functional.pad(
+                self.matrix, (0, 0, 0, 0, 0, bandwidth + 1 - self.matrix.shape[0])
+            )
+        reached = [j for j, any_pixel in enumerate(inside.any(1).tolist()) if any_pixel]
+        if not reached:
+            return
+        white = like(self.bands.moments[order].sum(1), columns)
+        masked = None if bool(inside[reached[0] : reached[-1] + 1].all()) else inside
+        weighted = radiance * weight
+        self._add_squares(columns, inside, radiance, weight, weighted, first_line, table.support_px)
+        flat = weight.reshape(3, -1), weighted.reshape(3, -1)
+        for start in range(reached[0], reached[-1] + 1, GROUP):
+            group = range(start, min(start + GROUP, reached[-1] + 1))
+            stop = min(group[-1] + bandwidth, reached[-1]) + 1
+            self._add_group(group, stop, columns, masked, white, flat, first_line, table)
+
+    def positive_matrix(self) -> Tensor:
+        """The banded matrix of unit shading, made safe against what its bandwidth leaves out."""
+        matrix = self.matrix.clone()
+        matrix[0] *= 1 + self.dropped
+        return matrix
+
+    def _add_squares(
+        self,
+        columns: Tensor,
+        inside: Tensor,
+        radiance: Tensor,
+        weight: Tensor,
+        weighted: Tensor,
+        first_line: int,
+        support_px: float,
+    ) -> None:
+        low = torch.where(inside, columns, torch.inf).amin(0) - support_px
+        high = torch.where(inside, columns, -torch.inf).amax(0) + support_px
+        index = torch.arange(first_line, first_line + radiance.shape[1], device=columns.device)[:, None]
+        centre = self.lines.centre_px(index)
+        used = ((centre > low) & (centre < high)).to(radiance.dtype)
+        for c in range(3):
+            self.square += (weighted[c] * radiance[c] * used).sum(0)
+            self.samples += ((weight[c] > 0) * used).sum(0)
+
+    def _add_group(
+        self,
+        group: range,
+        stop: int,
+        columns: Tensor,
+        inside: Tensor | None,
+        white: Tensor,
+        flat: tuple[Tensor, Tensor],
+        first_line: int,
+        table: ProfileTable,
+    ) -> None:
+        pixels = columns.shape[1]
+        count = flat[0].shape[1] // pixels
+        ends = columns[[group[0], group[-1]]]
+        lowest, span = ends.amin(0), float((ends[1] - ends[0]).abs().max())
+        window = math.ceil((span + 2 * table.support_px) / self.lines.step_px) + 1
+        offsets = torch.arange(window, device=columns.device, dtype=torch.int32)[:, None]
+        start = ((lowest - table.support_px - self.lines.first_px) / self.lines.step_px).ceil().int()
+        frame = (start - first_line) + offsets
+        valid = (frame >= 0) & (frame < count)
+        index = (
+            frame.clip_(0, count - 1) * pixels
+            + torch.arange(pixels, device=columns.device, dtype=torch.int32)
+        ).reshape(-1)
+        weights, weighted = (values.index_select(1, index) for values in flat)
+        relative = columns[group[0] : stop] - (start * self.lines.step_px + self.lines.first_px)
+        profiles = table.at(relative[:, None] - (offsets * self.lines.step_px))
+        profiles[: len(group)] *= valid
+        if inside is not None:
+            profiles *= inside[group[0] : stop, None]
+        for i, j in enumerate(group):
+            own = profiles[i]
+            if self.offset is not None:
+                self.offset[:, j] += (white[:, j, None, None] * weights.reshape(3, window, pixels) * own).sum(
+                    1
+                )
+            self.right[j] += ((white[:, j] @ weighted).reshape(window, pixels) * own).sum(0)
+            reach = profiles[i : i + self.matrix.shape[0]]
+            pairs = (white[:, j, None] * white[:, j : j + len(reach)]).T
+            mixed = (pairs @ weights).reshape(len(reach), window, pixels)
+            mixed *= own
+            mixed *= reach
+            self.matrix[: len(reach), j] += mixed.sum(1)

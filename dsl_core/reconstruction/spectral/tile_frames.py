@@ -1,0 +1,111 @@
+"""What is measured of the pixels of a tile: their frames in three colours, and what is known before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.model.rig import Rig
+from dsl_core.optics.demosaic import demosaic, demosaic_variance
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.pixel_model import MODEL_ERROR, demosaic_blur_px
+from dsl_core.reconstruction.columns.column import halo_of_line
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """What is known of every pixel before its spectrum: arrays of shape (rows, columns).
+
+    ``amplitude`` and ``amplitude_std`` (DN per ms) are those of the zero order in the pixel's own colour,
+    ``offset`` the residual dark signal and ``offset_std`` how far all frames may be off it; ``valid`` pixels
+    get a spectrum.
+    """
+
+    column_px: NDArray[np.float32]
+    depth_mm: NDArray[np.float32]
+    shading: NDArray[np.float32]
+    shading_rel_std: NDArray[np.float32]
+    amplitude: NDArray[np.float32]
+    amplitude_std: NDArray[np.float32]
+    offset: NDArray[np.float32]
+    offset_std: NDArray[np.float32]
+    valid: NDArray[np.bool_]
+
+
+class TileFrames:
+    """The frames of one tile with the neighbours that demosaicing needs."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        radiance: NDArray[np.float32],
+        std: NDArray[np.floating],
+        pixels: Pixels,
+        rows: slice,
+        columns: slice,
+        like: Tensor,
+    ) -> None:
+        """``radiance`` and ``std`` (frames, rows, columns) and ``pixels`` are those of the whole picture.
+
+        All comes in the precision and on the device of ``like``.
+        """
+        self.response, self.bayer, self.like = rig.projector_response, rig.sensor.bayer, like
+        inside = np.nonzero(pixels.valid[rows, columns])
+        y, x = (at + part.start for at, part in zip(inside, (rows, columns), strict=True))
+        #: Flat indices of the tile's valid pixels in the picture.
+        self.flat = y * pixels.valid.shape[1] + x
+        near = np.s_[max(rows.start - 2, 0) : rows.stop + 2, max(columns.start - 2, 0) : columns.stop + 2]
+        self._radiance, self._std = radiance[:, *near], std[:, *near]
+        self._near = Pixels(**{name: values[near] for name, values in vars(pixels).items()})
+        at = (y - near[0].start) * self._near.valid.shape[1] + x - near[1].start
+        self.at = torch.as_tensor(at, device=like.device)
+
+    def known(self, name: str) -> Tensor:
+        """A map of `Pixels` at the tile's pixels, (pixels,)."""
+        return self._tensor(getattr(self._near, name)).reshape(-1)[self.at]
+
+    def _tensor(self, values: NDArray[np.floating]) -> Tensor:
+        return torch.as_tensor(np.ascontiguousarray(values), device=self.like.device).to(self.like.dtype)
+
+    def blur_px(self) -> float:
+        """Spread of the projector columns that demosaicing averages, px."""
+        return demosaic_blur_px(self._near.column_px)
+
+    def colours(self, frames: range, lines: LineSet | None) -> tuple[Tensor, Tensor]:
+        """Radiance without offset, and halo of lines, and weight of some frames, each (3, frames, pixels)."""
+        part = slice(frames.start, frames.stop)
+        y = self._tensor(self._radiance[part])
+        variance = self._tensor(self._std[part]) ** 2
+        y = y - self._tensor(self._near.offset)
+        if lines is not None:
+            index = torch.arange(frames.start, frames.stop, device=y.device)[:, None, None]
+            distance = self._tensor(self._near.column_px) - lines.centre_px(index).to(y.dtype)
+            y = y - self._tensor(self._near.amplitude) * halo_of_line(distance, lines, self.response)
+        rgb = self._pick(demosaic(y, self.bayer))
+        spread = self._pick(demosaic_variance(variance, self.bayer))
+        weight = spread.addcmul_(rgb, rgb, value=MODEL_ERROR**2).reciprocal_()
+        # An infinite variance has weight zero by itself; what is no number must not survive the product.
+        return torch.nan_to_num_(rgb, 0.0, 0.0, 0.0), torch.nan_to_num_(weight, 0.0, 0.0, 0.0)
+
+    def _pick(self, images: Tensor) -> Tensor:
+        """The tile's pixels of colour images (frames, 3, rows, columns), as (3, frames, pixels)."""
+        count = len(images)
+        flat = images.reshape(count * 3, -1).index_select(1, self.at)
+        return flat.reshape(count, 3, -1).permute(1, 0, 2).contiguous()
+
+    def offset_variance(self) -> Tensor:
+        """Variance of what all frames may be off in three colours, (3, pixels)."""
+        return self._variance(self._near.offset_std)
+
+    def zero_order_colour(self) -> tuple[Tensor, Tensor]:
+        """Zero-order amplitude in three colours and its variance, each (3, pixels)."""
+        colour = demosaic(self._tensor(self._near.amplitude), self.bayer).reshape(3, -1)[:, self.at]
+        return colour, self._variance(self._near.amplitude_std)
+
+    def _variance(self, std: NDArray[np.float32]) -> Tensor:
+        """Variance in three colours of independent deviations (rows, columns), (3, pixels)."""
+        return demosaic_variance(self._tensor(std) ** 2, self.bayer).reshape(3, -1)[:, self.at]

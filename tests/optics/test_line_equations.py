@@ -1,0 +1,113 @@
+"""Banded normal equations of scan lines against the full image model."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import Footprint, GratingModel
+from dsl_core.optics.line_equations import DROPPED, LineEquations
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.spectra import ORDERS, Bands
+from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve import banded
+
+PIXELS = 6
+
+
+def model_of(rig: Rig, grid: WavelengthGrid, plan: CapturePlan) -> PixelModel:
+    lines = LineSet.of(plan)
+    assert lines is not None
+    profiles = radiance_profiles(rig, plan)
+    return PixelModel(rig, Bands.of(rig, grid), profiles, GratingModel(rig), lines)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_banded_equations_are_those_of_the_full_model(order: int) -> None:
+    rig, plan = published_rig(), CapturePlan()
+    model = model_of(rig, WavelengthGrid(), plan)
+    # Pixels of the middle row: order +1 reaches the left ones whole, order -1 the right ones, others in part.
+    pixels = 290 * 890 + torch.linspace(60, 830, PIXELS).long()
+    traced = model.trace(pixels, torch.full((PIXELS,), 700.0, dtype=torch.float64), orders=(order,))
+    columns = traced.orders[order].columns
+    inside = model.inside(traced.orders[order])
+    assert inside.any()
+    assert not inside.all()
+    generator = torch.Generator().manual_seed(0)
+    radiance, weight = torch.rand(
+        (2, 3, plan.spectral_count, PIXELS), generator=generator, dtype=torch.float64
+    )
+    system = model.line_equations(columns[0])
+    lit = model.frames(columns, inside)
+    part = slice(lit.start, lit.stop)
+    system.add(order, columns, inside, radiance[:, part], weight[:, part], lit.start)
+    operator = model.operator(traced, torch.ones_like(columns[0]), orders=(order,))
+    full = operator.matrix().reshape(PIXELS, -1, model.bands.count)
+    weighted = full * weight.permute(2, 0, 1).reshape(PIXELS, -1, 1)
+    expected = weighted.mT @ full
+    found = banded.to_dense(system.matrix)
+    assert (found - expected).abs().max() < 0.01 * expected.abs().max()
+    right = operator.adjoint(radiance * weight)
+    assert (system.right - right).abs().max() < 0.01 * right.abs().max()
+    assert not system.right[~inside].any()
+
+
+def bright_equations(step_nm: float) -> LineEquations:
+    """Lines so bright that the data weigh far more than any prior."""
+    rig, plan = published_rig(), CapturePlan()
+    model = model_of(rig, WavelengthGrid(step_nm=step_nm), plan)
+    pixels = torch.arange(0, 890 * 580, 8009)
+    depth = torch.full((len(pixels),), 700.0, dtype=torch.float64)
+    bright = torch.full((3, plan.spectral_count, len(pixels)), 1e5, dtype=torch.float64)
+    system = model.line_equations(depth)
+    for order, footprint in model.trace(pixels, depth).orders.items():
+        inside = model.inside(footprint, margin_px=0.0)
+        system.add(order, footprint.columns, inside, bright, bright, 0)
+    return system
+
+
+def test_bands_narrower_than_a_column_leave_the_equations_positive() -> None:
+    matrix = bright_equations(step_nm=1.0).positive_matrix()
+    matrix[0] += 2.8
+    assert bool((banded.factorise(matrix).diagonal > 0).all())
+
+
+def test_the_main_diagonal_holds_what_the_left_out_ones_may_add_up_to() -> None:
+    """A chain of neighbours has this bound: eigenvalues move by the sum of a row that is left out."""
+    system = bright_equations(step_nm=1.0)
+    guarded = system.positive_matrix()
+    assert torch.equal(guarded[1:], system.matrix[1:])
+    share = (guarded[0] / system.matrix[0] - 1)[system.matrix[0] > 0]
+    assert torch.allclose(share, torch.full_like(share, system.dropped))
+
+
+def spaced(pitch_px: float, width_px: int = 5) -> tuple[LineEquations, Footprint]:
+    """Equations of bands that one pixel sees a pitch apart, on lines of every column, all weights one."""
+    rig = published_rig()
+    bands = Bands.of(rig, WavelengthGrid())
+    lines = LineSet(width_px, 1, (width_px - 1) / 2, 640, 640)
+    columns = 100.0 + pitch_px * torch.arange(bands.count, dtype=torch.float64)[:, None]
+    system = LineEquations(bands, lines, rig.projector_response.blur_px, 1, columns[0])
+    everywhere = torch.ones_like(columns, dtype=torch.bool)
+    one = torch.ones((3, lines.frames, 1), dtype=torch.float64)
+    system.add(1, columns, everywhere, one, one, 0)
+    return system, Footprint(columns, columns)
+
+
+@pytest.mark.parametrize("pitch_px", [1.0, 2.5, 4.0])
+def test_the_guard_bounds_what_a_wider_matrix_would_hold_beyond_the_diagonals_kept(
+    pitch_px: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept, _ = spaced(pitch_px)
+    # Without a threshold every overlap that is not zero is kept.
+    monkeypatch.setattr("dsl_core.optics.line_equations.DROPPED", 0.0)
+    whole, _ = spaced(pitch_px)
+    beyond = whole.matrix[len(kept.matrix) :, :, 0].sum() / whole.matrix[0, :, 0].sum()
+    assert len(kept.matrix) < len(whole.matrix)
+    assert 2 * float(beyond) <= kept.dropped <= 2 * DROPPED + 1e-6
+    assert torch.allclose(kept.matrix, whole.matrix[: len(kept.matrix)])

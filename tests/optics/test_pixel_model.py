@@ -1,0 +1,286 @@
+"""One forward model: its parts fit together, and all that read it expect the same of the same pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.demosaic import demosaic_variance
+from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, demosaic_blur_px, without_offset
+from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
+from dsl_core.planning.views import pixels_view
+from dsl_core.planning.virtual import VirtualPixels
+from dsl_core.reconstruction.spectral import dense_solver, spectra
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction, model_of_plan
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve import banded
+from dsl_core.workflows.inspection import FrameBlock, intensity_graph
+
+SIZE, DEPTH_MM, PITCH_PX = (40, 16), 700.0, 0.625
+#: Wide bands: what is 8 px outside the frame still counts a little, so that an edge elsewhere would show.
+GRID = WavelengthGrid(start_nm=430.0, stop_nm=655.0, step_nm=25.0)
+LINES = ScanLines(width_px=5, step_px=4)
+COMB = LineComb(width_px=5, step_px=4, period_px=104)
+COLOURS = LineComb(width_px=5, step_px=4, period_px=104, shifts_px=(0, 8, 20))
+
+
+def straight_rig() -> Rig:
+    """Lenses side by side without distortion, so that columns are the same number of pixels apart everywhere.
+
+    The projector's frame ends where the bands of order +1 arrive.
+    """
+    width, height = SIZE
+    camera = Lens(width_px=width, height_px=height, fx_px=1024, fy_px=1024, cx_px=width / 2, cy_px=height / 2)
+    fx = 1024 * PITCH_PX
+    projector = Lens(width_px=416, height_px=360, fx_px=fx, fy_px=fx, cx_px=320, cy_px=180)
+    pose = Pose(rotation=((1, 0, 0), (0, 1, 0), (0, 0, 1)), translation_mm=(-70, 0, 0))
+    return published_rig().model_copy(update={"camera": camera, "projector": projector, "pose": pose})
+
+
+def plan_of(spectral: ScanLines | LineComb) -> CapturePlan:
+    return CapturePlan(
+        code=GrayCode(rows=False), spectral=spectral, camera_size_px=SIZE, projector_size_px=(416, 360)
+    )
+
+
+def columns_px() -> np.ndarray[Any, np.dtype[np.float32]]:
+    """Columns of the plane at `DEPTH_MM`, exact in single precision, (rows, columns)."""
+    row = 320 - 64 + PITCH_PX * (np.arange(SIZE[0]) - SIZE[0] / 2)
+    return np.tile(row, (SIZE[1], 1)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Readers:
+    """One pixel of a plane as the solver, the prediction and the intensity graph have it."""
+
+    rig: Rig
+    plan: CapturePlan
+    pixel: tuple[int, int]
+
+    @property
+    def flat(self) -> int:
+        """Index of the pixel."""
+        return self.pixel[1] * SIZE[0] + self.pixel[0]
+
+    def virtual(self) -> VirtualPixels:
+        """The prediction."""
+        view = pixels_view(self.rig, np.array([self.flat]), DEPTH_MM)
+        return VirtualPixels(self.rig, self.plan, GRID, view, dtype=torch.float64)
+
+    @property
+    def shading(self) -> float:
+        """Shading of the pixel, exact in single precision as a result holds it."""
+        return float(np.float32(self.virtual().view.shading[0]))
+
+    def solver(self) -> SpectralReconstruction:
+        """The solver of frames without light, whose mosaic has a deviation of one everywhere."""
+        shape = SIZE[::-1]
+        none, valid = np.zeros(shape, np.float32), np.zeros(shape, bool)
+        valid[self.pixel[1], self.pixel[0]] = True
+        depth, shading = (np.full(shape, value, np.float32) for value in (DEPTH_MM, self.shading))
+        known = Pixels(columns_px(), depth, shading, none, none, none, none, none, valid)
+        dark = np.zeros((self.plan.spectral_count, *shape), np.float32)
+        model = correspondence(self.rig)
+        return SpectralReconstruction(
+            self.rig, self.plan, GRID, model, dark, np.ones_like(dark), known, dtype=torch.float64
+        )
+
+    def graph(self, spectrum: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
+        """The curves of the intensity graph, (3, frames)."""
+        from dsl_core.io.result.result_arrays import ResultArrays
+
+        shape = SIZE[::-1]
+        cube = np.broadcast_to(spectrum[:, None, None], (GRID.count, *shape))
+        arrays = {
+            "depth_mm": np.full(shape, DEPTH_MM, np.float32),
+            "column_px": columns_px(),
+            "shading": np.full(shape, self.shading, np.float32),
+            "reflectance": cube,
+        }
+        result = ResultArrays(Path("a.zarr"), GRID.centres_nm, arrays)
+        dark = np.zeros((self.plan.spectral_count, *shape), np.float32)
+        block = FrameBlock(dark, np.ones_like(dark), (0, 0), self.rig, self.plan)
+        model = intensity_graph(block, result, self.pixel).model
+        assert model is not None
+        return model
+
+
+@pytest.fixture(scope="module", params=[LINES, COMB, COLOURS], ids=["lines", "comb", "colours"])
+def readers(request: pytest.FixtureRequest) -> Readers:
+    return Readers(straight_rig(), plan_of(request.param), (13, 7))
+
+
+def spectrum(centres_nm: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Linear between the bands of the grid and constant beyond, as the graph takes results."""
+    values = 0.4 + 0.3 * np.sin(GRID.centres_nm / 37)
+    return np.asarray(np.interp(centres_nm, GRID.centres_nm, values))
+
+
+def test_the_pixel_has_bands_just_inside_and_just_outside_the_margin(readers: Readers) -> None:
+    """Otherwise the next test would not see an edge that is elsewhere."""
+    _, traced = readers.solver().tile(slice(0, 16), slice(0, 40))
+    beyond = traced.orders[1].columns[:, 0] - 415.5
+    assert ((beyond > 0) & (beyond < EDGE_PX)).any()
+    assert ((beyond > EDGE_PX) & (beyond < EDGE_PX + 2)).any()
+
+
+def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) -> None:
+    solver, virtual = readers.solver(), readers.virtual()
+    nodes = torch.as_tensor(spectrum(solver.bands.centres_nm))
+    frames, traced = solver.tile(slice(0, 16), slice(0, 40))
+    shading = frames.known("shading")
+    solved = solver.model.operator(traced, shading, frames.blur_px()).forward(nodes[:, None])[..., 0]
+    both = virtual.matrices.first[0] + virtual.matrices.zero[0]
+    predicted = (both @ nodes) * readers.shading
+    drawn = readers.graph(spectrum(GRID.centres_nm))
+    tolerance = 1e-6 * float(solved.abs().max())
+    assert np.abs(drawn - solved.numpy()).max() < tolerance
+    assert float((predicted - solved).abs().max()) < tolerance
+    # First orders are a few percent of the zero order: alone, they agree as well.
+    first = solver.model.operator(traced, shading, frames.blur_px(), solver.model.orders)
+    alone = first.forward(nodes[:, None])[..., 0]
+    calm = (virtual.matrices.first[0] @ nodes) * readers.shading
+    assert float((calm - alone).abs().max()) < 1e-6 * float(alone.abs().max())
+
+
+def test_the_solvers_equations_are_those_of_the_predictions_operator(
+    readers: Readers, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What the solver really solves, on frames whose weights are known."""
+    given: list[Tensor] = []
+
+    def watched(solve: Any) -> Any:
+        def call(data: Tensor, *others: Any) -> Any:
+            given.append(data.clone())
+            return solve(data, *others)
+
+        return call
+
+    monkeypatch.setattr(dense_solver, "solve_dense", watched(dense_solver.solve_dense))
+    monkeypatch.setattr(spectra, "solve_spectra", watched(spectra.solve_spectra))
+    solver, virtual = readers.solver(), readers.virtual()
+    solver.run(threads=1)
+    (data,) = given
+    single = solver.model.single
+    mosaic = np.ones(SIZE[::-1])
+    weight = 1 / demosaic_variance(mosaic, readers.rig.sensor.bayer)[:, readers.pixel[1], readers.pixel[0]]
+    operator = virtual.matrices.first[0] + (0 if single else virtual.matrices.zero[0])
+    wanted = torch.einsum("c,cfi,cfj->ij", torch.as_tensor(weight), operator, operator) * readers.shading**2
+    found = banded.to_dense(data)[0] if single else data[0]
+    # Lines' light is tabulated for the banded equations.
+    assert float((found - wanted).abs().max()) < (0.01 if single else 1e-6) * float(wanted.abs().max())
+
+
+def some_model(spectral: ScanLines | LineComb = COMB) -> tuple[PixelModel, Tensor, Tensor]:
+    """A model, and some pixels and depths."""
+    rig = published_rig()
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=spectral)
+    model = model_of_plan(rig, plan, WavelengthGrid(step_nm=10.0), correspondence(rig))
+    pixels = 290 * 890 + torch.linspace(60, 830, 5).long()
+    return model, pixels, torch.linspace(600, 900, 5, dtype=torch.float64)
+
+
+def random(*shape: int) -> Tensor:
+    return torch.rand(shape, generator=torch.Generator().manual_seed(len(shape)), dtype=torch.float64)
+
+
+@pytest.mark.parametrize("spectral", [COMB, COLOURS], ids=["grey", "colours"])
+def test_adjoint_and_matrix_are_those_of_the_forward_model(spectral: LineComb) -> None:
+    model, pixels, depth = some_model(spectral)
+    operator = model.operator(model.trace(pixels, depth), random(5), blur_px=0.3)
+    reflectance, signals = random(model.bands.count, 5), random(3, len(model.profiles), 5)
+    seen = operator.forward(reflectance)
+    assert float((seen * signals).sum()) == pytest.approx(
+        float((reflectance * operator.adjoint(signals)).sum()), rel=1e-12
+    )
+    by_matrix = torch.einsum("pcfj,jp->cfp", operator.matrix(), reflectance)
+    assert torch.allclose(by_matrix, seen, rtol=1e-12)
+
+
+@pytest.mark.parametrize("offset_std", [0.0, 0.2])
+def test_dense_equations_are_those_of_the_matrix_with_correlated_noise(offset_std: float) -> None:
+    model, pixels, depth = some_model()
+    traced = model.trace(pixels, depth)
+    radiance, weight = random(3, len(model.profiles), 5), 1 + random(3, len(model.profiles), 5)
+    variance = torch.full((3, 5), offset_std**2, dtype=torch.float64)
+    matrix, right, square = model.equations(traced, radiance, weight, variance, 0.3)
+    full = model.operator(traced, torch.ones_like(depth), 0.3).matrix()
+    for p in range(5):
+        wanted = torch.zeros_like(matrix[0])
+        side, squares = torch.zeros_like(right[0]), 0.0
+        for c in range(3):
+            inverse = torch.linalg.inv(torch.diag(1 / weight[c, :, p]) + offset_std**2)
+            wanted += full[p, c].T @ inverse @ full[p, c]
+            side += full[p, c].T @ inverse @ radiance[c, :, p]
+            squares += float(radiance[c, :, p] @ inverse @ radiance[c, :, p])
+        assert torch.allclose(matrix[p], wanted, rtol=1e-8, atol=1e-10 * float(wanted.abs().max()))
+        assert torch.allclose(right[p], side, rtol=1e-8, atol=1e-10 * float(side.abs().max()))
+        assert float(square[p]) == pytest.approx(squares, rel=1e-10)
+
+
+@pytest.mark.parametrize("variance", [0.0, 0.3, 1e6])
+def test_equations_without_the_offset_are_those_of_correlated_noise(variance: float) -> None:
+    operator, data, weight = random(12, 4), random(12, 1), random(1, 12, 1)[0]
+    weight[4] = 0
+    used = weight[:, 0] > 0
+    covariance = torch.diag(1 / weight[used, 0]) + variance
+    exact = operator[used].T @ torch.linalg.solve(covariance, torch.cat([operator, data], 1)[used])
+    model, y = (without_offset(v, weight, torch.tensor(variance)) for v in (operator, data))
+    assert torch.allclose((weight * model).T @ torch.cat([model, y], 1), exact, rtol=1e-6, atol=1e-9)
+
+
+def test_parts_and_displacements_of_traced_pixels() -> None:
+    model, pixels, depth = some_model()
+    traced = model.trace(pixels, depth)
+    some, moved = traced.part(slice(1, 3)), traced.displaced(0.5)
+    again = model.trace(pixels[1:3], depth[1:3])
+    assert torch.equal(some.column_px, again.column_px)
+    for order, footprint in traced.orders.items():
+        assert torch.allclose(some.orders[order].columns, again.orders[order].columns, atol=1e-9)
+        assert torch.equal(moved.orders[order].columns, footprint.columns + 0.5)
+    assert torch.equal(moved.column_px, traced.column_px)
+
+
+def test_single_lines_are_far_from_second_orders_and_other_patterns_are_not() -> None:
+    assert some_model(LINES)[0].orders == ORDERS
+    assert some_model(COMB)[0].orders == (*ORDERS, *SECOND_ORDERS)
+
+
+def test_a_pixel_outside_the_frame_has_no_zero_order_unless_its_column_was_measured() -> None:
+    model, pixels, depth = some_model()
+    # So near that the projector, to one side of the camera, does not reach it.
+    near = torch.full_like(depth, 150.0)
+    assert model.trace(pixels, depth).direct.all()
+    assert not model.trace(pixels, near).direct[0]
+    assert model.trace(pixels, near, torch.full_like(depth, 300.0)).direct.all()
+
+
+def test_frames_are_those_whose_lines_touch_a_band() -> None:
+    model, _, _ = some_model(LINES)
+    columns = torch.tensor([[100.0], [140.0], [500.0]])
+    some = torch.tensor([[True], [True], [False]])
+    lit = model.frames(columns, some)
+    assert model.lines is not None
+    centres = [model.lines.first_px + model.lines.step_px * line for line in (lit.start, lit.stop - 1)]
+    reach = LINES.width_px / 2 + EDGE_PX
+    assert 100 - reach - LINES.step_px < centres[0] <= 100 - reach
+    assert 140 + reach <= centres[1] < 140 + reach + LINES.step_px
+    assert not model.frames(columns, torch.zeros_like(some))
+
+
+def test_demosaicing_blurs_by_the_typical_distance_of_neighbours() -> None:
+    columns = np.array([[0.0, 0.7, 1.4, np.nan, 9.0], [0.0, -0.7, 50.0, 50.7, np.nan]])
+    assert demosaic_blur_px(columns) == pytest.approx(0.7 * DEMOSAIC_SPREAD**0.5)
+    assert demosaic_blur_px(np.full((2, 3), np.nan)) == 0.0
