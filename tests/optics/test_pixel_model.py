@@ -21,7 +21,8 @@ from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, de
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.planning.views import pixels_view
 from dsl_core.planning.virtual import VirtualPixels
-from dsl_core.reconstruction.spectral import dense_solver, spectra
+from dsl_core.reconstruction.spectral import dense_solver
+from dsl_core.reconstruction.spectral import solver as banded_solver
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction, model_of_plan
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.simulation.published_rig import published_rig
@@ -30,7 +31,7 @@ from dsl_core.workflows.inspection import FrameBlock, intensity_graph
 
 SIZE, DEPTH_MM, PITCH_PX = (40, 16), 700.0, 0.625
 #: Wide bands: what is 8 px outside the frame still counts a little, so that an edge elsewhere would show.
-GRID = WavelengthGrid(start_nm=430.0, stop_nm=655.0, step_nm=25.0)
+GRID = WavelengthGrid(start_nm=430.0, stop_nm=640.0, step_nm=35.0)
 LINES = ScanLines(width_px=5, step_px=4)
 COMB = LineComb(width_px=5, step_px=4, period_px=104)
 COLOURS = LineComb(width_px=5, step_px=4, period_px=104, shifts_px=(0, 8, 20))
@@ -44,20 +45,20 @@ def straight_rig() -> Rig:
     width, height = SIZE
     camera = Lens(width_px=width, height_px=height, fx_px=1024, fy_px=1024, cx_px=width / 2, cy_px=height / 2)
     fx = 1024 * PITCH_PX
-    projector = Lens(width_px=416, height_px=360, fx_px=fx, fy_px=fx, cx_px=320, cy_px=180)
+    projector = Lens(width_px=524, height_px=360, fx_px=fx, fy_px=fx, cx_px=464, cy_px=180)
     pose = Pose(rotation=((1, 0, 0), (0, 1, 0), (0, 0, 1)), translation_mm=(-70, 0, 0))
     return published_rig().model_copy(update={"camera": camera, "projector": projector, "pose": pose})
 
 
 def plan_of(spectral: ScanLines | LineComb) -> CapturePlan:
     return CapturePlan(
-        code=GrayCode(rows=False), spectral=spectral, camera_size_px=SIZE, projector_size_px=(416, 360)
+        code=GrayCode(rows=False), spectral=spectral, camera_size_px=SIZE, projector_size_px=(524, 360)
     )
 
 
 def columns_px() -> np.ndarray[Any, np.dtype[np.float32]]:
     """Columns of the plane at `DEPTH_MM`, exact in single precision, (rows, columns)."""
-    row = 320 - 64 + PITCH_PX * (np.arange(SIZE[0]) - SIZE[0] / 2)
+    row = 464 - 64 + PITCH_PX * (np.arange(SIZE[0]) - SIZE[0] / 2)
     return np.tile(row, (SIZE[1], 1)).astype(np.float32)
 
 
@@ -119,7 +120,7 @@ class Readers:
 
 @pytest.fixture(scope="module", params=[LINES, COMB, COLOURS], ids=["lines", "comb", "colours"])
 def readers(request: pytest.FixtureRequest) -> Readers:
-    return Readers(straight_rig(), plan_of(request.param), (13, 7))
+    return Readers(straight_rig(), plan_of(request.param), (14, 7))
 
 
 def spectrum(centres_nm: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -131,9 +132,9 @@ def spectrum(centres_nm: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[An
 def test_the_pixel_has_bands_just_inside_and_just_outside_the_margin(readers: Readers) -> None:
     """Otherwise the next test would not see an edge that is elsewhere."""
     _, traced = readers.solver().tile(slice(0, 16), slice(0, 40))
-    beyond = traced.orders[1].columns[:, 0] - 415.5
+    beyond = traced.orders[1].columns[:, 0] - 523.5
     assert ((beyond > 0) & (beyond < EDGE_PX)).any()
-    assert ((beyond > EDGE_PX) & (beyond < EDGE_PX + 2)).any()
+    assert ((beyond > EDGE_PX) & (beyond < EDGE_PX + 2)).any(), beyond
 
 
 def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) -> None:
@@ -169,7 +170,9 @@ def test_the_solvers_equations_are_those_of_the_predictions_operator(
         return call
 
     monkeypatch.setattr(dense_solver, "solve_dense", watched(dense_solver.solve_dense))
-    monkeypatch.setattr(spectra, "solve_spectra", watched(spectra.solve_spectra))
+    monkeypatch.setattr(
+        "dsl_core.reconstruction.spectral.spectra.solve_spectra", watched(banded_solver.solve_spectra)
+    )
     solver, virtual = readers.solver(), readers.virtual()
     solver.run(threads=1)
     (data,) = given
@@ -179,8 +182,9 @@ def test_the_solvers_equations_are_those_of_the_predictions_operator(
     operator = virtual.matrices.first[0] + (0 if single else virtual.matrices.zero[0])
     wanted = torch.einsum("c,cfi,cfj->ij", torch.as_tensor(weight), operator, operator) * readers.shading**2
     found = banded.to_dense(data)[0] if single else data[0]
+    assert torch.equal(found.diagonal() > 0, wanted.diagonal() > 0), "other bands belong to the model"
     # Lines' light is tabulated for the banded equations.
-    assert float((found - wanted).abs().max()) < (0.01 if single else 1e-6) * float(wanted.abs().max())
+    assert float((found - wanted).abs().max()) < (5e-4 if single else 1e-6) * float(wanted.abs().max())
 
 
 def some_model(spectral: ScanLines | LineComb = COMB) -> tuple[PixelModel, Tensor, Tensor]:
