@@ -1,0 +1,149 @@
+"""Light and film that changed are told apart, on signals that are summed up wavelength by wavelength."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+import torch
+from scipy.ndimage import gaussian_filter1d
+
+from dsl_core.calibration.drift.light import PlaneSignals, film_drift, light_drift
+from dsl_core.errors import CalibrationError
+from dsl_core.model.figure import Figure
+from dsl_core.optics.correspondence import GratingModel, zero_order
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.shading import Plane, plane_shading
+from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.published_rig import published_rig
+
+REFLECTANCE, NOISE = 0.99, 2e-3
+NM = np.arange(400.0, 701.0)
+RIG = published_rig()
+RIG = RIG.model_copy(
+    update={
+        "camera": RIG.camera.resized(160, 104),
+        "projector_response": RIG.projector_response.model_copy(update={"halo_peak_per_px": 0.0}),
+        "efficiency": {order: RIG.efficiency[order] for order in (1, -1)},
+    }
+)
+PLANE = Plane(np.array([0.03, -0.05, 1.0]) / 700.0)
+#: Some pixels, at random, so that all colours of the mosaic are among them.
+CHOSEN = np.sort(np.random.default_rng(0).permutation(160 * 104)[:3000])
+COLOURS = bayer_channels(RIG.sensor.bayer, 104, 160).ravel()[CHOSEN]
+DEPTH_MM, SHADING = (each.ravel()[CHOSEN] for each in (PLANE.depth_mm(RIG), plane_shading(RIG, PLANE)))
+
+
+def lines() -> np.ndarray:
+    """A line of five columns in each frame, forty apart."""
+    profiles = np.zeros((16, 640))
+    for k in range(16):
+        profiles[k, 40 * k : 40 * k + 5] = 1.0
+    return profiles
+
+
+@cache
+def light_of(order: int, shift_px: float, white: bool) -> np.ndarray:
+    """What the pixels see of one order, (frames, pixels), at unit efficiency."""
+    profiles = np.ones((1, 640)) if white else lines()
+    pixels, depth = torch.as_tensor(CHOSEN), torch.as_tensor(DEPTH_MM)
+    if order == 0:
+        columns, rows = (part.numpy()[None] for part in zero_order(RIG, pixels, depth))
+    else:
+        seen = GratingModel(RIG).trace(pixels, depth, order, NM)
+        columns, rows = seen.columns.numpy() + shift_px, seen.rows.numpy()
+    # Eight samples a column; beyond the frame there is no light.
+    fine = np.pad(np.repeat(profiles, 8, 1), ((0, 0), (400, 400)))
+    fine = gaussian_filter1d(fine, 8 * RIG.projector_response.blur_px, axis=1)
+    at = (columns + 0.5) * 8 - 0.5 + 400
+    at = np.where((rows > -0.5) & (rows < 359.5), at, -1.0)
+    response = chain_response(RIG, order, NM).sum(1)
+    total = np.zeros((len(profiles), len(CHOSEN)))
+    for k, profile in enumerate(fine):
+        lit = np.interp(at, np.arange(len(profile)), profile, 0.0, 0.0)
+        total[k] = lit[0] * response.sum(1)[COLOURS] if order == 0 else (lit * response[COLOURS].T).sum(0)
+    return np.asarray(total * SHADING * REFLECTANCE)
+
+
+def signals(
+    gains: dict[int, float] | None = None, shifts: dict[int, float] | None = None, white: bool = False
+) -> PlaneSignals:
+    """The pixels of the plane; ``gains`` and ``shifts`` (px) of orders are what changed."""
+    gains, shifts = gains or {}, shifts or {}
+    rng = np.random.default_rng(0)
+    radiance = np.asarray(sum(gains.get(m, 1.0) * light_of(m, shifts.get(m, 0.0), white) for m in (0, 1, -1)))
+    return PlaneSignals(
+        pixels=CHOSEN,
+        colours=COLOURS,
+        depth_mm=DEPTH_MM,
+        shading=SHADING,
+        profiles=np.ones((1, 640)) if white else lines(),
+        radiance=radiance + NOISE * rng.standard_normal(radiance.shape),
+        std=np.full(radiance.shape, NOISE),
+    )
+
+
+def by_name(figures: list[Figure]) -> dict[str, Figure]:
+    return {figure.name.split(",")[0]: figure for figure in figures}
+
+
+def test_a_film_as_it_was_has_not_moved() -> None:
+    figures = film_drift(RIG, signals(), REFLECTANCE)
+    assert all(figure.passed for figure in figures)
+    for order in ("+1", "-1"):
+        found = by_name(figures)
+        assert found[f"displacement of order {order}"].value == pytest.approx(0.0, abs=0.05)
+        assert found[f"brightness of order {order}"].value == pytest.approx(1.0, abs=0.01)
+
+
+def test_a_displaced_order_and_a_dim_one_are_each_told() -> None:
+    found = by_name(film_drift(RIG, signals({-1: 0.9}, {1: 0.5}), REFLECTANCE))
+    assert found["displacement of order +1"].value == pytest.approx(0.5, abs=0.06)
+    assert found["displacement of order -1"].value == pytest.approx(0.0, abs=0.05)
+    assert found["brightness of order +1"].value == pytest.approx(1.0, abs=0.02)
+    assert found["brightness of order -1"].value == pytest.approx(0.9, abs=0.01)
+    assert [name for name, figure in found.items() if not figure.passed] == [
+        "displacement of order +1",
+        "brightness of order -1",
+    ]
+
+
+def test_brightness_of_all_orders_alike_is_not_the_films() -> None:
+    dim = {0: 0.8, 1: 0.8, -1: 0.8}
+    found = by_name(film_drift(RIG, signals(dim), REFLECTANCE))
+    assert found["brightness of order +1"].value == pytest.approx(1.0, abs=0.01)
+
+
+def test_wrong_pixels_do_no_harm_and_widen_no_shift() -> None:
+    seen = signals()
+    dust = np.random.default_rng(1).random(seen.pixels.size) < 0.05
+    radiance = np.where(dust, 1.5 * seen.radiance, seen.radiance)
+    found = by_name(film_drift(RIG, replace(seen, radiance=radiance), REFLECTANCE))
+    assert found["displacement of order +1"].value == pytest.approx(0.0, abs=0.08)
+    assert found["brightness of order +1"].value == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("level", [1.0, 0.9])
+def test_white_is_compared_colour_by_colour(level: float) -> None:
+    seen = signals(white=True)
+    dim = np.where(seen.colours == 2, level, 1.0)
+    figures = light_drift(RIG, replace(seen, radiance=seen.radiance * dim), REFLECTANCE)
+    red, green, blue = (figure.value for figure in figures)
+    assert (red, green) == pytest.approx((1.0, 1.0), abs=0.01)
+    assert blue == pytest.approx(level, abs=0.01)
+    assert [figure.passed for figure in figures] == [True, True, level == 1.0]
+
+
+def test_saturated_pixels_do_not_count_and_too_few_are_told() -> None:
+    seen = signals(white=True)
+    half = np.arange(seen.pixels.size) % 2 == 0
+    spoilt = replace(
+        seen, radiance=np.where(half, 3.0, 1.0) * seen.radiance, std=np.where(half, np.inf, seen.std)
+    )
+    assert all(figure.passed for figure in light_drift(RIG, spoilt, REFLECTANCE))
+    with pytest.raises(CalibrationError, match="Only 0 red pixels"):
+        light_drift(RIG, replace(seen, std=np.full(seen.std.shape, np.inf)), REFLECTANCE)
+    with pytest.raises(CalibrationError, match="light only 0 of the chosen pixels directly"):
+        film_drift(RIG, replace(signals(), std=np.full((16, 3000), np.inf)), REFLECTANCE)

@@ -1,0 +1,120 @@
+"""Columns of a plane on a stage as a function of all that is uncertain, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.calibration.common.tiles import ColumnSamples
+from dsl_core.calibration.geometry.bundle import SHARED
+from dsl_core.calibration.geometry.stage_planes import (
+    BOW_RADIUS_MM,
+    DISTANCE,
+    GAIN,
+    SLOPES,
+    STEPS,
+    StageProblem,
+    covariance_root,
+    plane_of,
+    require_agreement,
+    require_alike,
+    require_flat,
+    require_steps,
+    shared_parameters,
+)
+from dsl_core.errors import CalibrationError
+from dsl_core.optics.correspondence import zero_order
+from dsl_core.simulation.published_rig import published_rig
+
+RIG = published_rig()
+POSITIONS = [600.0, 700.0, 800.0]
+
+
+def problem(covariance: np.ndarray | None = None) -> StageProblem:
+    """Samples on a grid of whole pixels; columns are not yet those of any plane."""
+    x, y = (
+        axis.ravel().astype(float) for axis in np.meshgrid(np.arange(50, 850, 80), np.arange(40, 560, 60))
+    )
+    part = ColumnSamples(np.stack([x, y], 1), np.zeros(x.size), np.full(x.size, 0.01))
+    return StageProblem(RIG, POSITIONS, [part] * 3, covariance, 0.01)
+
+
+def numbers() -> np.ndarray:
+    found = np.zeros(STEPS + 3)
+    found[SLOPES], found[DISTANCE], found[GAIN] = (0.03, -0.02), 605.0, 1e-4
+    found[STEPS:] = 0.01, -0.02, 0.0
+    return found
+
+
+def test_columns_are_those_of_the_zero_order_on_the_planes() -> None:
+    stage, values = problem(), numbers()
+    distances = stage.distances_mm(values)
+    normal = np.sqrt(1 + 0.03**2 + 0.02**2)
+    assert distances == pytest.approx([605.01, 604.98 + 100 * 1.0001 / normal, 605.0 + 200 * 1.0001 / normal])
+    for k, distance in enumerate(distances):
+        mine = stage.position_of == k
+        x, y = stage.camera_px[mine].astype(int).T
+        depth = plane_of(values[SLOPES], distance).depth_mm(RIG)[y, x]
+        column, _ = zero_order(RIG, torch.as_tensor(y * RIG.camera.width_px + x), torch.as_tensor(depth))
+        assert -stage.residual_px(values)[mine] == pytest.approx(column.numpy(), abs=1e-6)
+
+
+def test_derivatives_are_those_of_the_columns() -> None:
+    covariance = np.diag(np.square(np.full(SHARED, 1e-4)))
+    stage, values = problem(covariance), numbers()
+    free = np.arange(len(values))
+    jacobian = stage.jacobian(values, free)
+    move = np.random.default_rng(0).standard_normal(len(values)) * 1e-5
+    change = stage.residual_px(values) - stage.residual_px(values + move)
+    assert change == pytest.approx(jacobian @ move, abs=1e-7 + 1e-3 * np.abs(change).max())
+
+
+def test_a_bulge_of_a_millimetre_falls_off_to_the_rim() -> None:
+    stage, values = problem(), numbers()
+    points = stage.points_mm(values)
+    rim = np.hypot(*(points[:2] - points[:2].mean(1, keepdims=True))) / BOW_RADIUS_MM
+    farther = 1 + rim**2 / stage.distances_mm(values)[stage.position_of]
+    slope = stage.bulge(values) / (farther - 1)
+    # Points farther away move alike per millimetre wherever they are in the picture, within the geometry.
+    assert np.ptp(np.sign(slope)) == 0
+    assert np.abs(stage.bulge(values)).argmin() == rim.argmin()
+
+
+def test_the_root_of_a_covariance_gives_it_back_whatever_the_scales() -> None:
+    rng = np.random.default_rng(0)
+    mix = rng.standard_normal((24, 24)) * np.geomspace(1e-6, 1e3, 24)[:, None]
+    covariance = mix @ mix.T
+    root = covariance_root(covariance)
+    scale = np.sqrt(np.diag(covariance))
+    assert (root @ root.T) / np.outer(scale, scale) == pytest.approx(
+        covariance / np.outer(scale, scale), abs=1e-9
+    )
+
+
+def test_parameters_are_those_of_the_rig() -> None:
+    found = shared_parameters(RIG)
+    assert found[:4] == pytest.approx(
+        [RIG.camera.fx_px, RIG.camera.fy_px, RIG.camera.cx_px, RIG.camera.cy_px]
+    )
+    assert found[9] == RIG.projector.fx_px
+    assert found[21:] == pytest.approx(RIG.pose.translation_mm)
+
+
+def test_steps_flatness_and_agreement_have_limits() -> None:
+    at = np.array([0.0, 100.0, 200.0])
+    assert require_steps(at, np.array([600.0, 700.5, 801.0])) == pytest.approx(1.005)
+    with pytest.raises(CalibrationError, match=r"position 100 mm stands \+2.00 mm"):
+        require_steps(at, np.array([600.0, 702.0, 800.0]))
+    with pytest.raises(CalibrationError, match=r"1\.030 times as far apart"):
+        require_steps(at, np.array([600.0, 703.0, 806.0]))
+    require_flat(at, np.array([0.1, 0.29, 0.1]))
+    with pytest.raises(CalibrationError, match="position 100 mm"):
+        require_flat(at, np.array([0.1, 0.31, 0.1]))
+    # Before the refinement all bend alike, which is no reason to refuse one.
+    require_alike(at, np.array([1.0, 1.2, 1.1]))
+    with pytest.raises(CalibrationError, match="position 200 mm"):
+        require_alike(at, np.array([0.2, 0.2, 1.0]))
+    require_agreement(3.9, 1.0, 0.1, 1.0)
+    with pytest.raises(CalibrationError, match=r"move by 4\.1 of"):
+        require_agreement(4.1, 1.0, 0.1, 1.0)
