@@ -6,7 +6,7 @@ Frames of reference
     The camera frame is that of OpenCV: x right, y down, z forward. A rig's pose maps camera
     coordinates to projector coordinates, ``x_projector = R x_camera + t``.
 Pixels
-    Pixel centres lie at integer coordinates, so pixel ``i`` covers ``[i - 0.5, i + 0.5)``.
+    Pixel centres are at integer coordinates, so pixel ``i`` covers ``[i - 0.5, i + 0.5)``.
     Images are (rows, columns); colour images end in (3,) = R, G, B; cubes are band first,
     (wavelength, y, x).
 Orders

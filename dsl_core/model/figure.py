@@ -1,4 +1,4 @@
-"""A measured figure beside its limits: what a check says."""
+"""A measured figure with its limits: the result of a check."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dsl_core.model.base import Record
 class Figure(Record):
     """A value with unit, uncertainty and limits; ``advice`` says what to do when it is outside them.
 
-    ``std`` is one standard deviation, None for what is counted. A limit of None does not exist. A figure
-    without limits only informs.
+    ``std`` is one standard deviation, None for counts. A limit of None does not exist. A figure without
+    limits only informs.
     """
 
     name: str
@@ -22,7 +22,7 @@ class Figure(Record):
 
     @property
     def passed(self) -> bool:
-        """Whether the value lies within its limits."""
+        """Whether the value is within its limits."""
         return (self.low is None or self.value >= self.low) and (self.high is None or self.value <= self.high)
 
     @property

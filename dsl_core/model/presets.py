@@ -106,7 +106,7 @@ def whole_cycles(exposure_ms: float, period_ms: float) -> int:
 
 
 def on_cycles(plan: CapturePlan, period_ms: float) -> CapturePlan:
-    """The plan with every exposure at whole cycles of a projector's frame period; what is there stays."""
+    """The plan with every exposure at whole cycles of a projector's frame period; the rest stays."""
     settings = tuple(_on_cycles(setting, period_ms) for setting in plan.settings)
     return plan.model_copy(update={"settings": settings})
 

@@ -258,7 +258,7 @@ CASES = (
         "plane not flat at every position",
         "fit of the depth stage",
         _redo("depth-stage", *PLANES),
-        r"planes contradict the geometry .* bulged towards the camera by 0\.\d+ ± 0\.\d+ mm",
+        r"planes contradict the geometry .* bulge towards the camera by 0\.\d+ ± 0\.\d+ mm",
         {"bow_mm": "0.5"},
         touched=_depth_stage(*PLANES),
     ),

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 LIGHTS = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
 #: Every so many patches are held out together.
 FOLDS = 4
-#: Patches with more saturated pixels, or fewer pixels, are wrong.
+#: Patches with more saturated pixels, or fewer pixels, are refused.
 SATURATED, MIN_PIXELS = 0.02, 8
 #: The white that the rig already reproduces is known to this, at best.
 WHITE_FLOOR = 2e-4
@@ -61,7 +61,7 @@ class ChartPictures:
 
 
 def expected_colours(rig: Rig, chart: str) -> Floats:
-    """Signals of the 24 patches under white as the rig has it, (24, 3); what orientations are told by."""
+    """Signals of the 24 patches under white as the rig has it, (24, 3); used to recognise orientations."""
     data = _surfaces(chart)
     return SpectralModel(rig).predict(_zero(), data)[0][:, :, 3]
 
@@ -69,7 +69,7 @@ def expected_colours(rig: Rig, chart: str) -> Floats:
 def measure_patches(
     pictures: ChartPictures, rig: Rig, samples: PatchSamples, chart: str
 ) -> list[PatchSignals]:
-    """Signals at unit shading, for each light; raises `CalibrationError` naming a patch that is no good."""
+    """Signals at unit shading, for each light; raises `CalibrationError` naming an unusable patch."""
     seen = [
         patch_signals(picture / pictures.shading, pictures.saturated, rig.sensor.bayer, samples)
         for picture in pictures.radiance

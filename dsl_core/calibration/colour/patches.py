@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 #: Inner part of a patch that is measured: half width as a share of the distance between patches.
 INNER = 0.28
-#: Mean logarithmic distance of measured from expected colours: above it the chart is none.
+#: Mean logarithmic distance of measured from expected colours: above it, it is not this chart.
 NOT_THIS_CHART = 0.35
 #: The next best orientation must be this many times farther off.
 CLEARLY = 1.5
@@ -33,9 +33,9 @@ CORNER_REACH = 0.3
 
 @dataclass(frozen=True)
 class ChartPose:
-    """Where the chart lies in a picture.
+    """Where the chart is in a picture.
 
-    ``corners_px`` (4, 2) are column and row of the outer corners of the grid of patches: beside the first
+    ``corners_px`` (4, 2) are column and row of the outer corners of the grid of patches: at the first
     patch (dark skin), the sixth (bluish green), the last (black) and the nineteenth (white).
     ``quarter_turns`` says how far the chart is turned clockwise, to the nearest right angle.
     ``colour_distance`` is the mean logarithmic distance of the patches' colours from those expected.
@@ -67,7 +67,7 @@ def chart_picture(mosaic: NDArray[np.floating], bayer: BayerPattern) -> NDArray[
 def find_chart(mosaic: NDArray[np.floating], bayer: BayerPattern, expected: Floats, name: str) -> ChartPose:
     """Find the chart in any orientation; ``expected`` (24, 3) are its colours up to one scale a channel.
 
-    Raises `CalibrationError` that calls the picture ``name`` when there is no chart, or another one.
+    Raises `CalibrationError` that calls the picture ``name`` when there is no chart, or a different one.
     """
     picture = chart_picture(mosaic, bayer)
     centres = _detected_centres(picture)
@@ -102,7 +102,7 @@ def orient_chart(
         raise CalibrationError(
             f"What was found in {name} does not have the colours of a classic Color Checker in any"
             f" orientation (mean difference {100 * np.expm1(distance):.0f} %). Check that it is the classic"
-            " chart of 24 patches, that its corners are right, and that no colours are exchanged."
+            " chart of 24 patches, that its corners are right, and that no colours are swapped."
         )
     if _signed_area(corners) < 0:
         raise CalibrationError(

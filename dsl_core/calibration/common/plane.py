@@ -26,7 +26,7 @@ LEAST_WIDTH = 0.02
 
 @dataclass(frozen=True)
 class TargetPlane:
-    """A plane, the pixels that lie on it (rows, columns) and the rms of their depths about it, mm."""
+    """A plane, the pixels on it (rows, columns) and the rms of their depths about it, mm."""
 
     plane: Plane
     on_plane: Mask
@@ -34,7 +34,7 @@ class TargetPlane:
 
 
 def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = None) -> TargetPlane:
-    """The plane through most of the depths (rows, columns); ``start`` marks pixels that surely lie on it.
+    """The plane through most of the depths (rows, columns); ``start`` marks pixels that are certainly on it.
 
     A plane's inverse depth is affine in the image coordinates, and inverse depth is nearly linear in the
     projector column, so that the rounding of columns averages out without a bias. Raises `CalibrationError`
@@ -47,7 +47,7 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
     for _ in range(ROUNDS):
         if on_plane.sum() < MIN_PIXELS:
             raise CalibrationError(
-                f"Only {int(on_plane.sum())} pixels lie on one plane. Check that a flat target fills the"
+                f"Only {int(on_plane.sum())} pixels are on one plane. Check that a flat target fills the"
                 " middle of the picture, that the projector lights it, and that the code is readable."
             )
         _require_area(rays[:2, on_plane])
@@ -63,11 +63,11 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
 
 
 def _require_area(rays: Floats) -> None:
-    """Raise `CalibrationError` where pixels (2, n) lie along one line, which many planes contain."""
+    """Raise `CalibrationError` where pixels (2, n) form a line, which many planes contain."""
     narrow, wide = np.linalg.eigvalsh(np.cov(rays))
     if narrow < LEAST_WIDTH**2 * wide:
         raise CalibrationError(
-            "The pixels that lie on one plane form a line, which does not tell how it is turned."
+            "The pixels on the plane form a line, which does not determine its tilt."
             " Check that the flat target fills the middle of the picture and that the projector lights it."
         )
 

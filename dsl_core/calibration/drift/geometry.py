@@ -1,7 +1,7 @@
-"""Whether lenses and pose still are as calibrated, from one coded picture of a flat target.
+"""Whether lenses and pose are still as calibrated, from one coded picture of a flat target.
 
 Two tests that need no known position. A camera pixel sees the projector along a line: the column it decodes
-says where on that line, and so which row it must decode. And points of a plane must lie on a plane. Both
+says where on that line, and so which row it must decode. And points of a plane must be on a plane. Both
 leave residuals in projector pixels; what varies smoothly over the image is drift, the rest is rounding.
 """
 
@@ -57,8 +57,8 @@ def geometry_drift(
         _figure(
             "column drift on a plane",
             smooth_part(column[known] - on_plane, known),
-            "A lens or the pose has changed, or the target is not flat: try a flat target, else repeat the"
-            " geometry and depth-stage calibrations.",
+            "A lens or the pose has changed, or the target is not flat: try a flat target; if that does not"
+            " help, repeat the geometry and depth-stage calibrations.",
         ),
     ]
 

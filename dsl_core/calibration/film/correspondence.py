@@ -221,7 +221,7 @@ def _smooth(values: Floats, weight: Floats) -> Floats:
     v, u = (np.linspace(-1, 1, n) for n in values.shape)
     terms = [np.outer(v**i, u**j).ravel() for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
     basis = np.stack(terms, 1)
-    # No node outweighs typical ones much: at the edge of the image a few would else decide everywhere.
+    # No node outweighs typical ones much: otherwise a few at the edge of the image would decide everywhere.
     known = weight.ravel() > 0
     root = np.sqrt(np.minimum(weight.ravel()[known], 4 * np.median(weight.ravel()[known])))
     solution = np.linalg.lstsq(basis[known] * root[:, None], values.ravel()[known] * root, rcond=None)[0]
@@ -255,8 +255,8 @@ def _record(samples: GridSamples, maps: Floats) -> CorrespondenceGrid:
 def fit_stage_grid(rig: Rig, samples: OrderSamples) -> GridFit:
     """Eq. (2) of the seed at the middles of all tiles, from samples of planes at three positions or more.
 
-    The grid wants the same depths and wavelengths at every node; what samples differ from these is little,
-    and is taken from the fitted film of ``rig``. Raises `CalibrationError` as `fit_grid` does.
+    The grid needs the same depths and wavelengths at every node; samples differ from these a little, which
+    the fitted film of ``rig`` corrects. Raises `CalibrationError` as `fit_grid` does.
     """
     fit = fit_grid(grid_samples(rig, samples))
     return replace(fit, grid=_rounded(fit.grid))

@@ -35,7 +35,7 @@ ORDERS = (1, -1)
 FINE_ROUNDS = 2
 #: Tiles, of both orders together, that a capture needs.
 MIN_TILES = 40
-#: A filter's light lies this far (px) from where all others say it should: another filter, a tilted one.
+#: A filter's light is this far (px) from where all others put it: another filter, or a tilted one.
 WRONG_PX, OFF_PX = 2.0, 0.5
 #: Doubt about a filter: this far off (px).
 DOUBT_PX = 0.15
@@ -168,15 +168,15 @@ def _dispersion(rig: Rig) -> float:
 def _require_filters(
     mounted: Rig, fitted: Rig, data: StageData, samples: OrderSamples, limit_px: float
 ) -> None:
-    """Raise `CalibrationError` when one filter's light lies elsewhere than all others say."""
+    """Raise `CalibrationError` when one filter's light is not where all others put it."""
     limit_nm = limit_px / _dispersion(fitted)
     if np.abs(_shifts_nm(fitted, data, samples)).max() < limit_nm:
         return
     position, name, off_nm = _odd_one(mounted, fitted, data, samples)
     raise CalibrationError(
-        f"Position {data.name(position, name)}: the first orders lie where light of another wavelength would,"
-        f" about {off_nm:+.1f} nm off. Check that the filter is the right one, not tilted, and nothing moved,"
-        " and capture this step again."
+        f"Position {data.name(position, name)}: the first orders are where light of another wavelength"
+        f" would be, about {off_nm:+.1f} nm off. Check that the filter is the right one, not tilted, and"
+        " nothing moved, and capture this step again."
     )
 
 
@@ -239,9 +239,9 @@ def _positions(data: StageData, planes: PlaneRefinement) -> tuple[StagePosition,
 
 
 def _warnings(data: StageData, seen: Sequence[FilterSeen]) -> list[str]:
-    """Filters whose light lies a little off."""
+    """Filters whose light is slightly off."""
     return [
-        f"Through the filter of {each.filter_nm:g} nm first orders lie {shift:+.2f} px off at"
+        f"Through the filter of {each.filter_nm:g} nm first orders are {shift:+.2f} px off at"
         f" {position:g} mm; it may be tilted or its transmission not the one given"
         for each in seen
         for position, shift in zip(data.positions_mm, each.shift_px, strict=True)
@@ -253,11 +253,11 @@ def _warnings(data: StageData, seen: Sequence[FilterSeen]) -> list[str]:
 class StageCurve:
     """One order at one filter's wavelength: columns (px) by film and residual, and by the data-driven grid.
 
-    NaN where the light would come from beside the projector's frame, so that nothing was measured.
+    NaN where the light would come from outside the projector's frame, so that nothing was measured.
 
     ``depth_mm``, ``film_px`` and ``grid_px`` (None without a grid) are curves. ``seen_mm`` are positions of
-    the stage, ``seen_film_px`` the film's columns there, and ``shift_px`` by how much the median over the
-    whole picture was measured beside them.
+    the stage, ``seen_film_px`` the film's columns there, and ``shift_px`` the median
+    offset of what was measured over the whole picture.
     """
 
     order: int

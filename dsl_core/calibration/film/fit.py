@@ -33,7 +33,7 @@ ROUNDS = 15
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
 HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
-#: either direction (seven drawn rigs, whose films then lie within 1.0 of their deviations, rms).
+#: either direction (seven drawn rigs, whose films are then within 1.0 of their deviations, rms).
 COMMON_PX = 0.0015
 MIN_SAMPLES = 100
 

@@ -50,7 +50,7 @@ def grey_of(picture: NDArray[Any], bayer: BayerPattern | None = None) -> NDArray
 def find_corners(grey: NDArray[np.float32], board: Board, name: str) -> Corners:
     """Corners of the board in a linear grey picture, shape (rows, columns).
 
-    Raises `CalibrationError` that calls the picture ``name`` when the board is not there.
+    Raises `CalibrationError` that calls the picture ``name`` when the board is not found.
     """
     if not np.isfinite(grey).all():
         raise CalibrationError(f"{name} holds values that are not finite. Take the picture again.")
@@ -151,7 +151,7 @@ def _exposure_hint(eight_bit: NDArray[np.uint8], grey: NDArray[np.float32]) -> s
 def refine_corners(frames: PoseFrames, corners: Corners, board: Board) -> tuple[Corners, float]:
     """Corners at the crossing of the edges around them, and the median blur of these edges, px.
 
-    Corners whose edges cannot be told stay where they were.
+    Corners whose edges cannot be fitted stay where they were.
     """
     along = _steps_px(corners, board)
     light = _full_light(frames)
@@ -180,7 +180,7 @@ def _full_light(frames: PoseFrames) -> NDArray[np.float32]:
 
 
 def _bends_per_px(corners: Corners, board: Board) -> Floats:
-    """Curvature of the edges along board x and y at every corner, (corners, 2), from corners beside it.
+    """Curvature of the edges along board x and y at every corner, (corners, 2), from its neighbours.
 
     Straight lines stay straight in any perspective, so that what bends them is the lens. Corners without
     neighbours on both sides take what the nearest other has.
@@ -216,7 +216,7 @@ def _steps_px(corners: Corners, board: Board) -> Floats:
     places = corner_positions_mm(board)[corners.ids, :2] / board.square_mm
     homography, _ = cv2.findHomography(places, corners.points_px, cv2.RANSAC, 3.0)
     if homography is None:
-        raise CalibrationError("The corners of the board lie on one line. Leave this pose out.")
+        raise CalibrationError("The corners of the board are on one line. Leave this pose out.")
     ends = []
     for step in np.array([[0.5, 0.0], [0.0, 0.5]]):
         both = cv2.perspectiveTransform(np.stack([places + step, places - step]), homography)

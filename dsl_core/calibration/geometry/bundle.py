@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 LENS = 9
 #: Both lenses and the pose between them (rotation vector, translation) come before the poses of the board.
 SHARED = 2 * LENS + 6
-#: Corners farther off than this many robust deviations do not lie on the plane of the board, or are misread.
+#: Corners farther off than this many robust deviations are not on the plane of the board, or are misread.
 OUTLIER_SIGMAS, MAX_ROUNDS = 4.0, 12
 #: Before that, corners weigh less the farther off they are, from this many deviations on.
 CAUCHY_SIGMAS, ROBUST_ROUNDS = 2.0, 3
@@ -39,7 +39,7 @@ class Adjustment:
     """The fitted parameters with their covariance, and the residuals (px) of every corner.
 
     ``parameters`` holds both lenses (9 each), the pose between them (rotation vector, mm) and 6 numbers a
-    board pose. Residuals are predicted minus seen, (corners, 2); ``used`` marks corners that are no outliers.
+    board pose. Residuals are predicted minus seen, (corners, 2); ``used`` marks all but outliers.
     """
 
     parameters: Floats
@@ -140,7 +140,7 @@ def adjust(
 ) -> Adjustment:
     """Minimise the weighted squares of all corners, first with robust weights, then without the outliers.
 
-    Camera and projector are weighted by their own noise, which the residuals tell. Raises
+    Camera and projector are weighted by their own noise, estimated from the residuals. Raises
     `CalibrationError` when the fit does not converge.
     """
     problem = Problem(poses)
@@ -249,7 +249,7 @@ def triangulate(shared: Floats, seen: PoseObservation, start_mm: Floats) -> Floa
     """Points (corners, 3) in camera coordinates, mm, whose images are nearest to those seen, in pixels.
 
     ``shared`` are the parameters of lenses and pose (see `bundle`). Gauss and Newton from ``start_mm``; the
-    board plays no part in where they end.
+    board itself is not used.
     """
     points = start_mm
     stereo = np.broadcast_to(shared[STEREO], (len(points), 6))

@@ -2,7 +2,7 @@
 
 Near a transition of a bit the difference of pattern and inverse, over their sum, changes gradually, since
 the projector's pixels are blurred and a camera pixel is wide. Every boundary of projector pixels is the
-transition of one bit, so that every camera pixel tells its place far below one projector pixel. Around a
+transition of one bit, so that every camera pixel locates itself far below one projector pixel. Around a
 corner a quadratic map from camera to projector is fitted to all bits of all pixels at once; blur and contrast
 are fitted too.
 """
@@ -40,7 +40,7 @@ MIN_PIXELS = 30
 
 @dataclass(frozen=True)
 class CodeLight:
-    """What a pose says of the finest bits of one axis.
+    """The finest bits of one axis in the pictures of a pose.
 
     ``contrast`` (bits, rows, columns) is the difference of pattern and inverse over their sum, from -1 to 1;
     ``weight`` (rows, columns) the inverse of its variance up to a factor, 0 where a pixel must not count.
@@ -205,5 +205,5 @@ class _CodeFit:
         return np.asarray(start + limit * step)
 
     def _near(self, residual: Floats, weight: Floats) -> NDArray[np.bool_]:
-        """Differences that are no outliers."""
+        """Differences that are not outliers."""
         return np.asarray(np.abs(residual) * np.sqrt(weight) <= OUTLIER_SIGMAS * self.sigma[:, None])

@@ -19,7 +19,7 @@ from dsl_core.optics.sensor import bayer_channels
 
 Floats = NDArray[np.float64]
 
-#: Pixels within this share of the distance between corners tell of a corner, and at most so many pixels.
+#: Pixels within this share of the distance between corners are used for a corner, at most so far away.
 REACH, MIN_REACH_PX, MAX_REACH_PX = 0.6, 3.0, 16.0
 ROUNDS = 12
 #: Blur: at the start, and at least; below, the square of a pixel hides it.
@@ -64,7 +64,7 @@ def fit_corners(
     """Fit corners in a linear picture (rows, columns), not finite where a pixel must not count.
 
     ``start_px`` (corners, 2); ``along_px`` (corners, 2, 2): one square's step along board x and y. Only
-    pixels within ``gap`` squares of an edge count (markers lie beyond). ``bend_per_px`` (corners, 2) is the
+    pixels within ``gap`` squares of an edge count (markers are beyond). ``bend_per_px`` (corners, 2) is the
     curvature of both edges in the picture, as lenses bend them, towards the left of board x and y; none if
     not given. Corners without a fit are NaN.
     """

@@ -2,7 +2,7 @@
 
 A board gives few, well known points; a plane under the binary code and lines gives a column at every pixel,
 at a hundredth of a pixel. What the board leaves uncertain is moved, within its covariance, until the
-points of every position lie on a plane, the planes are parallel, and their distances are those of the stage.
+points of every position are on a plane, the planes are parallel, and their distances are those of the stage.
 """
 
 from __future__ import annotations
@@ -243,6 +243,6 @@ def systematic_std(rig: Rig, shared: Floats, root: Floats, posterior: Floats) ->
 
 
 def _rms(values: Floats) -> float:
-    # Tiles at the rim of the light are few and far off; the middle 95 % tell what the plane is like.
+    # Tiles at the rim of the light are few and far off; the middle 95 % show what the plane is like.
     limit = np.percentile(np.abs(values), 95)
     return float(np.sqrt(np.mean(values[np.abs(values) <= limit] ** 2)))

@@ -20,14 +20,14 @@ from dsl_core.model.geometry import Lens
 
 #: A pose is blurred when its edges are this many times as wide as those of the others, and so wide (px).
 BLURRED, LEAST_BLUR_PX = 2.0, 0.8
-#: Pictures are linear when half the light reads as half the value; gammas farther from 1 are told.
+#: Pictures are linear when half the light reads as half the value; gammas farther from 1 are reported.
 GAMMA_TOLERANCE = 0.15
 #: Pixels whose pattern and inverse differ by less than this share see half the light in each.
 HALF_LIT, LEAST_PIXELS = 0.15, 200
 Size = tuple[int, int]
 
 MIN_POSES = 3
-#: Poses tilted less than this against each other do not tell the focal lengths; advised is more.
+#: Poses tilted less than this against each other do not determine the focal lengths; more is advised.
 MIN_TILT_DEG, GOOD_TILT_DEG = 5.0, 20.0
 #: Share of the pixels on the board that may be saturated.
 MAX_SATURATED = 0.01
@@ -49,7 +49,7 @@ class PoseSeries:
 def observe_series(
     poses: Iterable[PoseFrames], board: Board, projector_size_px: tuple[int, int]
 ) -> PoseSeries:
-    """Look at one pose after the other, and go on without those whose board or code cannot be read.
+    """Look at one pose after the other, and leave out those whose board or code cannot be read.
 
     Raises `CalibrationError` with the reasons when fewer than three are left. What the iterable raises (such
     as pictures that are missing) ends the series.
@@ -87,7 +87,7 @@ def _blurred(seen: list[PoseObservation]) -> list[str]:
 
 
 def picture_gamma(frames: PoseFrames, projector_size_px: tuple[int, int]) -> float:
-    """From light to the value of a pixel: the exponent, 1 for a linear camera; NaN where nothing tells.
+    """From light to the value of a pixel: the exponent, 1 for a linear camera; NaN where unknown.
 
     Where the edges of the finest stripes cross a pixel, it gets half of white's light from the pattern and
     from its inverse, so that their sum over white is ``2 * 0.5**gamma``.
@@ -110,7 +110,7 @@ def _bent(gammas: NDArray[np.float64]) -> list[str]:
     if not len(known) or abs(np.median(known) - 1) <= GAMMA_TOLERANCE:
         return []
     return [
-        f"The pictures are not linear: half the light reads like a gamma of {np.median(known):.2f}. Switch"
+        f"The pictures are not linear: half the light reads as a gamma of {np.median(known):.2f}. Switch"
         " off the camera's gamma and the projector's dynamic contrast, which shift corners and bits."
     ]
 
@@ -128,7 +128,7 @@ def exposure_warning(frames: PoseFrames, seen: PoseObservation) -> str | None:
 
 
 def check_poses(poses: Sequence[PoseObservation], camera_size_px: Size) -> None:
-    """Raise `CalibrationError` for poses that no calibration can come from, saying what to do."""
+    """Raise `CalibrationError` for poses that cannot be calibrated from, saying what to do."""
     if len(poses) < MIN_POSES:
         raise CalibrationError(
             f"{len(poses)} usable poses of the board are too few: {MIN_POSES} are needed, 10 are good."
@@ -192,7 +192,7 @@ def board_normal(
 
     homography, _ = cv2.findHomography(board_mm[:, :2], camera_px, 0)
     if homography is None:
-        raise CalibrationError(f"The corners of {name} lie on one line. Leave this pose out.")
+        raise CalibrationError(f"The corners of {name} are on one line. Leave this pose out.")
     normal = matrix.T @ np.linalg.inv(np.asarray(homography, np.float64)).T @ np.array([0.0, 0.0, 1.0])
     return np.asarray(normal / np.linalg.norm(normal))
 
@@ -277,7 +277,7 @@ def _corner_px(found: GeometryCalibration, lens: Lens, first: int) -> float:
 
 
 def _size_doubt(found: GeometryCalibration, baseline_mm: float | None) -> list[str]:
-    """The size of the squares scales all lengths, so that only another known length can tell it is wrong."""
+    """The size of the squares scales all lengths, so that only another known length can show an error."""
     distance = float(np.linalg.norm(found.pose.translation_mm))
     if baseline_mm is None or abs(distance / baseline_mm - 1) <= 0.1:
         return []

@@ -26,8 +26,8 @@ Floats = NDArray[np.float64]
 
 #: Share of the corners around which the code must be readable.
 MIN_READ = 0.4
-#: Pixels within this share of the distance between corners tell of a corner (into all four squares around
-#: it), at most so far away, where lenses still are nearly quadratic.
+#: Pixels within this share of the distance between corners are used for a corner (into all four squares
+#: around it), at most so far away, where lenses are still nearly quadratic.
 REACH, MIN_REACH_PX, MAX_REACH_PX = 0.8, 4.0, 24.0
 #: Residual (projector px) beyond which a pixel is decoded wrongly.
 INLIER_PX = 1.5
@@ -35,7 +35,7 @@ INLIER_PX = 1.5
 MIN_MARGIN = 0.05
 #: Pixels with less light than this share of the brightest ones are in shadow.
 MIN_LIGHT = 0.03
-#: Share of readable pixels that may tell of places that the projector does not have.
+#: Share of readable pixels that may decode to places outside the projector.
 MAX_OUTSIDE = 0.02
 
 
@@ -45,7 +45,7 @@ class PoseObservation:
 
     ``board_mm`` (x, y, 0) on the board, ``camera_px`` and ``projector_px`` (column, row). ``slope`` (corners,
     2, 2) is how the projector's place changes with the camera's on the board: the code was looked up at
-    ``camera_px``, so that an error there comes back in ``projector_px``, times the slope; None counts as
+    ``camera_px``, so that an error there enters ``projector_px`` times the slope; None counts as
     zero. ``blur_px`` is that of the edges in the camera's picture (deviation, median of the corners).
     """
 
@@ -73,7 +73,7 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
     """Corners of the board in camera and projector pixels; without those around which too little decodes.
 
     Raises `CalibrationError` naming the pose when pictures are missing or differ in size, when the board is
-    not found, or when the code says nothing around its corners.
+    not found, or when the code cannot be read around its corners.
     """
     check_frames(frames, projector_size_px)
     corners = find_corners(grey_of(frames.white, frames.bayer), board, f"the white picture of {frames.name}")
@@ -168,7 +168,7 @@ def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[
     if outside > MAX_OUTSIDE:
         width, height = projector_size_px
         raise CalibrationError(
-            f"{name}: {outside:.0%} of the pixels that can be read tell of places outside a projector of"
+            f"{name}: {outside:.0%} of the readable pixels decode to places outside a projector of"
             f" {width} x {height} px. Correct its size; width and height may be exchanged."
         )
 
@@ -180,7 +180,7 @@ def readable_share(code: DecodedCode, corners: Corners) -> float:
 
 
 def windows_around(code: DecodedCode, corners: Corners) -> list[CornerWindow]:
-    """The pixels that tell of each corner."""
+    """The pixels used for each corner."""
     radii = np.clip(REACH * pitches_px(corners.points_px), MIN_REACH_PX, MAX_REACH_PX)
     return [
         CornerWindow.around(point, radius, code.undecided.shape)
@@ -208,7 +208,7 @@ def decoded_maps(code: DecodedCode, window: CornerWindow) -> Floats | None:
 
 
 def _surrounds(near: Floats) -> bool:
-    """Whether points lie on all sides of the origin, so that nothing is extrapolated."""
+    """Whether points are on all sides of the origin, so that nothing is extrapolated."""
     return bool((near.min(0) < 0).all() and (near.max(0) > 0).all())
 
 
@@ -228,7 +228,7 @@ def explain(frames: PoseFrames, corners: Corners, projector_size_px: tuple[int, 
 
 
 def _other_orders(frames: list[NDArray[Any]], column_bits: int) -> list[tuple[str, list[NDArray[Any]]]]:
-    """Orders that are easily mistaken for the right one, in words and as pictures put right."""
+    """Orders that are easily mistaken for the right one, in words and as reordered pictures."""
     pairs = list(zip(frames[::2], frames[1::2], strict=True))
     half, rows = len(pairs), len(pairs) - column_bits
     orders = {

@@ -116,7 +116,7 @@ class StageProblem:
         return np.asarray(self.column_px - columns_at(self.shared(numbers), self.points_mm(numbers)))
 
     def bulge(self, numbers: Floats) -> Floats:
-        """Change of predicted columns (n,) for a target whose middle stands 1 mm before its rim.
+        """Change of predicted columns (n,) for a target whose middle is 1 mm in front of its rim.
 
         The rim is a circle of `BOW_RADIUS_MM` about the middle of all points; a bulge about another place
         differs by slopes and distance, which are fitted.
@@ -176,8 +176,8 @@ def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> float:
     worst = int(np.abs(off).argmax())
     if bent and abs(off[worst]) > tolerance:
         raise CalibrationError(
-            f"The plane at the stage's position {positions[worst]:g} mm stands {off[worst]:+.2f} mm from"
-            " where the other positions say it should. Check that the stage reached it and that nothing else"
+            f"The plane at the stage's position {positions[worst]:g} mm is {off[worst]:+.2f} mm from"
+            " where the other positions put it. Check that the stage reached it and that nothing else"
             " moved, that all was captured with this rig, and take this position again."
         )
     if abs(rise - 1) > MAX_SCALE_ERROR:
@@ -202,7 +202,7 @@ def require_flat(positions_mm: Sequence[float], rms_mm: Floats, limit_mm: float 
     worst = int(rms_mm.argmax())
     if rms_mm[worst] > limit_mm:
         raise CalibrationError(
-            f"The points at the stage's position {positions_mm[worst]:g} mm lie"
+            f"The points at the stage's position {positions_mm[worst]:g} mm are"
             f" {rms_mm[worst]:.2f} mm rms off a plane; {limit_mm:.2g} mm are allowed. Use a"
             " flat target that fills the view, and check that all positions were captured with this rig."
         )
@@ -217,8 +217,8 @@ def require_agreement(pull: float, bow_mm: float, bow_std_mm: float, rise: float
     if pull > MAX_PULL:
         raise CalibrationError(
             f"The planes contradict the geometry calibration: it would have to move by {pull:.1f} of"
-            f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat: it looks"
-            f" as if it bulged towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm."
-            f" By the printed board, the stage's steps are {rise:.3f} times as long as it says: check both."
+            f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat: it seems"
+            f" to bulge towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm. Measured by the"
+            f" printed board, the stage's steps are {rise:.3f} times as long as reported: check both."
             " Calibrate the geometry again if camera or projector were touched since."
         )

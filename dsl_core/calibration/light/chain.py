@@ -89,7 +89,7 @@ def chain_correction(
     reflectance: float | SpectralCurve = 0.99,
 ) -> ChainCorrection:
     """Smooth factors from one or more scans of a diffuser; raises `CalibrationError` without good pixels."""
-    # Where the light goes hangs on film and lenses alone, so that the model outlives the rig's curves.
+    # Where the light goes depends on film and lenses alone, so that the model outlives the rig's curves.
     model = model or correspondence(rig)
     target = (
         reflectance if isinstance(reflectance, SpectralCurve) else SpectralCurve.of([550.0], [reflectance])
@@ -155,7 +155,7 @@ def _corrections(equations: Equations) -> Equations:
 
 
 def _scale(solution: SmoothSolution, equations: Equations, parts: list[Equations]) -> tuple[float, float]:
-    """The wavelengths' scale beside corrections as smooth as without it; deviation by leaving out parts."""
+    """The wavelengths' scale, with corrections as smooth as without it; deviation by leaving out parts."""
     prior = np.zeros((UNKNOWNS.count + 1,) * 2)
     prior[:-1, :-1], prior[-1, -1] = solution.prior, SCALE_STD**2
     found = solve_given(equations, prior, solution.noise_factor)

@@ -117,7 +117,7 @@ def _smoothed(
 
 
 def _check_leds(nm: Floats, leds: Floats) -> None:
-    """Raise `CalibrationError` for a dark LED or spectra that are exchanged."""
+    """Raise `CalibrationError` for a dark LED or swapped spectra."""
     power = (leds * np.gradient(nm)).sum(1)
     for colour, value in zip(_LEDS, power, strict=True):
         if not value > 1e-3 * power.max():
@@ -129,7 +129,7 @@ def _check_leds(nm: Floats, leds: Floats) -> None:
     if not centre[0] > centre[1] > centre[2]:
         found = ", ".join(f"{c} {value:.0f} nm" for c, value in zip(_LEDS, centre, strict=True))
         raise CalibrationError(
-            f"The mean wavelengths of the LEDs are out of order ({found}). Spectra are exchanged: name each"
+            f"The mean wavelengths of the LEDs are out of order ({found}). Spectra are swapped: name each"
             " after the picture it was measured under."
         )
 

@@ -30,7 +30,7 @@ Mask = NDArray[np.bool_]
 
 #: Blocks along each side whose scatter gives the deviation of a mean.
 BLOCKS = 6
-#: A pixel this far (relative) from the median of its colour is dirt, a mark, or beside the target.
+#: A pixel this far (relative) from the median of its colour is dirt, a mark, or outside the target.
 OFF_MEDIAN = 0.2
 MIN_PIXELS = 400
 #: Nodes over rows and columns, and blocks per node that the residual is judged by.
@@ -51,7 +51,7 @@ class UniformPictures:
     """Linear radiance (DN per ms at full drive) of red, green, blue and white pictures.
 
     ``radiance`` (4, rows, columns) are mosaics, black subtracted; ``saturated`` (rows, columns) in any.
-    ``shading`` (rows, columns) is that of the target's plane, ``usable`` where it lies and is lit.
+    ``shading`` (rows, columns) is that of the target's plane, ``usable`` where it is and is lit.
     """
 
     radiance: Floats
@@ -233,7 +233,7 @@ def match_whites(rig: Rig, white: WhiteSignals, reflectance: SpectralCurve) -> R
 
     Each response is multiplied by the smoothest factor (least squared gradient of its logarithm) that gives
     the channel's signal under every LED; the three responses keep the sum of their integrals, and the white
-    scale takes the rest. A rig that gives the signals already comes back as it is.
+    scale takes the rest. A rig that gives the signals already is returned unchanged.
     """
     emission = np.stack([curve.at(FINE_NM) for curve in rig.emission]) * reflectance.at(FINE_NM)
     start = np.stack([curve.at(FINE_NM) for curve in rig.response])

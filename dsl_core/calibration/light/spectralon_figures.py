@@ -1,4 +1,4 @@
-"""What a person judges a Spectralon and its calibration by."""
+"""Figures by which a Spectralon and its calibration are judged."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _emission_figures(record: SpectralonCalibration) -> list[Figure]:
             value=100 * emission.end_share,
             unit="%",
             high=2.0,
-            advice="The instrument's range cuts the LEDs off; what lies beyond is taken as constant.",
+            advice="The instrument's range cuts off the LEDs; the emission beyond it is taken as constant.",
         ),
     ]
 

@@ -91,7 +91,7 @@ def fit_bandpass(
     """All that filters say of a rig whose response and emission are known about.
 
     ``scan`` is the target without filter. Raises `CalibrationError` that names a filter which is not the one
-    asked for, and where too few filters show an order.
+    requested, and where too few filters show an order.
     """
     if not filters:
         raise CalibrationError("No filter was captured. Capture at least two of different wavelengths.")
@@ -168,8 +168,8 @@ def _check(
 
 def _moved(filter_nm: float, shift_px: float) -> str:
     return (
-        f"the filter of {filter_nm:g} nm: the zero order stands {shift_px:+.2f} columns from where it stood"
-        " without filter. Target, camera or projector moved; capture all steps again"
+        f"the filter of {filter_nm:g} nm: the zero order is {shift_px:+.2f} columns from where it was"
+        " without a filter. The target, camera or projector moved; capture all steps again"
     )
 
 
@@ -215,7 +215,7 @@ def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Flo
         cells = np.array([float(np.median(relative[mask])) for mask in masks])
         if len(cells) < 2:
             raise CalibrationError(
-                "The scan without filter shows too little of the target. Let a flat white target fill the"
+                "The scan without a filter shows too little of the target. Let a flat white target fill the"
                 " picture and capture the step again."
             )
         value[colour], std[colour] = cells.mean(), cells.std() / np.sqrt(len(cells) - 1)

@@ -1,4 +1,4 @@
-"""Whether the filter in the beam is the one asked for: by the places of the orders, and by colour."""
+"""Whether the filter in the beam is the requested one: by the places of the orders, and by colour."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def found_wavelengths(rig: Rig, filters: Sequence[PlacedFilter]) -> list[tuple[f
             found.append(None)
             continue
         nm, std = np.array(known).T
-        # Both orders share what makes a filter's centre uncertain, so that their mean is no surer than one.
+        # Both orders share what makes a filter's centre uncertain: their mean is no more certain than either.
         found.append((float((nm / std**2).sum() / (std**-2.0).sum()), float(std.min())))
     return found
 
@@ -98,23 +98,24 @@ def _by_film(rig: Rig, each: PlacedFilter) -> list[tuple[float, float]]:
 def verdict(
     each: PlacedFilter, found: tuple[float, float] | None, width_px: float, share: float
 ) -> tuple[bool, str]:
-    """Whether a filter cannot be used, and a sentence on what is wrong with it (empty: nothing)."""
+    """Whether a filter is unusable, and a sentence on what is wrong with it (empty: nothing)."""
     name = f"the filter of {each.filter_nm:g} nm"
     if width_px > BROAD_PX or share < BROAD_SHARE:
         return True, (
             f"{name}: the light of the first orders is spread over {2 * width_px:.0f} columns, as without a"
-            " narrow filter. Put the filter before the camera, shade other light, and capture the step again"
+            " narrow filter. Put the filter in front of the camera, shade other light, and capture the step"
+            " again"
         )
     if found is None:
         return False, f"{name}: no first order stands out; it is left out"
     shift, std = found[0] - each.effective_nm, found[1]
     if abs(shift) > max(WRONG_NM, DOUBT_SIGMAS * std):
         return True, (
-            f"{name}: its first orders stand where {found[0]:.0f} nm belongs. It is not the filter asked for;"
-            " put the right one before the camera and capture the step again"
+            f"{name}: its first orders are where those of {found[0]:.0f} nm should be. This is not the"
+            " requested filter; put the right one in front of the camera and capture the step again"
         )
     if abs(shift) > DOUBT_SIGMAS * std:
-        why = "it may stand tilted in the beam" if shift < 0 else "its curve is not the one assumed"
+        why = "it may be tilted in the beam" if shift < 0 else "its curve is not the one assumed"
         return (
             False,
             f"{name}: it passes {abs(shift):.1f} nm {'less' if shift < 0 else 'more'} than it should; {why}",

@@ -1,7 +1,7 @@
 """How much light each diffraction order takes from scan lines seen through a bandpass filter.
 
 The lines tile the projector's frame, so that what a pixel sees of an order, summed over the lines, is that
-order's light whatever the spectrum, the blur or the place. Where an order lies is found without knowing the
+order's light whatever the spectrum, the blur or the place. Where an order is, is found without knowing the
 film: in each cell of the image, signals are lined up by their distance from the zero order's column and added
 up, and the first orders stand out as peaks on either side.
 """
@@ -38,7 +38,7 @@ class OrderLight:
 
     ``ratio`` and ``std`` are those of the three colours (NaN, infinite: not seen). ``offset_px`` is the
     distance of the peak from the zero order in the middle of the image, with its deviation (NaN: not found);
-    ``share`` how much of all light where first orders may be lies in the peak; ``width_px`` its rms width.
+    ``share`` how much of all light where first orders may be is in the peak; ``width_px`` its rms width.
     """
 
     order: int
@@ -78,7 +78,7 @@ def filter_light(
 ) -> FilterLight:
     """Measure one filter from ``radiance`` and ``std`` (frames, P), DN per ms; infinite where saturated.
 
-    ``reach_px`` are the smallest and largest distance from the zero order at which a first order may lie,
+    ``reach_px`` are the smallest and largest distance from the zero order at which a first order may be,
     whatever the filter, and ``unlit_px`` those between which none does; ``frame_px`` is the projector's
     width.
     """
@@ -118,7 +118,7 @@ def _zero_signals(graph: LineGraph) -> tuple[Floats, Floats]:
 
 
 def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:
-    """Sum an order's light around its place, over pixels whose window lies in the frame."""
+    """Sum an order's light around its place, over pixels whose window is inside the frame."""
     ratio, spread = np.full(3, np.nan), np.full(3, np.inf)
     if place is None:
         return OrderLight(order, ratio, spread, np.nan, np.inf, 0.0, np.nan, 0)

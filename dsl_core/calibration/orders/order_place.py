@@ -1,4 +1,4 @@
-"""Where a diffraction order lies in the signals of scan lines, found without knowing the film.
+"""Where a diffraction order is in the signals of scan lines, found without knowing the film.
 
 In each cell of the image the signals, lined up by their distance from the zero order, are added up; the order
 is the brightest peak. Its distance changes smoothly over the image, as a quadratic of the pixel's place that
@@ -33,13 +33,13 @@ SECOND_PLACE = (1.9, 2.35)
 BIN_PX, SMOOTH_BINS = 2.0, 9
 #: How many deviations a peak must stand above nothing, and its least share of the light of the zero order.
 MIN_SIGMAS, MIN_SHARE = 8.0, 2e-4
-#: Cells whose peak lies farther from the others' than this are not used, px; terms of the quadratic.
+#: Cells whose peak is farther from the others' than this are not used, px; terms of the quadratic.
 OUTLIER_PX, TERMS = 12.0, 6
 REFINEMENTS = 3
-#: A cell's peak is never better known than this, px; what the quadratic's terms change by in a refinement.
+#: Least deviation of a cell's peak, px; what the quadratic's terms change by in a refinement.
 CELL_PX, TERM_PX = 0.3, 13.0
 #: How far inside the frame a cell's light must come from to be refined with, px: at the edge a part of the
-#: order is missing, which pulls its centre inwards, and where the order lies is known roughly only.
+#: order is missing, which pulls its centre inwards, and where the order is, is known only roughly.
 INSIDE_PX = 30.0
 
 

@@ -1,1 +1,1 @@
-"""What a camera and a projector really do, measured."""
+"""The self-test: how camera and projector behave, measured."""

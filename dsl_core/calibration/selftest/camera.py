@@ -21,7 +21,7 @@ _MIN_EXPOSURES = 5
 
 @dataclass(frozen=True)
 class Dark:
-    """Numbers without light, and the light of a dark projector: level (DN), rate (DN per ms), rate beside."""
+    """Black level (DN), light of a dark projector (DN per ms), and light outside its picture (DN per ms)."""
 
     level_dn: Measured
     rate: Floats  # (3,)
@@ -131,7 +131,7 @@ def count_hot_pixels(first: NDArray[np.uint16], second: NDArray[np.uint16], nois
     for row in (0, 1):
         for column in (0, 1):
             plane = frame[row::2, column::2]
-            # Beyond every neighbour, so that the edge of a faint picture is no hot pixel.
+            # Beyond every neighbour, so that the edge of a faint picture is not a hot pixel.
             excess = plane - maximum_filter(plane, footprint=around, mode="mirror")
             # Far beyond what noise does; dim pixels that merely glow belong to the noise figures.
             count += int((excess > max(6 * noise_dn, 5.0)).sum())

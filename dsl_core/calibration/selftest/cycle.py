@@ -3,7 +3,7 @@
 Red, green and blue LEDs flash one after the other, so a short exposure shows a colour that depends on when it
 was taken. Harmonic least squares over trial frequencies (the periodogram of Lomb 1976 and Scargle 1982, with
 several harmonics and a constant, and all channels together) finds the frequency; irregular times leave no
-alias. A cycle at f is also one at f/2, f/3, ..., and its harmonics lie at 2f, 3f, ...: of all frequencies
+alias. A cycle at f is also one at f/2, f/3, ..., and its harmonics are at 2f, 3f, ...: of all frequencies
 that explain the light about equally well, the highest is the cycle.
 """
 
@@ -27,7 +27,7 @@ STEADY = 0.01
 _HARMONICS, _FINE_HARMONICS = 3, 12
 #: Share of the variance that a cycle must explain; noise alone explains a quarter of 100 frames.
 _EXPLAINED = 0.5
-#: A lower residual than the smallest by this factor, or by this share of the variance, is no better.
+#: Residuals within this factor of the smallest, or this share of the variance, count as equally good.
 _AS_GOOD, _AS_GOOD_SHARE = 1.5, 0.01
 #: Gaps between time stamps must follow the waits asked for this closely to be believed.
 _TRUSTED = 0.95
@@ -105,7 +105,7 @@ def _coarse(time_s: Floats, signal: Floats, whole: float) -> tuple[float, float]
 def _fine(time_s: Floats, signal: Floats, hz: float, step: float) -> tuple[float, float, Measured]:
     """Frequency with standard deviation, and the amplitude of the channel that varies most.
 
-    Steep edges leave residuals that repeat with the phase and are no noise, so the spread comes from fits
+    Steep edges leave residuals that repeat with the phase and are not noise, so the spread comes from fits
     that leave out every ``_GROUPS``-th frame in turn (the jackknife); a handful of them may agree by chance,
     so it is at least what the residuals say as noise.
     """

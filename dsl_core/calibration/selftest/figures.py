@@ -20,7 +20,7 @@ from dsl_core.model.figure import Figure
 LINEARITY_PERCENT, BLACK_NOISES, SATURATION, HOT = 0.5, 5.0, 0.9, 1e-3
 #: Largest difference of gamma between colours, rms residual of a ramp, both percent; largest black.
 GAMMA_SPREAD_PERCENT, RAMP_PERCENT, BLACK = 2.0, 1.0, 0.01
-#: The new picture must be there when ``show`` returns, to this; beat at the advised exposures, percent.
+#: The new picture must be visible when ``show`` returns, within this; beat at the advised exposures, percent.
 WAIT_MS, BEAT_PERCENT = 1.0, 0.3
 #: A line of a scan is 5 px wide, and its edges are modelled by a blur of about 0.6 px.
 BLUR_PX, AMBIENT = 1.5, 0.01
@@ -81,15 +81,15 @@ def _camera(camera: CameraCheck) -> Iterator[Figure]:
         camera.saturation_dn,
         "DN",
         low=SATURATION * (2**camera.bit_depth - 1),
-        advice="The sensor ends before the scale does, or nothing was bright enough to clip: lower the gain's"
-        " offset, open the aperture, or set the camera's full bit depth.",
+        advice="The sensor saturates before the scale ends, or nothing was bright enough to clip: lower the"
+        " gain's offset, open the aperture, or set the camera's full bit depth.",
     )
     yield _figure(
         "hot pixels",
         camera.hot_share,
         "1",
         high=HOT,
-        advice="Let the camera cool, or have it correct its defective pixels.",
+        advice="Let the camera cool down, or switch on its correction of defective pixels.",
     )
 
 
@@ -134,7 +134,7 @@ def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
         projector.black_fraction,
         "1",
         high=BLACK,
-        advice="Switch lamps off; else lower the projector's brightness offset.",
+        advice="Switch lamps off; otherwise lower the projector's brightness offset.",
     )
 
 

@@ -11,7 +11,7 @@ from dsl_core.model.calibration.selftest import LatencyCheck, Measured
 
 #: A frame shows the new picture when its light is that of the picture to this share.
 TOLERANCE = 0.03
-#: ``since_show`` of the frames that show each picture for sure.
+#: ``since_show`` from which a frame certainly shows the new picture.
 REFERENCE = 2
 
 
@@ -73,7 +73,7 @@ def trials(
     A frame is stale when it shows the picture before even after the longest wait and the next does not; that
     says nothing of the wait, so it is not judged.
     """
-    # The rows of the sure pictures come first and are no trials.
+    # The reference pictures come first and are not trials.
     trial = np.arange(len(readings)) > np.flatnonzero(readings.since_show >= REFERENCE).max()
     first = np.flatnonzero(trial & (readings.since_show == 0))
     is_long = readings.gap_ms[first] == readings.gap_ms[first].max()

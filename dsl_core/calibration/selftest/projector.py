@@ -111,7 +111,7 @@ def _falls(drive: Floats, rate: Floats, std: Floats, used: NDArray[np.bool_]) ->
 def _black_fraction(
     dark: Dark, white: Floats, white_std: Floats, sizes: RegionSizes
 ) -> tuple[Measured, bool]:
-    """Light of a dark projector as a share of white; the pixels beside the picture see ambient light alone.
+    """Light of a dark projector as a share of white; pixels outside the picture see only ambient light.
 
     White above black is ``(1 - b) * w``; black without ambient light is ``b * w``.
     """

@@ -17,7 +17,7 @@ ROUNDING_DN2 = 1 / 12
 class Readings:
     """Columns of n frames, for red, green, blue where there are three.
 
-    The region holds the well lit pixels of each channel, ``beside`` those that the projector does not reach.
+    The region holds the well lit pixels of each channel, ``beside`` those outside the projected picture.
     ``pair_variance_dn2`` is half the variance of the difference to the frame before over the region, 0 where
     ``is_pair`` is not set. ``gap_ms`` is the wait that was asked for before the frame, ``since_show`` how
     many frames came before it since the picture changed. ``drive`` is the level (0..255) shown.
@@ -53,7 +53,7 @@ CLIPPED_SHARE = 2e-4
 
 @dataclass(frozen=True)
 class RegionSizes:
-    """Pixels of the region and beside it, for red, green, blue, and the number format of the camera."""
+    """Pixels inside and outside the projected picture by colour, and the number format of the camera."""
 
     pixels: NDArray[np.int64]
     beside: NDArray[np.int64]

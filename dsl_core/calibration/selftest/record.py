@@ -33,11 +33,11 @@ from dsl_core.model.calibration.selftest import CycleCheck, SelfTest
 
 #: Exposures of the published prototype, whose beat is measured for comparison.
 PUBLISHED_MS = (160.0, 320.0)
-#: Exposures wanted for scans; what is advised are the nearest that hold whole cycles.
+#: Exposures preferred for scans; the advised ones are the nearest that hold whole cycles.
 WANTED_MS = (500.0 / 3.0, 1000.0 / 3.0)
 Floats = NDArray[np.float64]
 
-#: Drive levels that tell the power law well.
+#: Drive levels above which the power law is fitted.
 BRIGHT = 0.2
 
 

@@ -1,4 +1,4 @@
-"""What bandpass filters say: efficiency of the orders, response of the camera, blur and halo."""
+"""Measured through bandpass filters: efficiency of the orders, response of the camera, blur and halo."""
 
 from __future__ import annotations
 

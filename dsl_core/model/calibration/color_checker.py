@@ -1,4 +1,4 @@
-"""What a classic chart tells of a rig: camera response and LED emission, refined, and how well they fit."""
+"""Camera response and LED emission of a rig, refined on a classic chart, and how well they fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a plane on a stage says of film and geometry, and how far to trust it."""
+"""Film and geometry from a plane on a stage, and how far to trust them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class StagePosition(Record):
 
 
 class FilterSeen(Record):
-    """First orders through one filter: effective wavelength, and how far they lie from the fitted film.
+    """First orders through one filter: effective wavelength, and how far they are from the fitted film.
 
     ``shift_px`` is the median over the image, one number a position; ``tiles`` counts those that were used.
     """

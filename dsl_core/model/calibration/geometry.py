@@ -41,7 +41,7 @@ class Flatness(Record):
 class PoseQuality(Record):
     """Errors of one board pose; ``left_out`` is measured with a calibration that never saw it.
 
-    Errors are rms lengths (two axes together) over the ``corners`` that were no ``outliers``. A pose that is
+    Errors are rms lengths (two axes together) over the ``corners`` that were not ``outliers``. A pose that is
     not ``used`` did not fit the others. ``corners_px`` are columns and rows of all its corners in the camera
     image, to a hundredth; records of before they were kept have none.
     """

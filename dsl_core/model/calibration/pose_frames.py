@@ -18,8 +18,8 @@ class PoseFrames:
 
     ``pairs`` holds pattern, inverse, pattern, inverse ... in the order of the Gray code (columns before rows,
     most significant bit first). ``name`` is what errors call the pose. ``variance`` is that of ``white``, up
-    to a factor, and ``saturated`` marks pixels without a value; pictures merged from several settings know
-    both, of others brightness tells.
+    to a factor, and ``saturated`` marks pixels without a value; pictures merged from several settings have
+    both; for others they follow from the brightness.
     """
 
     name: str

@@ -52,8 +52,8 @@ class ProjectorCheck(Record):
     """From drive level to light.
 
     ``gamma`` is the one value for all colours that a rig holds. ``black_fraction`` is the light of a dark
-    projector as a share of white; where no pixel sees beside the projected picture, ambient light cannot be
-    told from it, and ``black_has_ambient`` says so.
+    projector as a share of white; where no pixel sees past the projected picture, ambient light cannot be
+    told from it, and ``black_has_ambient`` is set.
     """
 
     ramps: tuple[RampCheck, ...]

@@ -1,4 +1,4 @@
-"""What a white standard tells of a rig: its light, how white it is, and how evenly the camera sees it."""
+"""Light, white signals and evenness of a rig, measured on a white standard."""
 
 from __future__ import annotations
 

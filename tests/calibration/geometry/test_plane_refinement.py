@@ -135,7 +135,7 @@ def _samples(truth: Rig) -> list[ColumnSamples]:
 def test_a_bowed_plane_is_named() -> None:
     truth, samples = small_rig(), _samples(small_rig())
     samples[1] = seen(truth, 750.0, np.random.default_rng(0), bow_mm=3.0)
-    with pytest.raises(CalibrationError, match=r"750 mm lie .* mm rms off a plane"):
+    with pytest.raises(CalibrationError, match=r"750 mm are .* mm rms off a plane"):
         refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
 
 
@@ -147,7 +147,7 @@ def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
     covariance = np.array(board.geometry_covariance).reshape(24, 24)
     with pytest.raises(
         CalibrationError,
-        match=r"planes contradict the geometry .* bulged towards the camera by -?\d\.\d\d ± 0\.0\d mm",
+        match=r"planes contradict the geometry .* bulge towards the camera by -?\d\.\d\d ± 0\.0\d mm",
     ):
         refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
 
@@ -155,7 +155,7 @@ def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
 def test_a_step_that_was_not_made_is_named() -> None:
     truth, samples = small_rig(), _samples(small_rig())
     samples[2] = seen(truth, 896.0, np.random.default_rng(0))
-    with pytest.raises(CalibrationError, match=r"position \d+ mm stands .* mm from"):
+    with pytest.raises(CalibrationError, match=r"position \d+ mm is .* mm from"):
         refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
 
 

@@ -116,7 +116,9 @@ def test_bad_pictures_name_the_pose(
 
 @pytest.mark.parametrize("size_px", [(96, 128), (128, 65)])
 def test_a_wrong_size_of_the_projector_is_told(frames: PoseFrames, size_px: tuple[int, int]) -> None:
-    with pytest.raises(CalibrationError, match=r"pose_0: \d+% of the pixels .* outside a projector of"):
+    with pytest.raises(
+        CalibrationError, match=r"pose_0: \d+% of the readable pixels .* outside a projector of"
+    ):
         observe_pose(frames, SMALL_BOARD, size_px)
 
 

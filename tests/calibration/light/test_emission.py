@@ -77,7 +77,7 @@ def test_white_in_another_unit_shows() -> None:
 def test_exchanged_missing_and_dark_spectra_are_named() -> None:
     made = readings().readings
     wrong: dict[str, dict[LightColour, tuple[SpectralCurve, ...]]] = {
-        "exchanged": {**made, "red": made["blue"], "blue": made["red"]},
+        "swapped": {**made, "red": made["blue"], "blue": made["red"]},
         "green is missing": {colour: curves for colour, curves in made.items() if colour != "green"},
         "Under blue": {**made, "blue": made["black"]},
     }

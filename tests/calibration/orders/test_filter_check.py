@@ -39,7 +39,7 @@ def test_wrong_filter_is_named_and_the_others_are_not() -> None:
     verdicts = {f.filter_nm: verdict(f, w, 3.0, 1.0) for f, w in zip(filters, found, strict=True)}
     unusable, sentence = verdicts.pop(520.0)
     assert unusable
-    assert "the filter of 520 nm: its first orders stand where 55" in sentence
+    assert "the filter of 520 nm: its first orders are where those of 55" in sentence
     assert not any(bad for bad, _ in verdicts.values())
 
 
@@ -49,7 +49,7 @@ def test_tilted_filter_is_a_doubt() -> None:
     found = found_wavelengths(published_rig(), filters)[index]
     unusable, sentence = verdict(filters[index], found, 3.0, 1.0)
     assert not unusable
-    assert "nm less than it should; it may stand tilted" in sentence
+    assert "nm less than it should; it may be tilted" in sentence
 
 
 def test_broad_light_is_no_filter() -> None:
