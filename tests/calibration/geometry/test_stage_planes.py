@@ -102,7 +102,7 @@ def test_parameters_are_those_of_the_rig() -> None:
 
 
 def test_steps_flatness_and_agreement_have_limits() -> None:
-    at = np.array([0.0, 100.0, 200.0])
+    at = [0.0, 100.0, 200.0]
     assert require_steps(at, np.array([600.0, 700.5, 801.0])) == pytest.approx(1.005)
     with pytest.raises(CalibrationError, match=r"position 100 mm is \+2.00 mm"):
         require_steps(at, np.array([600.0, 702.0, 800.0]))
