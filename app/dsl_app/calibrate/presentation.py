@@ -146,7 +146,8 @@ def version_texts(line: LibraryLine, in_use: str) -> tuple[str, ...]:
 
     ``in_use`` is the key of the calibration that scans use.
     """
-    used = in_use in (f"{line.name}@{line.stamp}", line.name if line.is_current else "")
+    is_named = line.is_current and in_use == line.name
+    used = is_named or in_use == f"{line.name}@{line.stamp}"
     use = "scans" if used else ("current" if line.is_current else "")
     stored = stamp_date(line.stamp)
     if line.entry is None:

@@ -10,11 +10,12 @@ from typing import Any
 
 from dsl_app.calibrate.campaign_status import Kinds
 from dsl_app.calibrate.controller import CalibrateController
-from dsl_app.calibrate.state import CalibrateState, Row
+from dsl_app.calibrate.state import CalibrateState, Row, RowState
 from dsl_app.calibrate.wizard.controller import WizardController
-from dsl_app.calibrate.wizard.state import WizardState
+from dsl_app.calibrate.wizard.state import Fit, WizardState
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import RigChoice, RigState
+from dsl_app.shared.evented import Value
 from dsl_app.shared.jobs.base import JobRunner
 
 from dsl_core.campaign.common.recipe import AnyRecipe
@@ -108,3 +109,31 @@ def with_a_campaign(bench: CalibrateBench) -> CalibrateBench:
     devices.place = None
     bench.control.begin_campaign(bench.campaign)
     return bench
+
+
+def calibrate(bench: CalibrateBench, name: str) -> None:
+    """Go through a whole wizard as a person does."""
+    state, control = bench.wizard(name)
+    while state.lacking:
+        control.go_to(state.lacking[0])
+        control.capture()
+        assert not state.trouble.value
+    control.fit()
+    control.accept()
+    control.leave()
+
+
+def fit_of(state: WizardState) -> Fit | None:
+    return state.fit.value
+
+
+def is_on(value: Value[bool]) -> bool:
+    return value.value
+
+
+def page(state: WizardState) -> int:
+    return state.at.value
+
+
+def states(bench: CalibrateBench) -> list[RowState]:
+    return [row.state for row in bench.state.rows.value]

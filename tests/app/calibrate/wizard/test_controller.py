@@ -1,67 +1,29 @@
+"""One calibration step by step: captures, looks, fits and settings, without a window."""
+
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
 from dataclasses import replace
-from datetime import timedelta
-from pathlib import Path
 
 import pytest
-from dsl_app.calibrate.campaign_status import key_figure
-from dsl_app.calibrate.controller import library_name
 from dsl_app.calibrate.state import RowState
-from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
-from dsl_app.connection.state import RigChoice
-from dsl_app.shared.evented import Value
-from dsl_app.shared.jobs.base import Job
+from dsl_app.calibrate.wizard.state import Doing
 
 from dsl_core.devices.base import DeviceRig
-from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
-from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import load_rig
-from dsl_core.io.scan.lock import FolderLock
 from dsl_core.model.calibration.accepted import AcceptedCalibration
-from dsl_core.model.figure import Figure
 from dsl_core.model.frames import Frame
 from dsl_core.model.placement import Placement
 from dsl_core.simulation.sim_devices import SimCamera
-from tests.app.calibrate.calibrate_bench import CalibrateBench, make_bench, with_a_campaign
-from tests.app.support.doubles import InlineRunner
-
-
-@pytest.fixture
-def bench(tmp_path: Path) -> CalibrateBench:
-    return with_a_campaign(make_bench(tmp_path))
-
-
-def calibrate(bench: CalibrateBench, name: str) -> None:
-    """Go through a whole wizard as a person does."""
-    state, control = bench.wizard(name)
-    while state.lacking:
-        control.go_to(state.lacking[0])
-        control.capture()
-        assert not state.trouble.value
-    control.fit()
-    control.accept()
-    control.leave()
-
-
-def fit_of(state: WizardState) -> Fit | None:
-    return state.fit.value
-
-
-def is_on(value: Value[bool]) -> bool:
-    return value.value
-
-
-def page(state: WizardState) -> int:
-    return state.at.value
-
-
-def states(bench: CalibrateBench) -> list[RowState]:
-    return [row.state for row in bench.state.rows.value]
+from tests.app.calibrate.calibrate_bench import (
+    CalibrateBench,
+    calibrate,
+    fit_of,
+    is_on,
+    page,
+    states,
+)
 
 
 def test_a_wizard_goes_from_placement_to_acceptance_and_writes_the_rig(bench: CalibrateBench) -> None:
@@ -296,154 +258,6 @@ def test_a_rig_that_places_targets_captures_all_steps_by_itself(bench: Calibrate
     assert "'night picture' does not look right" in state.trouble.value
 
 
-def test_everything_runs_in_order_and_stops_with_the_reason(bench: CalibrateBench) -> None:
-    bench.control.run_everything()
-    assert "cannot place its targets itself" in bench.told
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    devices.place = lambda placement: None
-    bench.wrong = {"largest_dn": 1.0}
-    bench.control.run_everything()
-    assert "Brightness is outside its limits" in bench.told
-    assert "Open the aperture." in bench.told
-    assert bench.row("selftest").has_candidate
-    bench.wrong = {}
-    bench.control.run_everything()
-    assert "Everything is calibrated" in bench.state.note.value
-    assert bench.state.is_complete
-    assert bench.library.names() == ("campaign",)
-
-
-def test_only_one_calibration_runs_at_a_time(bench: CalibrateBench) -> None:
-    _, control = bench.wizard("selftest")
-    tries: list[Callable[[], None]] = [
-        lambda: bench.control.run("geometry"),
-        bench.control.run_everything,
-        bench.control.keep,
-    ]
-    for again in tries:
-        again()
-        assert bench.told == "Self-test is still running. Finish or leave it first."
-    bench.control.begin_campaign(bench.folder / "other")
-    assert not (bench.folder / "other").exists()
-    control.leave()
-    bench.control.run("geometry")
-    assert "needs selftest" in bench.told, "what it needs is named, and the wizard does not open"
-    lock = FolderLock(bench.campaign / "lock")
-    bench.control.run("selftest")
-    assert "written by another process" in bench.told
-    lock.release()
-    bench.wizard("selftest")
-
-
-def test_a_rig_in_use_is_not_taken(tmp_path: Path) -> None:
-    class Busy(InlineRunner):
-        jobs: tuple[Job[None], ...] = ()
-
-        @property
-        def active(self) -> tuple[Job[None], ...]:
-            return self.jobs
-
-    runner = Busy()
-    bench = with_a_campaign(make_bench(tmp_path, runner))
-    runner.jobs = (Job("Scan one", lambda progress: None, exclusive="the rig"),)
-    bench.control.run("selftest")
-    assert bench.told == "Scan one uses the rig. Wait for it, or cancel it."
-
-
-def test_wrong_folders_and_other_rigs_are_named(bench: CalibrateBench, tmp_path: Path) -> None:
-    bench.control.open_campaign(tmp_path)
-    assert "is no campaign" in bench.told
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "thing").touch()
-    bench.control.begin_campaign(tmp_path / "full")
-    assert "neither empty nor a campaign" in bench.told
-    bench.rig.connect(RigChoice("twin", (("scene", "plane"), ("size", "48x32"))))
-    assert is_on(bench.state.foreign)
-    assert "begun with the rig twin, scene plane, size 32x24" in bench.state.trouble.value
-    bench.control.run("selftest")
-    assert "another campaign" in bench.told
-    bench.control.connect_rig()
-    assert not is_on(bench.state.foreign)
-    assert bench.state.trouble.value == ""
-    bench.rig.disconnect()
-    bench.control.run("selftest")
-    assert "No rig is connected" in bench.told
-
-
-def test_rows_say_why_a_calibration_is_not_good(bench: CalibrateBench) -> None:
-    for name in ("selftest", "geometry"):
-        calibrate(bench, name)
-    bench.later = timedelta(days=91)
-    bench.control.refresh()
-    assert states(bench) == [RowState.AGEING, RowState.AGEING]
-    bench.later = timedelta(0)
-    bench.wrong = {"largest_dn": 1.0}
-    _, control = bench.wizard("selftest")
-    control.fit()
-    control.accept()
-    control.leave()
-    assert states(bench) == [RowState.OUTSIDE, RowState.SUPERSEDED]
-    assert bench.row("selftest").reason == "Open the aperture."
-    assert bench.row("geometry").reason == "Self-test changed since. Fit again; its captures are kept."
-    devices = bench.rig.state.devices.value
-    assert devices is not None
-    devices.camera._info = replace(devices.camera.info, binning=2)  # type: ignore[attr-defined]
-    bench.control.refresh()
-    assert states(bench) == [RowState.OTHER_RIG, RowState.OTHER_RIG]
-    assert "The camera's binning was 1 and is 2." in bench.row("selftest").reason
-    (bench.campaign / "selftest.json").write_text("{")
-    bench.control.refresh()
-    assert bench.row("selftest").state is RowState.DAMAGED
-
-
-def test_the_key_figure_is_the_one_nearest_to_its_limits() -> None:
-    def figure(name: str, value: float, low: float | None = None, high: float | None = None) -> Figure:
-        return Figure(name=name, value=value, unit="px", low=low, high=high)
-
-    easy, tight = figure("easy", 0.1, high=0.5), figure("tight", 0.45, high=0.5)
-    beyond, between = figure("beyond", 0.2, low=0.3), figure("between", 2.0, low=1.0, high=3.0)
-    assert key_figure((easy, tight, between)) is tight
-    assert key_figure((tight, beyond)) is beyond
-    assert key_figure((figure("free", 1.0),)) is None
-
-
-def test_the_library_restores_exports_imports_and_is_used(bench: CalibrateBench, tmp_path: Path) -> None:
-    library, state = bench.control.library, bench.state
-    for name in ("selftest", "geometry"):
-        calibrate(bench, name)
-    first = bench.library.stamps("campaign")[0]
-    rig = bench.library.find("campaign").rig
-    bench.library.store("campaign", rig.model_copy(update={"white_scale": 1.0}))
-    library.load()
-    assert [line.is_current for line in state.library.value] == [True, False]
-    library.restore("campaign", first)
-    assert bench.library.find("campaign").stamp == first
-    library.export(f"campaign@{first}", tmp_path / "out.json", "entry", False)
-    library.export(f"campaign@{first}", tmp_path / "out.json", "entry", False)
-    assert "exists already" in bench.told
-    other = CalibrationLibrary(tmp_path / "elsewhere")
-    assert other.names() == ()
-    assert bench.control.open(tmp_path / "out.json")
-    assert len(bench.library.stamps("campaign")) == 3
-    (tmp_path / "other.json").write_text(json.dumps({"a": 1}))
-    assert not bench.control.open(tmp_path / "other.json")
-    opened: list[Path] = []
-    state.opened.connect(opened.append)
-    library.report("campaign")
-    assert "<html" in opened[0].read_text()
-    library.use("campaign")
-    assert state.in_use.value == "campaign"
-
-
-def test_the_command_line_names_campaign_and_rig(bench: CalibrateBench) -> None:
-    where = f"{bench.campaign} --rig twin --option scene=plane --option size=32x24"
-    assert bench.control.command_line("geometry") == f"dsl-scan calibrate geometry {where}"
-    assert bench.control.command_line("selftest") == f"dsl-scan selftest {where}"
-    assert bench.control.command_line() == f"dsl-scan calibrate all {where}"
-    assert library_name(Path("a/(1) b")) == "1- b"
-
-
 def test_leaving_while_something_runs_waits_for_its_end(bench: CalibrateBench) -> None:
     state, control = bench.wizard("selftest")
     control.go_to(1)
@@ -472,53 +286,3 @@ def test_another_devices_captures_do_not_pass(bench: CalibrateBench) -> None:
     assert [each.state for each in state.statuses.value] == ["refused", "refused"]
     assert "serial number was TWIN-C and is OTHER" in state.statuses.value[0].reason
     control.leave()
-
-
-def test_a_drift_check_needs_the_rig_that_was_calibrated(bench: CalibrateBench) -> None:
-    devices, calibration = bench.calibrated
-    assert bench.control.library.must_be_placed
-    conditions = current_conditions(devices)
-    other = conditions.model_copy(
-        update={"projector": conditions.projector.model_copy(update={"mode": "6500 K"})}
-    )
-    bench.library.store("other", calibration.model_copy(update={"conditions": other}))
-    bench.control.library.check("other")
-    assert "the projector's mode was 6500 K and is not named" in bench.told
-    assert bench.state.drift.value is None
-    assert set(bench.notifier.offers) == {"Check anyway"}
-    bench.rig.disconnect()
-    bench.control.library.check("other")
-    assert "No rig is connected" in bench.told
-
-
-@pytest.fixture
-def plane(tmp_path: Path) -> CalibrateBench:
-    """A connected twin of a flat target that can be checked for drift."""
-    choice = RigChoice("twin", (("scene", "plane"), ("size", "112x72")))
-    made = make_bench(tmp_path, choice=choice)
-    made.rig.connect(choice)
-    return made
-
-
-def test_a_drift_check_of_the_twin_says_that_nothing_has_moved(plane: CalibrateBench) -> None:
-    _, calibration = plane.calibrated
-    plane.library.store("own", calibration)
-    plane.control.library.check("own")
-    verdict = plane.state.drift.value
-    assert verdict is not None, plane.told
-    assert {figure.name for figure in verdict.figures} >= {"row drift"}
-    assert "The rig matches the calibration own." in plane.state.note.value
-
-
-def test_a_check_in_spite_of_other_settings_says_which(plane: CalibrateBench) -> None:
-    devices, calibration = plane.calibrated
-    conditions = current_conditions(devices)
-    gain = conditions.camera.model_copy(update={"gain_db": 6.0})
-    other = calibration.model_copy(update={"conditions": conditions.model_copy(update={"camera": gain})})
-    plane.library.store("own", other)
-    plane.control.library.check("own")
-    assert "the camera's gain (dB) was 6 and is 0" in plane.told
-    plane.notifier.offers["Check anyway"]()
-    verdict = plane.state.drift.value
-    assert verdict is not None, plane.told
-    assert verdict.overridden == ("the camera's gain (dB) was 6 and is 0",)

@@ -1,0 +1,53 @@
+"""Where the calibrations of a campaign stand, and why."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import timedelta
+
+from dsl_app.calibrate.campaign_status import key_figure
+from dsl_app.calibrate.state import RowState
+
+from dsl_core.model.figure import Figure
+from tests.app.calibrate.calibrate_bench import (
+    CalibrateBench,
+    calibrate,
+    states,
+)
+
+
+def test_rows_say_why_a_calibration_is_not_good(bench: CalibrateBench) -> None:
+    for name in ("selftest", "geometry"):
+        calibrate(bench, name)
+    bench.later = timedelta(days=91)
+    bench.control.refresh()
+    assert states(bench) == [RowState.AGEING, RowState.AGEING]
+    bench.later = timedelta(0)
+    bench.wrong = {"largest_dn": 1.0}
+    _, control = bench.wizard("selftest")
+    control.fit()
+    control.accept()
+    control.leave()
+    assert states(bench) == [RowState.OUTSIDE, RowState.SUPERSEDED]
+    assert bench.row("selftest").reason == "Open the aperture."
+    assert bench.row("geometry").reason == "Self-test changed since. Fit again; its captures are kept."
+    devices = bench.rig.state.devices.value
+    assert devices is not None
+    devices.camera._info = replace(devices.camera.info, binning=2)  # type: ignore[attr-defined]
+    bench.control.refresh()
+    assert states(bench) == [RowState.OTHER_RIG, RowState.OTHER_RIG]
+    assert "The camera's binning was 1 and is 2." in bench.row("selftest").reason
+    (bench.campaign / "selftest.json").write_text("{")
+    bench.control.refresh()
+    assert bench.row("selftest").state is RowState.DAMAGED
+
+
+def test_the_key_figure_is_the_one_nearest_to_its_limits() -> None:
+    def figure(name: str, value: float, low: float | None = None, high: float | None = None) -> Figure:
+        return Figure(name=name, value=value, unit="px", low=low, high=high)
+
+    easy, tight = figure("easy", 0.1, high=0.5), figure("tight", 0.45, high=0.5)
+    beyond, between = figure("beyond", 0.2, low=0.3), figure("between", 2.0, low=1.0, high=3.0)
+    assert key_figure((easy, tight, between)) is tight
+    assert key_figure((tight, beyond)) is beyond
+    assert key_figure((figure("free", 1.0),)) is None

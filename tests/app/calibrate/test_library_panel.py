@@ -1,0 +1,60 @@
+"""The verdict of a drift check, and what it offers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from dsl_app.calibrate.library_panel import DriftWindow
+from dsl_app.calibrate.state import DriftVerdict
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QLabel,
+)
+
+from dsl_core.model.figure import Figure
+from tests.app.calibrate.page_stage import Stage, cell, click
+
+LIMITED = Figure(name="error", value=0.8, std=0.1, unit="px", high=0.5, advice="Hold it still.")
+
+
+def test_a_drift_check_shows_its_figures(stage: Stage) -> None:
+    stage.bench.state.drift.set(DriftVerdict("room 12", (LIMITED,)))
+    window = stage.page.findChild(DriftWindow)
+    assert isinstance(window, DriftWindow)
+    assert cell(window.table, 0, 2) == "0.80 ± 0.10 px"
+    assert cell(window.table, 0, 4) == "Hold it still."
+    window.close()
+
+
+def test_a_missed_drift_check_offers_to_check_again_and_to_go_on(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checks: list[tuple[object, ...]] = []
+    library = type(stage.bench.control.library)
+    monkeypatch.setattr(library, "check", lambda self, *asked: checks.append(asked))
+    verdict = DriftVerdict("room 12", (LIMITED,), spectralon=False, overridden=("the gain was 6 and is 0",))
+
+    def shown() -> DriftWindow:
+        stage.bench.state.drift.set(replace(verdict))
+        window = stage.page.findChild(DriftWindow)
+        assert isinstance(window, DriftWindow)
+        assert any("the gain was 6" in each.text() for each in window.findChildren(QLabel))
+        return window
+
+    window = shown()
+    click(window.again)
+    assert checks == [("room 12", False, True)]
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    click(shown().use)
+    assert stage.bench.state.in_use.value == "room 12"
+
+
+def test_a_passed_drift_check_has_nothing_to_offer(stage: Stage) -> None:
+    stage.bench.state.drift.set(DriftVerdict("room 12", (LIMITED.model_copy(update={"high": 2.0}),)))
+    window = stage.page.findChild(DriftWindow)
+    assert isinstance(window, DriftWindow)
+    assert not window.again.isVisible()
+    assert not window.use.isVisible()
+    window.close()

@@ -1,0 +1,104 @@
+"""The Calibrate page by mouse: campaigns, everything, names and tips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from dsl_app.calibrate.campaign_box import NewCampaignDialog
+from dsl_app.calibrate.state import ABOUT
+from dsl_app.calibrate.wizard.settings_page import SettingsPage
+from dsl_app.shared.theme import DARK
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractSpinBox,
+    QComboBox,
+    QFileDialog,
+    QLineEdit,
+)
+from pytestqt.qtbot import QtBot
+
+from tests.app.calibrate.page_stage import Stage, cell, click
+
+
+def test_a_campaign_is_begun_and_opened_from_the_page(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stage = Stage(qtbot, tmp_path)
+    assert "No campaign is open" in stage.page.head._where.text()
+    (tmp_path / "taken").mkdir()
+
+    def fill(dialog: NewCampaignDialog) -> int:
+        dialog.name.setText("taken")
+        assert not dialog.begin.isEnabled()
+        dialog.name.setText("first")
+        assert dialog.begin.isEnabled()
+        return 1
+
+    monkeypatch.setattr(NewCampaignDialog, "exec", fill)
+    stage.page.page_actions()["calibrate_selftest"]()  # a campaign is begun on the way
+    stage.wait(lambda: bool(stage.windows))
+    stage.windows[-1].reject()
+    assert (tmp_path / "first" / "campaign.json").is_file()
+    stage.idle()
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "taken"))
+    click(stage.page.head.open)
+    assert "is no campaign" in stage.bench.told
+    assert stage.bench.state.campaign.value is not None
+    assert stage.bench.state.campaign.value.path.name == "first"
+    stage.finish()
+
+
+def test_another_rigs_campaign_offers_to_connect_its_rig(stage: Stage) -> None:
+    other = replace(stage.bench.rig.state.choice.value, options=(("scene", "plane"), ("size", "48x32")))
+    stage.bench.rig.connect(other)
+    stage.wait(lambda: "is connected. Connect the campaign's rig" in stage.page.banner.text)
+    assert not stage.page.head.everything.isEnabled()
+    stage.idle()
+    click(stage.page.banner.action)
+    stage.wait(lambda: not stage.page.banner.isVisible())
+
+
+def test_everything_by_one_button_and_the_library_shows_it(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert stage.page.head.everything.isEnabled()
+    click(stage.page.head.everything)
+    assert stage.page.head.cancel.isVisible()
+    assert not stage.page.rows["selftest"].run.isEnabled()
+    stage.wait(lambda: "Everything is calibrated" in stage.bench.state.note.value)
+    stage.idle()
+    library = stage.page.library
+    assert cell(library.table, 0, 0) == "campaign"
+    assert cell(library.table, 0, 3) == "TWIN-C, 32 × 24 px"
+    assert "brightest" in library.details.toPlainText()
+    shown: list[str] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: shown.append(url.toLocalFile()))
+    click(library.report)
+    stage.wait(lambda: bool(shown))
+    assert Path(shown[0]).name == "campaign.html"
+    click(library.use)
+    assert stage.bench.state.in_use.value == "campaign"
+    assert cell(library.table, 0, 2) == "scans"
+    assert not library.restore.isEnabled()
+
+
+def test_every_control_has_a_name_and_a_tip(stage: Stage) -> None:
+    wizard = stage.wizard("selftest")
+    wizard.apply_theme(DARK)
+    kinds = (QAbstractButton, QLineEdit, QAbstractSpinBox, QComboBox)
+    for top in (stage.page, wizard, SettingsPage()):
+        for kind in kinds:
+            for control in top.findChildren(kind):
+                if not control.objectName().startswith("qt_"):
+                    text = control.text() if isinstance(control, QAbstractButton) else ""
+                    assert control.accessibleName() or text, control
+                    assert control.toolTip(), (control, text)
+
+
+def test_the_page_names_every_calibration() -> None:
+    from dsl_core.campaign.recipes import recipe_names
+
+    assert tuple(ABOUT) == recipe_names()

@@ -1,0 +1,176 @@
+"""What the Calibrate page shows for each state, decided without a window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from dsl_app.calibrate.presentation import (
+    campaign_head,
+    figure_words,
+    library_selection,
+    row_display,
+    short_date,
+    stamp_date,
+    version_texts,
+)
+from dsl_app.calibrate.state import About, CalibrateState, CampaignFacts, DriftVerdict, Row, RowState
+from dsl_app.connection.state import RigChoice
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.io.calibration_library import LibraryEntry, LibraryLine
+from dsl_core.model.figure import Figure
+from dsl_core.simulation.published_rig import published_rig
+
+GOOD = Figure(name="shift", value=-0.2, std=0.01, unit="px", low=-0.5, high=0.5)
+BAD = GOOD.model_copy(update={"value": -0.8})
+ROW = Row("geometry", About("Geometry", "Lenses"))
+FACTS = CampaignFacts(Path("/data/rigs/room-12"), RigChoice("twin", (("size", "32x24"),)))
+BY_ITSELF = cast(DeviceRig, SimpleNamespace(place=print))
+BY_HAND = cast(DeviceRig, SimpleNamespace(place=None))
+
+
+def page(**values: Any) -> CalibrateState:
+    """The state of a page whose campaign is open and half calibrated."""
+    made = CalibrateState()
+    made.campaign.set(FACTS)
+    made.rows.set((replace(ROW, state=RowState.GOOD), ROW))
+    for name, value in values.items():
+        getattr(made, name).set(value)
+    return made
+
+
+def test_without_a_campaign_only_new_and_open_can_be_used() -> None:
+    head = campaign_head(CalibrateState(), BY_ITSELF)
+    assert head.title == "Calibrate"
+    assert "No campaign is open" in head.place
+    assert head.new.is_enabled
+    assert head.open.is_enabled
+    assert not head.keep.is_visible
+    assert not head.everything.is_enabled
+
+
+def test_the_head_names_campaign_folder_and_rig() -> None:
+    head = campaign_head(page(), None)
+    assert head.title == "room-12"
+    assert head.place.replace(chr(0x200B), "") == "in /data/rigs  ·  rig twin, size 32x24"
+
+
+NOTHING_GOOD: dict[str, object] = {"rows": (ROW,)}
+
+
+@pytest.mark.parametrize(
+    ("values", "devices", "keep", "everything"),
+    [
+        ({}, BY_ITSELF, True, True),
+        ({}, BY_HAND, True, False),
+        ({}, None, False, False),
+        ({"foreign": True}, BY_ITSELF, False, False),
+        ({"campaign": None}, BY_ITSELF, False, False),
+        (NOTHING_GOOD, BY_ITSELF, False, True),
+    ],
+)
+def test_what_can_be_done_with_the_whole_campaign(
+    values: dict[str, object], devices: DeviceRig | None, keep: bool, everything: bool
+) -> None:
+    head = campaign_head(page(**values), devices)
+    assert (head.keep.is_enabled, head.everything.is_enabled) == (keep, everything)
+    assert head.everything.is_visible
+    assert head.everything.is_primary
+    assert not head.cancel.is_visible
+
+
+def test_while_everything_runs_it_can_only_be_stopped() -> None:
+    for progress, role in (("Geometry: fit, 2 of 8", "muted"), ("stopping", "warn")):
+        head = campaign_head(page(everything=progress), BY_ITSELF)
+        assert (head.progress, head.progress_role) == (progress, role)
+        assert head.cancel.is_visible
+        assert not head.keep.is_visible
+        assert not head.everything.is_visible
+        assert not head.new.is_enabled
+        assert not head.open.is_enabled
+
+
+@pytest.mark.parametrize(
+    ("row", "word", "role"),
+    [
+        (ROW, "Run…", "muted"),
+        (replace(ROW, state=RowState.BEGUN, captured=2), "Continue…", "warn"),
+        (replace(ROW, state=RowState.GOOD, accepted="2026-03-01T10:20:30+00:00"), "Open…", "good"),
+        (
+            replace(ROW, state=RowState.GOOD, accepted="2026-03-01T10:20:30+00:00", has_candidate=True),
+            "Continue…",
+            "good",
+        ),
+        (replace(ROW, state=RowState.OUTSIDE, accepted="2026-03-01T10:20:30+00:00"), "Open…", "warn"),
+        (replace(ROW, state=RowState.OTHER_RIG, accepted="2026-03-01T10:20:30+00:00"), "Open…", "bad"),
+        (replace(ROW, state=RowState.DAMAGED), "Run…", "bad"),
+    ],
+)
+def test_the_button_of_a_row_says_what_the_wizard_does(row: Row, word: str, role: str) -> None:
+    shown = row_display(row)
+    assert (shown.run.text, shown.state_role) == (word, role)
+    assert shown.run_name == f"{word[:-1]} Geometry"
+    assert shown.run.is_enabled
+    assert not row_display(row, is_busy=True).run.is_enabled
+
+
+def test_a_row_shows_its_figure_and_reason() -> None:
+    good = row_display(replace(ROW, figure=GOOD, reason="2 captured"))
+    assert (good.figure, good.figure_role) == ("shift −0.200 ± 0.010 px  (−0.5 to 0.5)", "")
+    assert good.accessible_name == "Geometry: missing. 2 captured"
+    bad = row_display(replace(ROW, figure=BAD))
+    assert bad.figure_role == "bad"
+    assert row_display(ROW).figure == row_display(ROW).date == ""
+
+
+def test_times_are_shown_to_the_minute() -> None:
+    assert short_date("") == ""
+    assert short_date("2026-03-01T10:20:59+00:00")[4:] == stamp_date("20260301-102059-000400")[4:]
+    assert stamp_date("not a time") == "not a time"
+    free = Figure(name="corners", value=77.0, unit="")
+    assert figure_words(free) == "corners 77"
+
+
+def version(is_current: bool = True) -> LibraryLine:
+    entry = LibraryEntry(name="room-12", stored="2026-03-01T10:20:30+00:00", rig=published_rig())
+    return LibraryLine("room-12", "20260301-102030-000000", is_current, entry)
+
+
+@pytest.mark.parametrize(
+    ("is_current", "in_use", "use"),
+    [
+        (True, "", "current"),
+        (False, "", ""),
+        (True, "room-12", "scans"),
+        (False, "room-12", ""),
+        (False, "room-12@20260301-102030-000000", "scans"),
+        (True, "room-12@20260301-102030-000000", "scans"),
+    ],
+)
+def test_a_version_says_whether_scans_use_it(is_current: bool, in_use: str, use: str) -> None:
+    assert version_texts(version(is_current), in_use)[2] == use
+
+
+def test_what_can_be_done_with_a_version() -> None:
+    none, now, old = library_selection(None), library_selection(version()), library_selection(version(False))
+    assert (none.key, none.can_use, none.can_restore) == ("", False, False)
+    assert "library is empty" in none.details
+    assert (now.key, now.can_use, now.can_restore) == ("room-12", True, False)
+    assert (old.key, old.can_use, old.can_restore) == ("room-12@20260301-102030-000000", True, True)
+    broken = LibraryLine("<lab>", "20260301-102030-000000", False, error="It is cut off.")
+    damaged = library_selection(broken)
+    assert not damaged.can_use
+    assert not damaged.can_restore
+    assert damaged.details == "<p><b>&lt;lab&gt;</b></p><p>It is cut off.</p>"
+    assert version_texts(broken, "")[3:] == ("damaged", "", "")
+
+
+def test_a_drift_check_is_passed_when_all_figures_are() -> None:
+    good, bad = DriftVerdict("room 12", (GOOD,)), DriftVerdict("room 12", (GOOD, BAD))
+    assert (good.passed, bad.passed) == (True, False)
+    assert good.sentence == "The rig matches the calibration room 12."
+    assert bad.sentence == "The rig does not match the calibration room 12."
