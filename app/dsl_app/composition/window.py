@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from dsl_app.scan.controller import ScanController
     from dsl_app.scan.state import ScanState
     from dsl_app.session.restore import SessionRestore
+    from dsl_core.devices.base import Projector
 
 
 #: What every page needs.
@@ -150,11 +151,13 @@ class Composition(QObject):
         remembered = RigChoice(settings.rig, tuple(settings.rig_options.items()))
         state = RigState(self._options.rig or remembered)
         state.choice.changed.connect(self._remember_rig)
-        screens = self.screens
+        screens, projector_window = self.screens, self.screens.projector_window
         state.used_by.changed.connect(lambda _: screens.hide_names())
-        return RigController(
-            state, window.parts.runner, window.toasts, lambda own: ScreenProjector(screens.beam, own)
-        )
+
+        def wrap(own: Projector) -> Projector:
+            return ScreenProjector(projector_window, own)
+
+        return RigController(state, window.parts.runner, window.toasts, wrap)
 
     def _remember_rig(self, choice: RigChoice) -> None:
         settings = self.window.parts.settings

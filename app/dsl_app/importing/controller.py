@@ -10,7 +10,7 @@ from dsl_app.importing.state import (
     PUBLISHED,
     SUFFIXES,
     Found,
-    ImportOrder,
+    ImportRequest,
     ImportState,
     command_of,
     rows_of,
@@ -29,7 +29,7 @@ _CHECKED = {"folder", "base", "camera_px"}
 
 
 class ImportController:
-    """Checks a folder, keeps the order to import it, and carries that out."""
+    """Checks a folder, keeps the request to import it, and carries that out."""
 
     def __init__(
         self,
@@ -45,28 +45,28 @@ class ImportController:
     def look(self, folder: Path, home: Path) -> None:
         """Check a folder; the proposed target is in the folder ``home``."""
         self.state.library.set(self._library.names())
-        before = self.state.order.value
+        before = self.state.request.value
         # Folders of one rig are often imported one after the other.
-        order = ImportOrder(folder, home, PUBLISHED if before is None else before.base)
+        request = ImportRequest(folder, home, PUBLISHED if before is None else before.base)
 
         def done(found: Found) -> None:
-            self.state.order.set(replace(order, target=target_for(folder, found.kind, home)))
+            self.state.request.set(replace(request, target=target_for(folder, found.kind, home)))
             self._show(found)
             self.state.ready.emit(found)
 
-        self._look(order, done)
+        self._look(request, done)
 
     def change(self, **what: Any) -> None:
-        """Change fields of the order; checks the folder again if that matters."""
-        order, found = self.state.order.value, self.state.found.value
-        if order is None or found is None:
+        """Change fields of the request; checks the folder again if that matters."""
+        request, found = self.state.request.value, self.state.found.value
+        if request is None or found is None:
             return
-        order = replace(order, **what)
-        self.state.order.set(order)
+        request = replace(request, **what)
+        self.state.request.set(request)
         if _CHECKED & set(what):
-            self._look(order, self._show)
+            self._look(request, self._show)
         else:
-            self.state.trouble.set(trouble_of(found, order))
+            self.state.trouble.set(trouble_of(found, request))
 
     def rename(self, name: str, home: Path) -> None:
         """Store what is imported by a name in a folder."""
@@ -76,14 +76,14 @@ class ImportController:
             plain = name.strip().removesuffix(suffix).replace("/", "-")
             self.change(target=home.expanduser() / f"{plain}{suffix}")
 
-    def _look(self, order: ImportOrder, done: Any) -> None:
+    def _look(self, request: ImportRequest, done: Any) -> None:
         self._looks += 1
         number = self._looks
-        self.state.busy.set(f"Checking {order.folder.name}")
+        self.state.busy.set(f"Checking {request.folder.name}")
 
         def work(progress: Progress) -> Found:
             progress.report("check the files", 0, 0)
-            return look_at(order, self._library)
+            return look_at(request, self._library)
 
         def looked(found: Found) -> None:
             # The outcome of a check is dropped once another one has begun.
@@ -97,72 +97,72 @@ class ImportController:
             self._tell(error)
 
         ended = lambda: self.state.busy.set("")  # noqa: E731
-        self._runner.submit(Job(f"Check {order.folder.name}", work, looked, failed, ended, is_minor=True))
+        self._runner.submit(Job(f"Check {request.folder.name}", work, looked, failed, ended, is_minor=True))
 
     def _show(self, found: Found) -> None:
-        assert self.state.order.value is not None
+        assert self.state.request.value is not None
         self.state.found.set(found)
-        self.state.trouble.set(trouble_of(found, self.state.order.value))
+        self.state.trouble.set(trouble_of(found, self.state.request.value))
 
     def command_line(self) -> str:
         """The command that does the same."""
-        found, order = self.state.found.value, self.state.order.value
-        return "" if found is None or order is None else command_of(found, order)
+        found, request = self.state.found.value, self.state.request.value
+        return "" if found is None or request is None else command_of(found, request)
 
     def start(self) -> bool:
         """Import in a job; if that is not possible, a message says why and the answer is False."""
-        found, order = self.state.found.value, self.state.order.value
+        found, request = self.state.found.value, self.state.request.value
         # Something of that name may exist by now.
-        trouble = "Choose a folder first." if found is None or order is None else trouble_of(found, order)
+        trouble = "Choose a folder first." if found is None or request is None else trouble_of(found, request)
         self.state.trouble.set(trouble)
-        if found is None or order is None or trouble:
+        if found is None or request is None or trouble:
             self._notifier.tell("warning", trouble)
             return False
         carry_out = import_calibration if found.kind == "calibration" else import_scan
-        work = lambda progress: carry_out(order, self._library, progress)  # noqa: E731
-        self._runner.submit(Job(f"Import {order.folder.name}", work, self.state.done.emit, self._tell))
+        work = lambda progress: carry_out(request, self._library, progress)  # noqa: E731
+        self._runner.submit(Job(f"Import {request.folder.name}", work, self.state.done.emit, self._tell))
         return True
 
     def _tell(self, error: Exception) -> None:
         self._notifier.tell("error", sentence_of(error))
 
 
-def look_at(order: ImportOrder, library: CalibrationLibrary) -> Found:
-    """What the folder of an order contains; raises `StoreError`."""
+def look_at(request: ImportRequest, library: CalibrationLibrary) -> Found:
+    """What the folder of an request contains; raises `StoreError`."""
     from dsl_core.workflows import exchange
 
-    look = exchange.look_at(order.folder, base_of(order, library), _size(order))
+    look = exchange.look_at(request.folder, base_of(request, library), _size(request))
     return Found(
-        order.folder, look.kind, rows_of(look.table), summary_of(look.kind, look.table), look.obstacle
+        request.folder, look.kind, rows_of(look.table), summary_of(look.kind, look.table), look.obstacle
     )
 
 
-def import_scan(order: ImportOrder, library: CalibrationLibrary, progress: Progress) -> Path:
+def import_scan(request: ImportRequest, library: CalibrationLibrary, progress: Progress) -> Path:
     """Make a scan of a dataset, complete or not at all."""
     from dsl_core.io.staging import staged
     from dsl_core.workflows import exchange
 
-    with staged([order.target]) as (draft,):
-        exchange.import_scan(order.folder, draft, base_of(order, library), progress)
-    return order.target
+    with staged([request.target]) as (draft,):
+        exchange.import_scan(request.folder, draft, base_of(request, library), progress)
+    return request.target
 
 
-def import_calibration(order: ImportOrder, library: CalibrationLibrary, progress: Progress) -> Path:
+def import_calibration(request: ImportRequest, library: CalibrationLibrary, progress: Progress) -> Path:
     """Make a rig's file of a published calibration."""
     from dsl_core.io.rig_file import save_rig
     from dsl_core.workflows import exchange
 
     progress.report("read the calibration", 0, 0)
-    rig = exchange.import_calibration(order.folder, base_of(order, library), _size(order))
-    return save_rig(rig, order.target)
+    rig = exchange.import_calibration(request.folder, base_of(request, library), _size(request))
+    return save_rig(rig, request.target)
 
 
-def base_of(order: ImportOrder, library: CalibrationLibrary) -> Rig:
+def base_of(request: ImportRequest, library: CalibrationLibrary) -> Rig:
     """The rig that gives film, sensor and scales; raises what `load_calibration` raises."""
     from dsl_core.simulation.published_rig import published_rig
 
-    return published_rig() if order.base == PUBLISHED else load_calibration(order.base, library)
+    return published_rig() if request.base == PUBLISHED else load_calibration(request.base, library)
 
 
-def _size(order: ImportOrder) -> tuple[int, int] | None:
-    return order.camera_px if all(order.camera_px) else None
+def _size(request: ImportRequest) -> tuple[int, int] | None:
+    return request.camera_px if all(request.camera_px) else None

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportOrder, ImportState, import_view
+from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.dialogs import OrderDialog
+from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.read_table import ReadTable, cell
@@ -29,26 +29,26 @@ _COLUMNS = ("Expected", "Found", "Status", "What to do")
 _LARGEST_PX = 20000
 
 
-class ImportDialog(OrderDialog):
+class ImportDialog(JobDialog):
     """Follows an `ImportState` whose folder has been checked; the controller imports."""
 
     def __init__(self, state: ImportState, commands: ImportController, parent: QWidget) -> None:
         super().__init__(commands, parent)
-        order = state.order.value
-        assert order is not None
+        request = state.request.value
+        assert request is not None
         self._state, self._commands, self._theme = state, commands, DARK
-        #: The folder whose order is shown.
+        #: The folder whose request is shown.
         self._shown: Path | None = None
         self.setWindowTitle("Import")
         self.resize(880, 560)
         add_help_key(self, "importing")
         self._make_folder()
-        self._make_target(order)
+        self._make_target(request)
         self._lay_out()
         self._connect()
         self.stops = [
             state.found.follow(self._show_found),
-            state.order.follow(self._show_order),
+            state.request.follow(self._show_request),
             state.busy.follow(lambda _: self._judge()),
             state.trouble.follow(lambda _: self._judge()),
         ]
@@ -86,11 +86,11 @@ class ImportDialog(OrderDialog):
         for box in (self.width_px, self.height_px):
             box.setSpecialValueText("as in the file")
 
-    def _make_target(self, order: ImportOrder) -> None:
-        self.name = QLineEdit(order.target.stem)
+    def _make_target(self, request: ImportRequest) -> None:
+        self.name = QLineEdit(request.target.stem)
         self.name.setAccessibleName("Name")
         self.name.setToolTip("Name of the imported scan or calibration; the ending is added")
-        self.home = QLineEdit(str(order.target.parent))
+        self.home = QLineEdit(str(request.target.parent))
         self.home.setAccessibleName("Folder to save in")
         self.home.setToolTip("Folder of the imported scan or calibration; the source folder is not changed")
         self.browse = push_button("&Choose…", "Choose the folder to save in")
@@ -154,15 +154,15 @@ class ImportDialog(OrderDialog):
             cell(row.advice),
         )
 
-    def _show_order(self, order: ImportOrder | None) -> None:
-        if order is None:
+    def _show_request(self, request: ImportRequest | None) -> None:
+        if request is None:
             return
-        if self.base.findData(order.base) < 0:
-            self.base.addItem(Path(order.base).name, order.base)
-        self.base.setCurrentIndex(self.base.findData(order.base))
+        if self.base.findData(request.base) < 0:
+            self.base.addItem(Path(request.base).name, request.base)
+        self.base.setCurrentIndex(self.base.findData(request.base))
         # Text that is being typed is not replaced.
-        is_other, self._shown = order.folder != self._shown, order.folder
-        for field, text in ((self.name, order.target.stem), (self.home, str(order.target.parent))):
+        is_other, self._shown = request.folder != self._shown, request.folder
+        for field, text in ((self.name, request.target.stem), (self.home, str(request.target.parent))):
             if is_other or not field.hasFocus():
                 field.setText(text)
         self._judge()

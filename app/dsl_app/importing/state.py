@@ -48,7 +48,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class ImportOrder:
+class ImportRequest:
     """How to import: ``base`` is `PUBLISHED`, a name of the library or the path of a file.
 
     ``camera_px`` is the image size of a calibration; 0 leaves it to the file.
@@ -69,7 +69,7 @@ class ImportState:
 
     def __init__(self) -> None:
         self.found: Value[Found | None] = Value(None)
-        self.order: Value[ImportOrder | None] = Value(None)
+        self.request: Value[ImportRequest | None] = Value(None)
         self.library: Value[tuple[str, ...]] = Value(())
         self.busy = Value("")
         self.trouble = Value("")
@@ -131,24 +131,24 @@ def target_for(folder: Path, kind: str, home: Path) -> Path:
     return target
 
 
-def trouble_of(found: Found, order: ImportOrder) -> str:
+def trouble_of(found: Found, request: ImportRequest) -> str:
     """Why nothing can be imported, and what to do; empty when it can."""
     if found.obstacle:
         return found.obstacle
-    if not order.target.stem.strip() or order.target.name.startswith("."):
+    if not request.target.stem.strip() or request.target.name.startswith("."):
         return "Enter a name."
-    if order.target.exists():
-        return f"{order.target.name} exists already. Choose another name or folder."
+    if request.target.exists():
+        return f"{request.target.name} exists already. Choose another name or folder."
     return ""
 
 
-def command_of(found: Found, order: ImportOrder) -> str:
+def command_of(found: Found, request: ImportRequest) -> str:
     """The command that does the same."""
-    words = ["dsl-scan import", _quoted(order.folder), "-o", _quoted(order.target)]
-    if order.base != PUBLISHED:
-        words.append(f"--calibration {_quoted(order.base)}")
-    if found.kind == "calibration" and all(order.camera_px):
-        words.append("--camera-size {}x{}".format(*order.camera_px))
+    words = ["dsl-scan import", _quoted(request.folder), "-o", _quoted(request.target)]
+    if request.base != PUBLISHED:
+        words.append(f"--calibration {_quoted(request.base)}")
+    if found.kind == "calibration" and all(request.camera_px):
+        words.append("--camera-size {}x{}".format(*request.camera_px))
     return " ".join(words)
 
 
@@ -168,9 +168,9 @@ class ImportView:
 
 def import_view(state: ImportState) -> ImportView:
     """The dialog's texts and rows for what is known now."""
-    busy, order, found = state.busy.value, state.order.value, state.found.value
+    busy, request, found = state.busy.value, state.request.value, state.found.value
     is_calibration = found is not None and found.kind == "calibration"
-    remark = "" if order is None else f"Creates {order.target.name}."
+    remark = "" if request is None else f"Creates {request.target.name}."
     if is_calibration:
         remark += " The calibration is also added to the library."
     return ImportView(

@@ -26,20 +26,20 @@ class ProjectorScreens(QObject):
         super().__init__(window)
         self._window, self._notifier = window, notifier
         self._labels: list[ScreenLabel] = []
-        self.beam = ProjectorWindow()
-        self.beam.lost.connect(
+        self.projector_window = ProjectorWindow()
+        self.projector_window.lost.connect(
             lambda name: notifier.tell(
                 "error",
                 f"The projector's screen {name} was disconnected. Connect it again and choose it on the Rig"
                 " page.",
             )
         )
-        self.beam.restored.connect(
+        self.projector_window.restored.connect(
             lambda name: notifier.tell(
                 "info", f"The screen {name} is connected again. Choose it on the Rig page to use it."
             )
         )
-        window.destroyed.connect(self.beam.close)
+        window.destroyed.connect(self.projector_window.close)
 
     def serve(self, page: RigPage) -> None:
         """Serve a Rig page, and update its list when screens are connected or disconnected."""
@@ -67,11 +67,11 @@ class ProjectorScreens(QObject):
     def close(self) -> None:
         """Release all screens."""
         self.hide_names()
-        self.beam.close()
+        self.projector_window.close()
 
     def _list(self, page: RigPage) -> None:
-        beam = self.beam
-        page.projector.refresh_screens(beam.screen().name() if beam.is_armed else "", beam.lost_screen)
+        window = self.projector_window
+        page.projector.refresh_screens(window.screen().name() if window.is_armed else "", window.lost_screen)
 
     def _choose(self, page: RigPage, name: str) -> None:
         if name == LOST:
@@ -79,13 +79,13 @@ class ProjectorScreens(QObject):
         found = next((s for s in QGuiApplication.screens() if s.name() == name), None)
         try:
             if found is None:
-                self.beam.disarm()
+                self.projector_window.disarm()
             elif found is self._window.screen():
                 raise DslError(
                     f"{name} is the screen of this window. Choose the projector's, or move this window away."
                 )
             else:
-                self.beam.arm(found)
+                self.projector_window.arm(found)
         except DslError as error:
             self._notifier.tell("error", str(error))
         self._list(page)

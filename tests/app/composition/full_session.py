@@ -32,7 +32,6 @@ from PySide6.QtCore import QPoint, QPointF, Qt, QtMsgType, qInstallMessageHandle
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QCheckBox, QLineEdit, QWidget
 
-from tests.app.composition.beam_reader import BeamReader, screen_of
 from tests.app.composition.person import (
     choose,
     click,
@@ -46,6 +45,7 @@ from tests.app.composition.person import (
     when_asked,
     write,
 )
+from tests.app.composition.screen_reader import ScreenReader, screen_of
 from tests.app.support.two_screens import PROJECTOR, plug, unplug
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
@@ -172,7 +172,7 @@ class Session:
 
     # Scan and results ------------------------------------------------------------------------------
 
-    def scan(self) -> tuple[BeamReader, Path]:
+    def scan(self) -> tuple[ScreenReader, Path]:
         """Put the chart back, choose the projector's screen, scan, and read every picture back."""
         key(Qt.Key.Key_1, self.window, CONTROL)
         page = self.window.page_of("rig")
@@ -184,10 +184,10 @@ class Session:
         click(page._connect_button)
         wait(lambda: rig.link.value is Link.OPEN, "the rig to answer")
         choose(page.projector._screen, PROJECTOR[:2])
-        wait(lambda: self.composition.screens.beam.is_armed, "the beam")
+        wait(lambda: self.composition.screens.projector_window.is_armed, "the projector window")
         devices = rig.devices.value
         assert devices is not None
-        reader = BeamReader(devices.projector, PROJECTOR)
+        reader = ScreenReader(devices.projector, PROJECTOR)
         devices.projector = reader.projector
         key(Qt.Key.Key_3, self.window, CONTROL)
         scan = self.window.page_of("scan")
@@ -226,7 +226,7 @@ class Session:
             toast.dismiss()
         key(Qt.Key.Key_1, self.window, CONTROL)
         choose(rig.projector._screen, PROJECTOR[:2])
-        wait(lambda: self.composition.screens.beam.is_armed, "the beam")
+        wait(lambda: self.composition.screens.projector_window.is_armed, "the projector window")
         key(Qt.Key.Key_3, self.window, CONTROL)
         click(scan.banner.action)
         wait(lambda: state.phase.value is Phase.DONE, "the rest of the scan")

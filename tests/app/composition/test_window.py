@@ -105,18 +105,18 @@ def test_nothing_stays_on_any_screen_when_the_window_closes(
 ) -> None:
     composition, window = composed
     screens = composition.screens
-    screens.beam.show()
+    screens.projector_window.show()
     screens.identify()
     (name,) = screens._labels
-    for shown in (screens.beam, name):
+    for shown in (screens.projector_window, name):
         assert not shown.testAttribute(Qt.WidgetAttribute.WA_QuitOnClose)
     monkeypatch.setattr(window, "_may_stop", lambda: False)
     assert not window.close()
-    assert screens.beam.isVisible()
+    assert screens.projector_window.isVisible()
     assert name.isVisible()
     monkeypatch.undo()
     assert window.close()
-    assert not screens.beam.isVisible()
+    assert not screens.projector_window.isVisible()
     assert not screens._labels
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from dsl_app.importing.controller import ImportController, import_scan
-from dsl_app.importing.state import FileRow, Found, ImportOrder, ImportState, rows_of
+from dsl_app.importing.state import FileRow, Found, ImportRequest, ImportState, rows_of
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.known_files import Kind, kind_of
 
@@ -179,9 +179,9 @@ def test_real_captures_of_other_programs_are_told_from_scans(bench: Bench) -> No
 def test_nothing_is_replaced_and_names_are_free(bench: Bench, made: Folders) -> None:
     (bench.home / "rig.json").write_text("mine")
     bench.look(made.rig)
-    order = bench.state.order.value
-    assert order is not None
-    assert order.target == bench.home / "rig-2.json"
+    request = bench.state.request.value
+    assert request is not None
+    assert request.target == bench.home / "rig-2.json"
     bench.control.rename("rig", bench.home)
     assert "rig.json exists already" in bench.trouble
     bench.control.rename(" ", bench.home)
@@ -195,9 +195,9 @@ def test_nothing_is_replaced_and_names_are_free(bench: Bench, made: Folders) -> 
 
 def test_a_cancelled_import_leaves_nothing(made: Folders, bench: Bench) -> None:
     progress = CallbackProgress(lambda stage, done, total: progress.token.cancel() if done == 3 else None)
-    order = ImportOrder(made.scene, bench.home / "a.dsl", str(made.own))
+    request = ImportRequest(made.scene, bench.home / "a.dsl", str(made.own))
     with pytest.raises(Cancelled):
-        import_scan(order, bench.library, progress)
+        import_scan(request, bench.library, progress)
     assert list(bench.home.iterdir()) == []
 
 

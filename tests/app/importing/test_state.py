@@ -2,13 +2,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dsl_app.importing.state import Found, ImportOrder, ImportState, import_view
+from dsl_app.importing.state import Found, ImportRequest, ImportState, import_view
 
 
 def test_the_dialog_says_what_it_makes_and_what_prevents_it() -> None:
     state = ImportState()
     assert import_view(state).remark == ""
-    state.order.set(ImportOrder(Path("leaf"), Path("home/leaf.dsl")))
+    state.request.set(ImportRequest(Path("leaf"), Path("home/leaf.dsl")))
     state.found.set(Found(Path("leaf"), "scan", (), ""))
     view = import_view(state)
     assert (view.trouble, view.remark, view.is_busy, view.asks_size) == (
@@ -23,7 +23,7 @@ def test_the_dialog_says_what_it_makes_and_what_prevents_it() -> None:
 
 def test_a_calibration_also_asks_its_size_and_goes_to_the_library() -> None:
     state = ImportState()
-    state.order.set(ImportOrder(Path("rig"), Path("home/rig.json")))
+    state.request.set(ImportRequest(Path("rig"), Path("home/rig.json")))
     state.found.set(Found(Path("rig"), "calibration", (), ""))
     view = import_view(state)
     assert view.asks_size

@@ -66,16 +66,16 @@ class RecordingProjector(Projector):
 
 def main() -> None:
     wait(lambda: screen(PROJECTOR) is not None)
-    beam = screen(PROJECTOR)
-    assert beam is not None
+    second = screen(PROJECTOR)
+    assert second is not None
     window = ProjectorWindow()
     told: list[str] = []
     window.lost.connect(lambda name: told.append(f"lost {name}"))
     window.restored.connect(lambda name: told.append(f"restored {name}"))
-    window.arm(beam)
+    window.arm(second)
     wait(lambda: window.is_armed)
 
-    image = pattern(*pixel_size(beam))
+    image = pattern(*pixel_size(second))
     projector = ScreenProjector(window, latency_ms=1.0)
     errors: list[BaseException] = []
 
@@ -91,7 +91,7 @@ def main() -> None:
     assert not errors, errors
     show(np.zeros((*image.shape[:2], 4), np.uint8))
     assert isinstance(errors.pop(), DeviceError)
-    seen = pixels(beam)
+    seen = pixels(second)
     assert seen.shape == image.shape, (seen.shape, image.shape)
     print("differing pixels at 1:1:", int((seen != image).any(2).sum()))
 
@@ -99,7 +99,7 @@ def main() -> None:
     window.show_pixels(half)
     window.repaint()
     doubled = half.repeat(2, 0).repeat(2, 1)
-    print("differing pixels at 1:2:", int((pixels(beam) != doubled).any(2).sum()))
+    print("differing pixels at 1:2:", int((pixels(second) != doubled).any(2).sum()))
 
     unplug(display)
     wait(lambda: told == ["lost PROJECTOR"])
@@ -124,11 +124,11 @@ def main() -> None:
 
     set_monitor(display, "MIRROR", "1280/300x720/170+1280+0", "none")
     wait(lambda: screen("MIRROR") is not None)
-    beam = screen(PROJECTOR)
-    assert beam is not None
-    assert mirrors(beam)
+    second = screen(PROJECTOR)
+    assert second is not None
+    assert mirrors(second)
     try:
-        window.arm(beam)
+        window.arm(second)
     except DeviceError as error:
         print("mirrored:", error)
     QTimer.singleShot(0, application.quit)

@@ -57,16 +57,16 @@ def gone() -> int:
 
 
 def test_a_session_is_written_only_after_a_change(tmp_path: Path) -> None:
-    keeper = SessionStore(tmp_path / "sessions", lambda: LEAF, process=7)
-    keeper.save()
+    store = SessionStore(tmp_path / "sessions", lambda: LEAF, process=7)
+    store.save()
     assert not (tmp_path / "sessions").exists()
     band = Value(1)
-    keeper.watch(band)
+    store.watch(band)
     band.set(2)
-    assert keeper.save() == ""
+    assert store.save() == ""
     (file,) = (tmp_path / "sessions").iterdir()
     assert Session.model_validate_json(file.read_bytes()) == LEAF
-    keeper.remove()
+    store.remove()
     assert not file.exists()
 
 
@@ -74,9 +74,9 @@ def test_what_a_crash_left_is_found_once(tmp_path: Path, gone: int) -> None:
     crashed = SessionStore(tmp_path, lambda: LEAF, process=gone)
     crashed.touch()
     crashed.save()
-    keeper = SessionStore(tmp_path, Session)
-    assert keeper.crashed_session() == (LEAF, "")
-    assert keeper.crashed_session() == (None, "")
+    store = SessionStore(tmp_path, Session)
+    assert store.crashed_session() == (LEAF, "")
+    assert store.crashed_session() == (None, "")
 
 
 def test_what_a_running_program_has_open_is_left_to_it(tmp_path: Path) -> None:
@@ -99,11 +99,11 @@ def test_a_damaged_session_is_put_aside_with_a_sentence(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
     (tmp_path / "sessions").write_text("a file in the way")
     sessions = iter([LEAF, Session(page="scan")])
-    keeper = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
-    keeper.touch()
-    assert "cannot be saved" in keeper.save()
-    keeper.touch()
-    assert keeper.save() == ""
+    store = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
+    store.touch()
+    assert "cannot be saved" in store.save()
+    store.touch()
+    assert store.save() == ""
 
 
 def test_a_result_is_looked_at_as_before(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.reconstruct_again.controller import ReconstructionController
 from dsl_app.results.reconstruct_again.state import OWN, ReconstructionRequest, ReconstructionState
-from dsl_app.shared.widgets.dialogs import OrderDialog
+from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_core.model.options import MODELS, SOLVERS, SpectralChoice
@@ -26,7 +26,7 @@ LOW_NM, HIGH_NM = 380.0, 780.0
 DEVICES = (("cpu", "Processor (CPU)"), ("cuda", "Graphics card (CUDA)"))
 
 
-class ReconstructionDialog(OrderDialog):
+class ReconstructionDialog(JobDialog):
     """Follows a `ReconstructionState` whose scan has been read; the controller reconstructs."""
 
     def __init__(

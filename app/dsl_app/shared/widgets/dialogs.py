@@ -53,7 +53,7 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     return window
 
 
-class OrderCommands(Protocol):
+class JobCommands(Protocol):
     """What such a dialog asks of its controller."""
 
     def start(self) -> bool:
@@ -63,13 +63,13 @@ class OrderCommands(Protocol):
         """The command that does the same."""
 
 
-class OrderDialog(QDialog):
+class JobDialog(QDialog):
     """Asks for the settings of long work, and closes once that has started.
 
     Lay out the settings in `column`, then call `close_column`.
     """
 
-    def __init__(self, commands: OrderCommands, parent: QWidget) -> None:
+    def __init__(self, commands: JobCommands, parent: QWidget) -> None:
         super().__init__(parent)
         self._orders = commands
         #: Functions that disconnect the dialog from its state when it closes.

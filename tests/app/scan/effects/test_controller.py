@@ -3,6 +3,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.connection.state import RigChoice
 from dsl_app.scan.effects.controller import EffectsController
@@ -18,6 +19,7 @@ from dsl_core.io.scan.folder import ScanReader
 from dsl_core.simulation.effects.catalogue import NAMES, NEEDED, USUAL
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 from dsl_core.simulation.sim_devices import SimCamera
+from dsl_core.simulation.world import World
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.scan_bench import FRAMES, TWIN, ScanBench, planned_bench
 
@@ -76,8 +78,10 @@ def test_looking_changes_nothing_in_the_rig(control: EffectsController, bench: S
 
 
 def test_a_choice_is_put_in_force_by_options_that_scans_note(
-    control: EffectsController, bench: ScanBench, tmp_path: Path
+    control: EffectsController, bench: ScanBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # What the frames show does not matter here.
+    monkeypatch.setattr(World, "_light", lambda *_: np.ones((48, 64), np.float32))
     control.apply("auto", Tolerance(0.5, "sigma"))
     assert dict(bench.rig.state.choice.value.options)["tolerance"] == "0.5sigma"
     assert (control.state.in_use.value, control.state.tolerance.value) == ("auto", Tolerance(0.5, "sigma"))

@@ -24,7 +24,7 @@ def pixels_of(screen: QScreen) -> NDArray[np.uint8]:
     return rows[:, : 3 * picture.width()].reshape(picture.height(), picture.width(), 3).copy()
 
 
-class BeamReader(QObject):
+class ScreenReader(QObject):
     """Stands before a projector on a screen; ``compared`` pictures had ``differing`` pixels in all."""
 
     _shown = Signal(object, object)
@@ -57,7 +57,7 @@ class BeamReader(QObject):
 
 
 class _Watched(Projector):
-    def __init__(self, projector: Projector, reader: BeamReader) -> None:
+    def __init__(self, projector: Projector, reader: ScreenReader) -> None:
         self._projector, self._reader = projector, reader
 
     @property
