@@ -18,7 +18,7 @@ class DriftError(DeviceError):
 
 
 class CalibrationError(DslError):
-    """A calibration is missing, damaged, or does not belong to the data at hand."""
+    """A calibration is missing, damaged, or does not belong to the data."""
 
 
 class DecodeError(DslError):

@@ -1,4 +1,4 @@
-"""How long work reports and is cancelled, without knowing who listens."""
+"""How long-running work reports progress and is cancelled."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dsl_core.errors import Cancelled
 
 
 class Progress(Protocol):
-    """What a long computation may say while it runs."""
+    """What a long computation reports while it runs."""
 
     def report(self, stage: str, done: int, total: int) -> None:
         """Tell that ``done`` of ``total`` steps of ``stage`` are finished; raises `Cancelled`."""

@@ -22,7 +22,7 @@ def resource_path(name: str) -> Path:
     Raises `StoreError` when the name leaves the resources or nothing of that name was installed.
     """
     if Path(name).is_absolute() or ".." in Path(name).parts:
-        raise StoreError(f"Resource {name!r} lies outside the resources; give a path relative to them.")
+        raise StoreError(f"Resource {name!r} is outside the resources; give a path relative to them.")
     for root in resource_roots():
         if (root / name).exists():
             return root / name

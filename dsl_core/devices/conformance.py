@@ -38,7 +38,7 @@ class CameraConformance:
         with self.open_camera() as camera:
             info = camera.info
             _require(info.width_px > 0 and info.height_px > 0, f"the image size of {info} is empty")
-            _require(info.bayer in ("RGGB", "BGGR", "GRBG", "GBRG"), f"{info.bayer} is no Bayer mosaic")
+            _require(info.bayer in ("RGGB", "BGGR", "GRBG", "GBRG"), f"{info.bayer} is not a Bayer mosaic")
             _require(8 <= info.bit_depth <= 16, f"{info.bit_depth} bits are not between 8 and 16")
             low, high = info.exposure_range_ms
             _require(0 < low <= high < math.inf, f"the exposure range {low} to {high} ms is not a range")
@@ -110,7 +110,7 @@ class CameraConformance:
         camera.close()
 
     def _check_region(self, info: CameraInfo) -> None:
-        """A region lies on the sensor and makes the image size."""
+        """A region is on the sensor and makes the image size."""
         x, y, width, height = info.region_px or (0, 0, 0, 0)
         size = (width // info.binning, height // info.binning)
         _require(x >= 0 and y >= 0, f"the region {info.region_px} starts outside the sensor")

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 
 from pydantic import BaseModel
-from pydantic_core import PydanticUndefined
 
 import dsl_core
 from dsl_core.devices.base import DeviceRig
@@ -142,14 +141,18 @@ def _options(function: OpenRig) -> tuple[OptionEntry, ...]:
     if not (inspect.isclass(record) and issubclass(record, BaseModel)):
         return ()
     return tuple(
-        OptionEntry(name, _as_text(field.get_default(call_default_factory=True)), field.description or "")
+        OptionEntry(
+            name,
+            "" if field.is_required() else _as_text(field.get_default(call_default_factory=True)),
+            field.description or "",
+        )
         for name, field in record.model_fields.items()
     )
 
 
 def _as_text(value: object) -> str:
     """A default as a person types it."""
-    if value is None or value is PydanticUndefined:
+    if value is None:
         return ""
     if isinstance(value, bool):
         return "on" if value else "off"

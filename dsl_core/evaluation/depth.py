@@ -50,7 +50,7 @@ def depth_score(depth_mm: Floats, truth_mm: Floats, lit: Mask | None = None) -> 
     if not measured.any():
         raise DecodeError(
             f"None of the {int(wanted.sum())} lit pixels with known depth was measured, so that no error"
-            " can be given; look at the flags of the result for the reason."
+            " can be given; the flags of the result say why."
         )
     errors = np.where(measured, depth_mm.astype(np.float64) - truth_mm, np.nan)
     error = errors[measured]

@@ -1,4 +1,4 @@
-"""Two results of one view against each other, pixel by pixel; neither is taken for the truth."""
+"""Two results of one view against each other, pixel by pixel; neither is the truth."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class ResultDifference:
 
 
 def shared_bands(first_nm: Floats, second_nm: Floats) -> list[tuple[int, int]]:
-    """Pairs of bands, by number in each, that lie at the same wavelength."""
+    """Pairs of bands, by number in each, at the same wavelength."""
     if not (len(first_nm) and len(second_nm)):
         return []
     nearest = [int(np.abs(second_nm - nm).argmin()) for nm in first_nm]

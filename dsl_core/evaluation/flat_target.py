@@ -35,7 +35,7 @@ _TO_DEVIATION = 1.4826
 
 @dataclass(frozen=True)
 class SeenTarget:
-    """The plane of a target and what lies about it.
+    """The plane of a target and how pixels lie about it.
 
     ``left_out`` pixels of the region have a depth but are limited or lie off the plane. ``residual_mm``
     (h, w) is how far behind the plane a pixel lies, NaN where it is not counted. ``patches_mm`` are mean
@@ -63,7 +63,7 @@ class SeenTarget:
         return float(x), float(y)
 
     def depth_at(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        """Depth of the plane beside the camera's axis, and its standard deviation, mm.
+        """Depth of the plane next to the camera's axis, and its standard deviation, mm.
 
         The deviation follows from how far the means of patches lie off the plane; an error that the whole
         plane has, such as one of the calibration, is not in it.
@@ -111,7 +111,7 @@ def _cut(shape: tuple[int, ...], region: Region | None) -> tuple[slice, slice]:
     x, y, width, height = region
     if min(x, y) < 0 or min(width, height) < 1 or x + width > shape[1] or y + height > shape[0]:
         raise DecodeError(
-            f"The region {width} x {height} px at column {x}, row {y} does not lie inside the picture of"
+            f"The region {width} x {height} px at column {x}, row {y} is not inside the picture of"
             f" {shape[1]} x {shape[0]} px. Choose one that does."
         )
     return slice(y, y + height), slice(x, x + width)
@@ -122,8 +122,8 @@ def _require_pixels(chosen: Mask, measured: Mask) -> None:
         raise DecodeError("It has no depth there. Choose another result, or another region.")
     if not chosen.any():
         raise DecodeError(
-            f"All {int(measured.sum())} pixels with a depth are limited: coarse, or beside an edge. Scan with"
-            " more lines, or choose another region."
+            f"All {int(measured.sum())} pixels with a depth are limited: coarse, or next to an edge. Scan"
+            " with more lines, or choose another region."
         )
 
 
@@ -145,7 +145,7 @@ def _plane(points: Floats, chosen: Mask) -> tuple[PlaneFit, Mask]:
 def _plane_of_most(points: Floats, chosen: Mask) -> PlaneFit:
     """The plane of that half of the pixels that lies nearest to it, of a thinned image.
 
-    A fit to all would be tilted by what stands beside the target.
+    A fit to all would be tilted by what stands next to the target.
     """
     step = max(1, min(chosen.shape) // _THIN_PX)
     points, chosen = points[:, ::step, ::step], chosen[::step, ::step]

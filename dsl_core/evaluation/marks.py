@@ -17,7 +17,7 @@ Floats = NDArray[np.float32] | NDArray[np.float64]
 
 
 def mask_of_outline(outline_px: Sequence[tuple[float, float]], shape: tuple[int, int]) -> Mask:
-    """Pixels whose centre lies in a closed outline of (x, y) corners, even-odd rule; shape (rows, columns).
+    """Pixels whose centre is in a closed outline of (x, y) corners, even-odd rule; shape (rows, columns).
 
     Pixel (x, y) has its centre at (x, y), so a rectangle from -0.5 to 9.5 holds ten columns.
     """
@@ -39,7 +39,7 @@ def mask_of_outline(outline_px: Sequence[tuple[float, float]], shape: tuple[int,
 def inside_outline(
     x: NDArray[Any], y: NDArray[Any], outline: NDArray[np.float64] | Sequence[tuple[float, float]]
 ) -> Mask:
-    """Whether points lie in a closed outline of (x, y) corners, even-odd rule; NaN lies outside."""
+    """Whether points are in a closed outline of (x, y) corners, even-odd rule; NaN is outside."""
     corners = np.asarray(outline, np.float64).reshape(-1, 2)
     inside = np.zeros(np.broadcast_shapes(x.shape, y.shape), bool)
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -57,7 +57,7 @@ def runs_of(mask: Mask) -> tuple[tuple[int, int, int], ...]:
 
 
 def mask_of_runs(runs: Iterable[tuple[int, int, int]], shape: tuple[int, int]) -> Mask:
-    """The mask of `runs_of`; what lies outside the image is left out."""
+    """The mask of `runs_of`; what is outside the image is left out."""
     mask = np.zeros(shape, bool)
     for y, x, count in runs:
         if 0 <= y < shape[0]:
@@ -69,7 +69,7 @@ def mask_of_runs(runs: Iterable[tuple[int, int, int]], shape: tuple[int, int]) -
 class RegionSpectrum:
     """Mean reflectance of a region and the deviation of its pixels, of shape (bands,); NaN without pixels.
 
-    ``pixels`` lie in the outline, ``used`` of them have a spectrum. ``pixel_std`` is the mean uncertainty
+    ``pixels`` are in the outline, ``used`` of them have a spectrum. ``pixel_std`` is the mean uncertainty
     stated for a single pixel; a deviation far above it means that the region is not of one material.
     """
 
@@ -181,7 +181,7 @@ def on_screen(points_mm: Floats, projection: NDArray[np.float64]) -> NDArray[np.
 def nearest_on_screen(
     seen: NDArray[np.float64], at: tuple[float, float], size_px: tuple[int, int], within_px: float = 6.0
 ) -> int | None:
-    """Index of the point of `on_screen` that a person means who points at ``at`` (normalised).
+    """Index of the point of `on_screen` that is meant by pointing at ``at`` (normalised).
 
     Of the points within a few pixels it is the foremost; None where there is none.
     """

@@ -13,14 +13,14 @@ from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.float32] | NDArray[np.float64]
 Map = NDArray[np.float32]
-#: Rows taken at once, so that intermediates stay small beside the cube.
+#: Rows taken at once, so that intermediates stay small compared with the cube.
 BLOCK_ROWS = 64
 
 
 def spectrum_at(bands_nm: NDArray[np.float64], nm: Floats, values: Floats) -> NDArray[np.float64]:
     """A spectrum (samples,) at the bands of an image, linear between its samples.
 
-    Beyond its ends nothing is invented: raises `DecodeError` where a band lies further out than half a band.
+    Beyond its ends nothing is invented: raises `DecodeError` where a band is further out than half a band.
     """
     beyond = np.diff(bands_nm).max() / 2 if len(bands_nm) > 1 else 0.0
     if nm[0] > bands_nm[0] + beyond or nm[-1] < bands_nm[-1] - beyond:

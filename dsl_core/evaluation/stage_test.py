@@ -53,7 +53,7 @@ class StageLine:
 class StageTest:
     """What a target at several positions says of depth.
 
-    ``distances_mm`` are depths of the plane at one place beside the camera's axis, the same for all, with
+    ``distances_mm`` are depths of the plane at one place next to the camera's axis, the same for all, with
     ``std_mm``. ``free`` is the line with its own slope, ``fixed`` the one with slope 1. ``pixel_rms_mm`` is
     the scatter of single pixels about their planes; ``patch_rms_mm`` the published figure: means of patches
     about lines of their own, None where no patch is seen at all positions.
@@ -103,7 +103,7 @@ def _require_positions(positions_mm: Sequence[float], targets: Sequence[SeenTarg
             f" {len(positions_mm)}. Add results at other positions."
         )
     if not all(math.isfinite(position) for position in positions_mm):
-        raise DecodeError("A position of the stage is no number. Give each in mm, like 695.2.")
+        raise DecodeError("A position of the stage is not a number. Give each in mm, like 695.2.")
     if max(positions_mm) == min(positions_mm):
         raise DecodeError(
             f"All positions of the stage are {positions_mm[0]:g} mm, so that no line can be drawn."
@@ -119,7 +119,7 @@ def _line(at: Floats, distance: Floats, std: Sequence[float], scale: float, know
     """The line of a slope through the middle of all points; ``known`` of its parameters are fitted."""
     middle = at - at.mean()
     off = distance - distance.mean() - scale * middle
-    # Few points may lie straight by chance: a point is never taken for surer than its plane is.
+    # Few points may lie straight by chance: no point is more certain than its plane.
     scatter = math.sqrt(max(float(off @ off) / (len(at) - known), float(np.mean(np.square(std)))))
     return StageLine(
         scale=scale,

@@ -78,7 +78,7 @@ def point_against_truth(name: str, seconds: float, found: Evaluation) -> SweepPo
 
 
 def point_against_result(name: str, seconds: float, found: ResultDifference) -> SweepPoint:
-    """How far a scan is from another one that is taken for the best."""
+    """How far a scan is from a reference scan."""
     return SweepPoint(
         name,
         seconds,

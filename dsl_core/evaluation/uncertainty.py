@@ -1,4 +1,4 @@
-"""Whether standard deviations tell the truth."""
+"""Whether the standard deviations are honest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures against goals, in words a person can check."""
+"""Figures against goals, as rows of a table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dsl_core.evaluation.summary import Evaluation
 
 @dataclass(frozen=True)
 class Verdict:
-    """A figure with its unit, what was wanted of it, and whether it got there (None: nothing was wanted).
+    """A figure with its unit, its goal, and whether the goal is met (None: no goal).
 
     ``std`` is the standard deviation of a figure that is estimated, in its unit; empty for others.
     """
@@ -45,7 +45,7 @@ def estimate_row(
 
 @dataclass(frozen=True)
 class Goal:
-    """What is wanted of a figure: at most ``limit``, or at least where ``at_least``."""
+    """The goal for a figure: at most ``limit``, or at least where ``at_least``."""
 
     limit: float
     at_least: bool = False

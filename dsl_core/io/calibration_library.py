@@ -3,7 +3,7 @@
 ``NAME/versions/STAMP.json``
     a calibrated rig with the accepted calibrations it was made of.
 ``NAME/current``
-    the stamp of the version in use; every other one stays beside it.
+    the stamp of the version in use; every other one stays next to it.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class CalibrationLibrary:
         return entry
 
     def names(self) -> tuple[str, ...]:
-        """All names, sorted; one whose first version is just being written is none yet."""
+        """All names, sorted; one whose first version is still being written is not listed."""
         if not self.home.is_dir():
             return ()
         folders = self.home.glob("*/versions")

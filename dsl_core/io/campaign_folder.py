@@ -9,7 +9,7 @@
 ``NAME.json``
     the accepted calibration; ``history/NAME/`` keeps the ones it replaced.
 
-Every file is written whole or not at all, so that a campaign can be left and taken up at any moment.
+Every file is written whole or not at all, so that a campaign can be left and continued at any moment.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ R = TypeVar("R", bound=Record)
 
 
 class CampaignInfo(Record):
-    """With which rig and options a campaign was begun; ``settings`` are those of each calibration."""
+    """The rig and options a campaign was begun with; ``settings`` are those of each calibration."""
 
     schema_version: Literal[1] = 1
     created: str
@@ -51,7 +51,9 @@ class CampaignFolder:
     def open(cls, path: Path) -> Self:
         """A campaign that was begun before; raises `StoreError`."""
         if not (path / CAMPAIGN_NAME).is_file():
-            raise StoreError(f"{path} is no campaign: it has no {CAMPAIGN_NAME}. Give a campaign's folder.")
+            raise StoreError(
+                f"{path} is not a campaign: it has no {CAMPAIGN_NAME}. Give a campaign's folder."
+            )
         return cls(path, read_record(path / CAMPAIGN_NAME, CampaignInfo))
 
     @classmethod
@@ -62,7 +64,7 @@ class CampaignFolder:
         options: Mapping[str, str],
         settings: Mapping[str, Mapping[str, str]] | None = None,
     ) -> Self:
-        """Begin a campaign or go on with it: `prepare` and `save`."""
+        """Begin or continue a campaign: `prepare` and `save`."""
         campaign = cls.prepare(path, rig, options, settings)
         campaign.save()
         return campaign
@@ -94,7 +96,7 @@ class CampaignFolder:
         return cls(path, info.model_copy(update={"settings": merged}))
 
     def save(self) -> None:
-        """Write down with what the campaign was begun; raises `StoreError`."""
+        """Write what the campaign was begun with; raises `StoreError`."""
         make_folder(self.path)
         _write(self.path / CAMPAIGN_NAME, self.info)
 
@@ -106,7 +108,7 @@ class CampaignFolder:
         return type(self)(self.path, self.info.model_copy(update={"settings": settings}))
 
     def home(self, name: str) -> Path:
-        """Where the captures of a calibration lie."""
+        """Where the captures of a calibration are."""
         return self.path / name
 
     def accepted(self, name: str) -> AcceptedCalibration | None:
@@ -114,7 +116,7 @@ class CampaignFolder:
         return self._calibration(self.path / f"{name}.json")
 
     def candidate(self, name: str) -> AcceptedCalibration | None:
-        """A fit that waits for a verdict; raises `StoreError` when its file is damaged."""
+        """A fit that is not accepted yet; raises `StoreError` when its file is damaged."""
         return self._calibration(self._candidate_path(name))
 
     def history(self, name: str) -> tuple[AcceptedCalibration, ...]:
@@ -129,13 +131,13 @@ class CampaignFolder:
         _write(path, fitted)
 
     def accept(self, name: str) -> AcceptedCalibration:
-        """Let the candidate be the calibration from now on; the one it replaces goes into the history.
+        """Accept the candidate; the one it replaces goes into the history.
 
         Raises `StoreError` when there is none.
         """
         candidate = self.candidate(name)
         if candidate is None:
-            raise StoreError(f"No fit of {name} in {self.path} waits to be accepted. Fit it first.")
+            raise StoreError(f"There is no fit of {name} in {self.path} to be accepted. Fit it first.")
         old = self.accepted(name)
         if old is not None:
             folder = self.path / "history" / name
@@ -147,7 +149,7 @@ class CampaignFolder:
         return fresh
 
     def discard(self, name: str) -> None:
-        """Forget the candidate; the accepted calibration stays. Nothing happens when there is none."""
+        """Delete the candidate; the accepted calibration stays. Nothing happens when there is none."""
         self._candidate_path(name).unlink(missing_ok=True)
 
     def _candidate_path(self, name: str) -> Path:
@@ -158,7 +160,7 @@ class CampaignFolder:
 
 
 def _is_unborn(path: Path) -> bool:
-    """Whether a file is what a campaign that was killed at its birth leaves."""
+    """Whether a file may be left by a campaign that was killed while it was created."""
     return path.name == "lock" or path.name.startswith(CAMPAIGN_NAME)
 
 

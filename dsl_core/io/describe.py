@@ -20,7 +20,7 @@ Facts = dict[str, Any]
 
 
 def describe(path: Path, verify: bool = False) -> Facts:
-    """Facts about a session, result, campaign, rig or plan; ``verify`` also reads every frame of a session.
+    """Facts about a scan, result, campaign, rig or plan; ``verify`` also reads every frame of a scan.
 
     Raises `StoreError` when the path is none of them, and the reader's own error when it is a damaged one.
     """
@@ -35,7 +35,7 @@ def describe(path: Path, verify: bool = False) -> Facts:
     if not path.exists():
         raise StoreError(f"{path} does not exist. Give a scan (NAME.dsl), a result, a rig or a plan.")
     raise StoreError(
-        f"{path} is neither a session (it has no {MANIFEST_NAME}) nor a result (no zarr.json), nor the"
+        f"{path} is neither a scan (it has no {MANIFEST_NAME}) nor a result (no zarr.json), nor the"
         " JSON file of a rig or plan. For a published dataset use 'dsl-scan import'."
     )
 

@@ -1,4 +1,4 @@
-"""The rig ``replay``: a session on disk, played back by name."""
+"""The rig ``replay``: a scan on disk, played back by name."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class ReplayOptions(BaseModel):
 def open_replay(options: dict[str, str]) -> DeviceRig:
     """Plays a stored scan back; option ``session`` is its folder.
 
-    Raises `DeviceError` for other options, `StoreError` when the folder is not a session.
+    Raises `DeviceError` for other options, `StoreError` when the folder is not a scan.
     """
     if set(options) != {"session"}:
         given = ", ".join(sorted(options)) or "none"

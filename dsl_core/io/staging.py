@@ -35,7 +35,7 @@ def staged(
         yield drafts
         for draft in drafts:
             _sync_tree(draft)
-        # What lies there now may have come while the block was writing.
+        # What is there now may have come while the block was writing.
         check_targets(targets, overwrite=overwrite, kind=kind)
         for draft, target in zip(drafts, targets, strict=True):
             _move_in(draft, target, room)
@@ -81,11 +81,11 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
 
 
 def _require_form(target: Path, kind: FolderKind | None) -> None:
-    """Raise `StoreError` when a folder stands where a file is wanted, or the reverse."""
+    """Raise `StoreError` when a folder stands where a file is needed, or the reverse."""
     if target.is_dir() and kind is None:
-        raise StoreError(f"{target} is a folder, where a file is to be written. Choose another name.")
+        raise StoreError(f"{target} is a folder, but a file is to be written. Choose another name.")
     if not target.is_dir() and kind is not None:
-        raise StoreError(f"{target} is a file, where {kind.name}, a folder, is to lie. Choose another name.")
+        raise StoreError(f"{target} is a file, but {kind.name} is a folder. Choose another name.")
 
 
 def _sync_tree(path: Path) -> None:
@@ -107,9 +107,9 @@ def _move_in(draft: Path, target: Path, room: Path) -> None:
 
 
 def _clear(room: Path, targets: Sequence[Path]) -> None:
-    """Delete what is left over, after an old folder without a successor has come back to its place.
+    """Delete what is left over, after an old folder without a successor has been moved back to its place.
 
-    Raises `StoreError` that says where the old folder is when it cannot come back; then it stays there.
+    Raises `StoreError` that says where the old folder is when it cannot be moved back; then it stays there.
     """
     for target in targets:
         aside = _aside(target, room)
@@ -151,4 +151,4 @@ class FolderKind:
         if entries and not self.is_one(folder):
             return f"is not {self.name}"
         foreign = sorted(entry.name for entry in entries if not self.owns(entry))
-        return f"holds {foreign[0]} beside {self.name}" if foreign else ""
+        return f"holds {foreign[0]} next to {self.name}" if foreign else ""

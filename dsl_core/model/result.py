@@ -15,7 +15,7 @@ SCHEMA_VERSION = 1
 
 
 class Flag(IntFlag):
-    """Why a pixel is not what it could be; 0 means nothing is wrong."""
+    """Why a pixel is limited; 0 means nothing is wrong."""
 
     NO_LIGHT = 1
     SATURATED = 2

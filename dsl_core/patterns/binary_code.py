@@ -1,4 +1,4 @@
-"""Binary codes of any kind: what to show, and who decodes it."""
+"""Binary codes of any kind: what to show, and how it is decoded."""
 
 from __future__ import annotations
 

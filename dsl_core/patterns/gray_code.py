@@ -84,7 +84,7 @@ class DecodedCode:
 
     The rest only codes with fine stripes can say. ``straight``: the light comes straight from the projector.
     ``rival_column``, int32: what the other code of an ensemble says where the two disagree, else -1.
-    ``at_edge``: two codes name neighbouring columns, ``likely_column`` and the next; the truth lies between.
+    ``at_edge``: two codes name neighbouring columns, ``likely_column`` and the next; the truth is between.
     """
 
     column: NDArray[np.int32]
@@ -144,7 +144,7 @@ class GrayDecoder:
         """Columns and rows of all pixels; raises `DecodeError` when pairs are missing.
 
         Undecided is a pixel whose margin is zero, not a number or below ``min_margin`` or ``min_sigmas``,
-        and one whose code lies outside the projector.
+        and one whose code is outside the projector.
         """
         if self.missing_pairs:
             raise DecodeError(

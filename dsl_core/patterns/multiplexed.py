@@ -55,7 +55,7 @@ def _own_profile(spec: Columns, width_px: int, index: int) -> NDArray[np.float32
     if levels.min() < 0 or levels.max() > 1:
         raise PlanError(
             f"Column profile {index} ranges from {levels.min():g} to {levels.max():g};"
-            " drive levels lie between 0 and 1."
+            " drive levels are between 0 and 1."
         )
     return levels
 

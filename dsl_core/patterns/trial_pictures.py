@@ -31,7 +31,7 @@ def trial_picture(
     if kind not in KINDS:
         raise PlanError(f"There is no trial picture {kind!r}; choose one of {', '.join(KINDS)}.")
     if not 0 <= level <= 1:
-        raise PlanError(f"The level must lie between 0 and 1, not {level:g}.")
+        raise PlanError(f"The level must be between 0 and 1, not {level:g}.")
     width, height = size_px
     lit = np.zeros((height, width), bool)
     match kind:

@@ -17,14 +17,14 @@ from dsl_core.workflows.scans import calibration_of
 if TYPE_CHECKING:
     from dsl_core.io.published import FileRecord
 
-#: Note of a session that says from which files it was made.
+#: Note of a scan that says from which files it was made.
 _FINGERPRINT = "imported_fingerprint"
 
 
 def export_scan(
     folder: Path, target: Path, overwrite: bool = False, progress: Progress | None = None
 ) -> list[Path]:
-    """Write a complete session in the published dataset layout and return the files; raises `StoreError`."""
+    """Write a complete scan in the published dataset layout and return the files; raises `StoreError`."""
     from dsl_core.io.published import export_dataset
     from dsl_core.io.scan.check import require_complete
     from dsl_core.io.scan.folder import ScanReader
@@ -84,7 +84,7 @@ def _look_at_scan(root: Path, base: Rig) -> FolderLook:
 
 
 def _poses_hint(root: Path) -> str:
-    """What to do with a folder of calibration pictures, which is easily taken for a dataset."""
+    """What to do with a folder of calibration pictures, which is easily mistaken for a dataset."""
     if not any(root.glob("*/graycode_*.*")):
         return ""
     return (
@@ -95,9 +95,9 @@ def _poses_hint(root: Path) -> str:
 def import_scan(
     root: Path, target: Path | None, calibration: Rig, progress: Progress | None = None
 ) -> Sequence[FileRecord]:
-    """Check a published dataset, make a session of it if a target is given; return the table of files.
+    """Check a published dataset, make a scan of it if a target is given; return the table of files.
 
-    An interrupted import goes on. Raises `StoreError` naming the first file that is needed but of no use,
+    An interrupted import resumes. Raises `StoreError` naming the first needed file that cannot be used,
     or when the target holds another scan; then nothing is written.
     """
     from dsl_core.devices.replay import replay_rig

@@ -73,7 +73,7 @@ def pose_folders(folder: Path) -> list[Path]:
     found = sorted((path for path in folder.iterdir() if path.is_dir() and _pictures(path)), key=_natural)
     if not found:
         raise CalibrationError(
-            f"{folder} holds no folders with pictures. One folder a pose is wanted, like capture_0 with"
+            f"{folder} holds no folders with pictures. One folder a pose is needed, like capture_0 with"
             " graycode_00.png and so on."
         )
     return found
@@ -118,7 +118,7 @@ def _check_numbers(folder: Path, pictures: list[Path], wanted: int) -> None:
     absent = sorted(set(range(wanted)) - set(numbers))
     lacks = f" Number {', '.join(map(str, absent[:5]))} is missing." if absent and numbers else ""
     raise CalibrationError(
-        f"{folder} holds {len(pictures)} pictures, {wanted} are wanted: pattern and inverse of every bit of"
+        f"{folder} holds {len(pictures)} pictures, {wanted} are needed: pattern and inverse of every bit of"
         f" the projector's columns and rows, white, black.{lacks} Correct the projector's size or add the"
         " pictures."
     )

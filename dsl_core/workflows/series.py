@@ -69,7 +69,7 @@ def read_target(path: Path, region: Region | None = None) -> tuple[SeenTarget, f
 
     result = load_result(path)
     if "points_mm" not in result:
-        raise DecodeError(f"{path.name} holds no points in space. Reconstruct its scan anew.")
+        raise DecodeError(f"{path.name} holds no points in space. Reconstruct its scan again.")
     flags = result["flags"].values if "flags" in result else None
     try:
         return flat_target(result["points_mm"].values, flags, region), position_of(path, result.attrs)
@@ -142,7 +142,7 @@ class TruthReference:
 
 
 class ResultReference:
-    """One result that is taken for the best, such as that of the longest scan."""
+    """One result as the reference, such as that of the longest scan."""
 
     def __init__(self, path: Path, progress: Progress | None = None) -> None:
         from dsl_core.io.result.result_arrays import load_arrays
@@ -186,7 +186,7 @@ def _seconds(path: Path, attributes: Mapping[str, Any]) -> float:
     seconds = seconds_of(attributes)
     if seconds is None:
         raise DecodeError(
-            f"{path.name} does not say what its capture took. Reconstruct its scan anew, with its plan."
+            f"{path.name} does not say what its capture took. Reconstruct its scan again, with its plan."
         )
     return seconds
 

@@ -67,7 +67,7 @@ def test_a_stored_scan_is_replayed_by_name(tmp_path: Path) -> None:
 def test_replay_says_what_it_needs(tmp_path: Path) -> None:
     with pytest.raises(DeviceError, match=r"takes one option, session=NAME.dsl; given: none"):
         open_rig("replay")
-    with pytest.raises(StoreError, match="is not a session"):
+    with pytest.raises(StoreError, match="is not a scan"):
         open_rig("replay", {"session": str(tmp_path)})
     with pytest.raises(DeviceError, match="shot 99 is not one of them"):
         replay_rig(_scan()).camera.prepare(99)

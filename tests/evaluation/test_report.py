@@ -157,7 +157,7 @@ def test_flag_picture_shows_the_gravest_and_counts_all() -> None:
     shares = {key.text: key.share for key in picture.keys}
     assert shares[REASONS[Flag.POOR_FIT]] == pytest.approx(3 / 16)
     assert shares[REASONS[Flag.NO_LIGHT]] == pytest.approx(2 / 16)
-    assert shares["nothing to remark"] == pytest.approx(12 / 16)
+    assert shares["no flag"] == pytest.approx(12 / 16)
     colour = {key.text: key.colour for key in picture.keys}
     image = (pixels_of(picture.uri)[..., :3] * 255 + 0.5).astype(int)
     seen = "#{:02x}{:02x}{:02x}"

@@ -87,7 +87,7 @@ def test_a_region_is_all_that_counts() -> None:
     assert known.min(axis=0).tolist() == [6, 10]
     assert known.max(axis=0).tolist() == [25, 33]
     assert found.left_out < 3
-    with pytest.raises(DecodeError, match="does not lie inside the picture of 48 x 36 px"):
+    with pytest.raises(DecodeError, match="is not inside the picture of 48 x 36 px"):
         target(700.0, region=(30, 0, 24, 20))
     points = flat_arrays(700.0)["points_mm"]
     points[:, 8:], points[:, :, 12:] = np.nan, np.nan
@@ -101,7 +101,7 @@ def test_what_cannot_be_tested_is_refused_in_a_sentence() -> None:
         stage_test((700.0, 720.0), three[:2])
     with pytest.raises(DecodeError, match="All positions of the stage are 700 mm"):
         stage_test((700.0, 700.0, 700.0), three)
-    with pytest.raises(DecodeError, match="is no number"):
+    with pytest.raises(DecodeError, match="is not a number"):
         stage_test((700.0, float("nan"), 740.0), three)
     with pytest.raises(DecodeError, match="3 results and 2 positions"):
         stage_test((700.0, 720.0), three)

@@ -104,10 +104,10 @@ def test_a_scan_is_never_replaced(session: Path, write: Callable[[Path], None]) 
         (_campaign, _export, "holds the captures of a campaign"),
         (_save, _export, "is not a published dataset"),
         (_export, _save, "is not a result"),
-        (_result_with_notes, _save, r"holds notes\.txt beside a result"),
-        (_result_around_a_scan, _save, r"holds scan\.dsl beside a result"),
-        (_results_together, _save, r"holds second\.zarr beside a result"),
-        (_dataset_with_notes, _export, r"holds notes\.txt beside a published dataset"),
+        (_result_with_notes, _save, r"holds notes\.txt next to a result"),
+        (_result_around_a_scan, _save, r"holds scan\.dsl next to a result"),
+        (_results_together, _save, r"holds second\.zarr next to a result"),
+        (_dataset_with_notes, _export, r"holds notes\.txt next to a published dataset"),
     ],
 )
 def test_a_folder_of_something_else_stays(
@@ -140,12 +140,12 @@ def test_a_file_gives_way_to_a_file_and_a_folder_to_a_folder(tmp_path: Path) -> 
     _documents(tmp_path / "docs")
     before = _tree(tmp_path / "docs")
     with (
-        pytest.raises(StoreError, match="docs is a folder, where a file is to be written"),
+        pytest.raises(StoreError, match="docs is a folder, but a file is to be written"),
         staged([tmp_path / "docs"], overwrite=True) as (draft,),
     ):
         draft.write_text("a page")
     (tmp_path / "page.html").write_text("a page")
-    with pytest.raises(StoreError, match=r"page\.html is a file, where a result, a folder, is to lie"):
+    with pytest.raises(StoreError, match=r"page\.html is a file, but a result is a folder"):
         _save(tmp_path / "page.html")
     assert _tree(tmp_path / "docs") == before
     assert (tmp_path / "page.html").read_text() == "a page"

@@ -34,7 +34,7 @@ def main(name: str, out: str, material: str, *only: str) -> int:
             try:
                 play(stage)
             except Exception:
-                # The other scenes are wanted all the same.
+                # The other scenes are needed all the same.
                 traceback.print_exc()
                 wrong += 1
             finally:

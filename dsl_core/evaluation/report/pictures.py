@@ -112,5 +112,5 @@ def flag_picture(flags: NDArray[np.integer], title: str, caption: str) -> Pictur
         share = float(np.mean((flags & int(flag)) != 0))
         if share > 0:
             keys.append(Key(FLAG_COLOURS[flag], REASONS[flag], share))
-    keys.append(Key("transparent", "nothing to remark", float(np.mean(flags == 0))))
+    keys.append(Key("transparent", "no flag", float(np.mean(flags == 0))))
     return Picture(title, caption, png_uri(rgba), keys=tuple(keys))

@@ -132,8 +132,8 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
         caption = "standard deviation as stated, mean over bands"
         found.append(value_picture(spread, "Uncertainty of reflectance", caption, "", "magma"))
     if "flags" in result:
-        caption = "the gravest remark of each pixel; shares count every remark"
-        found.append(flag_picture(result["flags"].values.astype(np.int64), "Remarks", caption))
+        caption = "the gravest flag of each pixel; shares count every flag"
+        found.append(flag_picture(result["flags"].values.astype(np.int64), "Flags", caption))
     return found
 
 

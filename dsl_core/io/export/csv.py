@@ -48,7 +48,7 @@ def export_csv(
 ) -> list[Path]:
     """Write the spectra of pixels given as (x, y).
 
-    Raises `StoreError` when no pixel is given or one lies outside the image.
+    Raises `StoreError` when no pixel is given or one is outside the image.
     """
     require_suffix(path, ".csv")
     require(result, "A table of spectra", "reflectance", "wavelength_nm")

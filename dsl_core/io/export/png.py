@@ -103,7 +103,7 @@ def depth_picture(depth_mm: NDArray[np.float32]) -> Image:
     """Depth in colours (near is red, far is blue), with a bar that says how many mm they mean.
 
     The bar spans all but the nearest and farthest half percent, so that single outliers leave colours to
-    the rest; what lies beyond has the colour of the bar's end.
+    the rest; what is beyond has the colour of the bar's end.
     """
     lit = np.isfinite(depth_mm)
     near, far = np.percentile(depth_mm[lit], (0.5, 99.5)) if lit.any() else (0.0, 0.0)

@@ -35,7 +35,7 @@ class NamedSpectrum:
     """A spectrum with its name, all arrays of shape (bands,).
 
     ``deviation`` is the scatter of the ``pixels`` that it is the mean of, ``uncertainty`` one standard
-    deviation as stated for a single pixel; None where there is no such thing, as for a reference.
+    deviation as stated for a single pixel; None where it does not exist, as for a reference.
     """
 
     name: str

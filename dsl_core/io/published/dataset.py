@@ -119,12 +119,12 @@ class PublishedScan:
             points = np.load(path, allow_pickle=False)
         except (OSError, ValueError, EOFError) as error:
             raise StoreError(
-                f"{path} cannot be read ({error}). Copy it again, or decode depth anew."
+                f"{path} cannot be read ({error}). Copy it again, or decode depth again."
             ) from error
         width, height = self.plan.camera_size_px
         if points.shape != (height, width, 3):
             raise StoreError(
-                f"{path} has shape {points.shape}; {(height, width, 3)} is wanted (x, y, z in metres)."
+                f"{path} has shape {points.shape}; {(height, width, 3)} is needed (x, y, z in metres)."
             )
         millimetres: NDArray[np.float32] = np.moveaxis(points.astype(np.float32), -1, 0) * np.float32(1000)
         millimetres[:, ~(np.isfinite(millimetres).all(axis=0) & (millimetres[2] > 0))] = np.nan
@@ -193,7 +193,7 @@ DATASET_FOLDER = FolderKind("a published dataset", _is_dataset, _is_of_dataset)
 def _write_rgb(mosaic: NDArray[np.uint16], path: Path, bayer: BayerPattern, bit_depth: int) -> None:
     import cv2
 
-    # float32 holds 16 bit exactly, so measured samples come back to the bit.
+    # float32 holds 16 bit exactly, so measured samples are restored to the bit.
     image = np.moveaxis(demosaic(mosaic.astype(np.float32), bayer), 0, -1)
     values = np.left_shift(np.rint(image).astype(np.uint16), np.uint16(_CONTAINER_BITS - bit_depth))
     path.parent.mkdir(parents=True, exist_ok=True)

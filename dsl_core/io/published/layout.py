@@ -219,11 +219,14 @@ def _judge(info: PngInfo | str, plan: CapturePlan) -> tuple[Status, str]:
         given = f"{info.width_px} x {info.height_px}"
         return (
             "wrong size",
-            f"is {given} px, {width} x {height} is wanted: crop and bin as for the calibration",
+            f"is {given} px, {width} x {height} is needed: crop and bin as for the calibration",
         )
     if info.channels != 3 or info.bits not in {8, 16}:
         kind = f"{info.channels} channel(s) of {info.bits} bit"
-        return "wrong type", f"has {kind}; R, G, B of 8 or 16 bit are wanted: save it anew from the raw frame"
+        return (
+            "wrong type",
+            f"has {kind}; R, G, B of 8 or 16 bit are needed: save the raw frame again",
+        )
     return "ok", "" if info.bits == 16 else "8 bit only: dark first orders are coarse"
 
 

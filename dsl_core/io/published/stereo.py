@@ -179,7 +179,7 @@ def _dialect_of(nodes: dict[str, Any], path: Path) -> Dialect:
         near = difflib.get_close_matches(name, set(nodes) - set(_NODES[best].values()), n=1, cutoff=0.6)
         problems.append(f"{name} is missing" + (f" (is {near[0]!r} misnamed?)" if near else ""))
     raise CalibrationError(
-        f"{path} is no complete calibration in a known dialect; the closest is {best!r}:"
+        f"{path} is not a complete calibration in a known dialect; the closest is {best!r}:"
         f" {', '.join(problems)}. Correct the names, or export the calibration again."
     )
 
@@ -190,7 +190,7 @@ def _shaped(nodes: dict[str, Any], node: str, part: str, path: Path) -> NDArray[
         values = values.ravel()
     shape = _SHAPES.get(part)
     if shape is not None and values.shape != shape:
-        raise CalibrationError(f"{path}: {node} has shape {values.shape}, {shape} is wanted for the {part}.")
+        raise CalibrationError(f"{path}: {node} has shape {values.shape}, {shape} is needed for the {part}.")
     if not np.isfinite(values).all():
         raise CalibrationError(f"{path}: {node} holds numbers that are not finite. Calibrate again.")
     if shape is None:
@@ -202,7 +202,7 @@ def _five_coefficients(values: NDArray[np.float64], node: str, path: Path) -> ND
     """OpenCV's k1 k2 p1 p2 [k3 [...]]; the model ends at k3, so anything further must be zero."""
     if len(values) < 4 or np.any(values[5:]):
         raise CalibrationError(
-            f"{path}: {node} has {len(values)} distortion coefficients; 4 or 5 are wanted (k1 k2 p1 p2 k3),"
+            f"{path}: {node} has {len(values)} distortion coefficients; 4 or 5 are needed (k1 k2 p1 p2 k3),"
             " further ones only as zeros. Calibrate without the rational, thin prism or tilted model."
         )
     return np.pad(values[:5], (0, max(0, 5 - len(values))))
@@ -231,13 +231,13 @@ def _camera_size(nodes: dict[str, Any], given: Size | None, path: Path) -> Size:
     shape = np.asarray(stored, float).ravel()
     if len(shape) < 2:
         raise CalibrationError(
-            f"{path}: img_shape holds {len(shape)} number(s), rows and columns are wanted."
+            f"{path}: img_shape holds {len(shape)} number(s), rows and columns are needed."
         )
     size = (int(shape[1]), int(shape[0]))
     if given is not None and given != size:
         raise CalibrationError(
             f"{path} was made with camera images of {size[0]} x {size[1]} px,"
-            f" wanted are {given[0]} x {given[1]}."
+            f" needed are {given[0]} x {given[1]}."
             " Use the calibration made with the scan's binning and crop."
         )
     return size

@@ -111,7 +111,7 @@ def _load(folder: Path, name: str, wavelengths_nm: ArrayLike | None) -> list[Spe
     rows = table.T if name != "efficiency" and table.ndim == 2 else table
     if rows.ndim != 2 or len(rows) != 3:
         wanted = "(3, bands), orders -1, 0, +1" if name == "efficiency" else "(bands, 3), channels R, G, B"
-        raise CalibrationError(f"{path} has shape {table.shape}; {wanted} is wanted.")
+        raise CalibrationError(f"{path} has shape {table.shape}; {wanted} is needed.")
     if not np.isfinite(rows).all() or (rows < 0).any():
         raise CalibrationError(
             f"{path} holds negative or non-finite values; a {name} cannot. Measure it again."

@@ -1,4 +1,4 @@
-"""What a person marked on a result: pins, regions and references, kept beside it as ``NAME.marks.json``."""
+"""What a person marked on a result: pins, regions and references, kept next to it as ``NAME.marks.json``."""
 
 from __future__ import annotations
 
@@ -54,21 +54,21 @@ class Annotations(Record):
 
 
 def annotations_path(result: Path) -> Path:
-    """Where the marks of a result lie."""
+    """Where the marks of a result are."""
     return result.with_suffix(".marks.json")
 
 
 def save_annotations(annotations: Annotations, result: Path) -> Path:
-    """Store the marks beside a result, whole or not at all; raises `StoreError`."""
+    """Store the marks next to a result, whole or not at all; raises `StoreError`."""
     path = annotations_path(result)
     write_atomic(path, annotations.model_dump_json(indent=1).encode())
     return path
 
 
 def load_annotations(result: Path) -> Annotations:
-    """The marks beside a result, none where there is no file.
+    """The marks next to a result, none where there is no file.
 
-    Raises `StoreError` for a damaged file, which is put aside, so that new marks do not replace it.
+    Raises `StoreError` for a damaged file, which is set aside, so that new marks do not replace it.
     """
     path = annotations_path(result)
     try:

@@ -1,4 +1,4 @@
-"""A result in memory as plain arrays, for looking at: band first, float32, read one band after the other."""
+"""A result in memory as plain arrays, for display: band first, float32, read one band after the other."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class ResultArrays:
         return self.arrays[name][..., pixel[1], pixel[0]]
 
     def holds(self, pixel: tuple[int, int]) -> bool:
-        """Whether a pixel ``(x, y)`` lies in the image."""
+        """Whether a pixel ``(x, y)`` is in the image."""
         height, width = self.shape
         return 0 <= pixel[0] < width and 0 <= pixel[1] < height
 

@@ -66,7 +66,7 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
 
 
 def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
-    """Open a stored result; bands are read when they are looked at unless ``lazy`` is false.
+    """Open a stored result; bands are read when they are first used unless ``lazy`` is false.
 
     Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
     """
@@ -114,7 +114,7 @@ RESULT_FOLDER = FolderKind("a result", _is_result, _is_of_result)
 def _read_labels(path: Path) -> dict[str, list[str]]:
     """Names along the axes without numbers, after checking that this is a result that can be read."""
     if not (path / "zarr.json").is_file():
-        raise StoreError(f"{path} is not a result: a folder with a file zarr.json is wanted.")
+        raise StoreError(f"{path} is not a result: a folder with a file zarr.json is needed.")
     try:
         attributes = json.loads((path / "zarr.json").read_text("utf-8"))["attributes"]
         version, labels = attributes.get("schema_version"), dict(attributes.get("labels", {}))

@@ -20,8 +20,8 @@ from dsl_core.model.base import Record
 class LogEntry(Record):
     """How a stored frame was taken.
 
-    ``run`` counts how often the session was opened for writing: frame numbers and clocks of a camera
-    start anew with it. ``attempts`` above one means that the frame was taken again before it was kept.
+    ``run`` counts how often the scan was opened for writing: frame numbers and clocks of a camera
+    start again with it. ``attempts`` above one means that the frame was taken again before it was kept.
     """
 
     shot: int = Field(ge=0)
@@ -75,7 +75,7 @@ class CaptureLog:
     def append(self, entry: LogEntry) -> None:
         """Add a line and wait until it is on disk; a line that does not fit is taken back."""
         if self._descriptor is None:
-            raise StoreError(f"{self.path} is closed; open the session again before writing to it.")
+            raise StoreError(f"{self.path} is closed; open the scan again before writing to it.")
         line = entry.model_dump_json().encode() + b"\n"
         try:
             os.lseek(self._descriptor, self._size, os.SEEK_SET)

@@ -1,4 +1,4 @@
-"""Everything that is wrong with a session, one clear sentence each."""
+"""Everything that is wrong with a scan, one clear sentence each."""
 
 from __future__ import annotations
 

@@ -48,16 +48,16 @@ _FRAMES_A_BLOCK = 8
 
 
 def store_of(folder: Path, plan: CapturePlan) -> FrameStore:
-    """The frames folder of a session with this plan."""
+    """The frames folder of a scan with this plan."""
     width, height = plan.camera_size_px
     return FrameStore(folder / FRAMES_NAME, plan.shot_count, height, width)
 
 
 class ScanReader:
-    """A `FrameSource` over a session folder, complete or not; safe to use from several threads."""
+    """A `FrameSource` over a scan folder, complete or not; safe to use from several threads."""
 
     def __init__(self, folder: str | Path) -> None:
-        """Open the session; raises `StoreError` when it is not one or its metadata are damaged."""
+        """Open the scan; raises `StoreError` when it is not one or its metadata are damaged."""
         self.folder = Path(folder)
         self.manifest: Manifest = read_manifest(self.folder)
         self.store = store_of(self.folder, self.plan)
@@ -188,7 +188,7 @@ class ScanWriter:
 
     @property
     def plan(self) -> CapturePlan:
-        """The plan of the session."""
+        """The plan of the scan."""
         return self.manifest.plan
 
     @classmethod
@@ -199,12 +199,12 @@ class ScanWriter:
         rig: DeviceRig | None = None,
         notes: dict[str, str] | None = None,
     ) -> ScanWriter:
-        """Start a session in a new folder; raises `StoreError` if there is one or the disk is too small."""
+        """Start a scan in a new folder; raises `StoreError` if there is one or the disk is too small."""
         folder = Path(folder)
         if (folder / MANIFEST_NAME).exists():
             raise StoreError(f"{folder} already holds a scan. Resume it, or choose a new name.")
         if folder.exists() and not _is_unborn(folder):
-            raise StoreError(f"{folder} exists and is not a session. Choose a new name.")
+            raise StoreError(f"{folder} exists and is not a scan. Choose a new name.")
         check_space(folder, plan, plan.shot_count)
         make_folder(folder)
         lock = FolderLock(folder / "lock")
@@ -222,7 +222,7 @@ class ScanWriter:
     def resume(
         cls, folder: str | Path, plan: CapturePlan | None = None, rig: DeviceRig | None = None
     ) -> ScanWriter:
-        """Go on with a session; raises `StoreError` naming the field in which plan or devices differ.
+        """Resume a scan; raises `StoreError` naming the field in which plan or devices differ.
 
         Every stored frame is checked against its checksum; those that do not agree are missing again.
         """
@@ -250,7 +250,7 @@ class ScanWriter:
         rig: DeviceRig | None = None,
         notes: dict[str, str] | None = None,
     ) -> ScanWriter:
-        """Resume the session if there is one, start it otherwise; raises `StoreError`."""
+        """Resume the scan if there is one, start it otherwise; raises `StoreError`."""
         if (Path(folder) / MANIFEST_NAME).exists():
             return cls.resume(folder, plan, rig)
         return cls.create(folder, plan, rig, notes)

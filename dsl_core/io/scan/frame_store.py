@@ -39,7 +39,7 @@ class ChunkError(Exception):
 
 @dataclass(frozen=True)
 class FrameStore:
-    """The frames folder of a session: ``count`` mosaics of ``height_px`` x ``width_px``."""
+    """The frames folder of a scan: ``count`` mosaics of ``height_px`` x ``width_px``."""
 
     folder: Path
     count: int
@@ -58,7 +58,7 @@ class FrameStore:
         except (OSError, ValueError) as error:
             raise StoreError(
                 f"{self._metadata_path} is missing or damaged, so the frames cannot be read."
-                " Restore it from a copy of the session."
+                " Restore it from a copy of the scan."
             ) from error
         wanted = self._metadata()
         for key in ("zarr_format", "shape", "data_type", "chunk_grid", "chunk_key_encoding", "codecs"):
@@ -66,7 +66,7 @@ class FrameStore:
                 raise StoreError(
                     f"{self._metadata_path} gives {key} as {found.get(key)}, but the plan needs"
                     f" {wanted[key]}. The frames do not belong to this plan;"
-                    " restore the file from a copy of the session."
+                    " restore the file from a copy of the scan."
                 )
 
     def path(self, index: int) -> Path:
@@ -82,7 +82,7 @@ class FrameStore:
         """Store a mosaic, shape (height, width), so that it survives a power cut; raises `StoreError`."""
         if pixels.shape != (self.height_px, self.width_px) or pixels.dtype != np.uint16:
             raise StoreError(
-                f"Frame {index} is {pixels.dtype} of shape {pixels.shape}, but the session takes uint16"
+                f"Frame {index} is {pixels.dtype} of shape {pixels.shape}, but the scan takes uint16"
                 f" of shape {(self.height_px, self.width_px)}. Make a plan for this camera's size."
             )
         from numcodecs import blosc  # type: ignore[import-untyped]

@@ -1,4 +1,4 @@
-"""One writer a session: a lock of the operating system, which dies with its process."""
+"""One writer a scan: a lock of the operating system, which dies with its process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import write_all
 
-#: Windows locks byte ranges for reading too, so the locked byte lies behind the text.
+#: Windows locks byte ranges for reading too, so the locked byte is behind the text.
 _LOCK_BYTE = 1 << 20
 
 

@@ -1,4 +1,4 @@
-"""What a session knows about itself: plan, rig, devices, versions, origin."""
+"""What a scan knows about itself: plan, rig, devices, versions, origin."""
 
 from __future__ import annotations
 
@@ -57,14 +57,13 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Load the manifest of a session folder; raises `StoreError`."""
+    """Load the manifest of a scan folder; raises `StoreError`."""
     path = folder / MANIFEST_NAME
     try:
         return Manifest.model_validate_json(path.read_bytes())
     except FileNotFoundError as error:
         raise StoreError(
-            f"{folder} is not a session: it has no {MANIFEST_NAME}."
-            " Give the folder that a scan made (NAME.dsl)."
+            f"{folder} is not a scan: it has no {MANIFEST_NAME}. Give the folder that a scan made (NAME.dsl)."
         ) from error
     except OSError as error:
         raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
@@ -83,7 +82,7 @@ def refuse_other_scan(folder: Path, stored: Manifest, given: Manifest) -> None:
     ):
         if old and new and (old.model, old.serial) != (new.model, new.serial):
             differences.append(
-                f"{name} is {old.model} {old.serial} in the session and {new.model} {new.serial} now"
+                f"{name} is {old.model} {old.serial} in the scan and {new.model} {new.serial} now"
             )
     if not differences and stored.camera and stored.projector and given.camera and given.projector:
         known = conditions_of(stored.camera, stored.projector)
@@ -103,7 +102,7 @@ def _differences(old: Any, new: Any, where: str) -> Iterator[str]:
         for i, (a, b) in enumerate(zip(old, new, strict=True)):
             yield from _differences(a, b, f"{where}[{i}]")
     elif old != new:
-        yield f"{where} is {_short(old)} in the session and {_short(new)} now"
+        yield f"{where} is {_short(old)} in the scan and {_short(new)} now"
 
 
 def _short(value: Any) -> str:

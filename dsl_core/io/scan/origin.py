@@ -16,7 +16,7 @@ _CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"
 
 
 def rig_notes(name: str, options: Mapping[str, str]) -> dict[str, str]:
-    """Notes of a session from which its rig can be opened again; paths are made absolute."""
+    """Notes of a scan from which its rig can be opened again; paths are made absolute."""
     # A path is relative to where the scan was started, and a resume may start elsewhere.
     fixed = {key: str(Path(v).absolute()) if key == "session" else v for key, v in options.items()}
     return {_RIG: name, _OPTIONS: json.dumps(fixed, sort_keys=True)}

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 LIBRARY = "envi spectral library"
 #: Endings that the data may have; the first is what ENVI writes.
 DATA_SUFFIXES = (".sli", ".SLI", ".dat", ".img", "")
-#: Kinds of numbers by the header's code; complex ones are no reflectance.
+#: Kinds of numbers by the header's code; complex ones are not reflectance.
 _KINDS = {
     **{"1": "u1", "2": "i2", "3": "i4", "4": "f4", "5": "f8"},
     **{"12": "u2", "13": "u4", "14": "i8", "15": "u8"},
@@ -60,7 +60,7 @@ def _pair(path: Path) -> tuple[Path, Path]:
         found = [data for suffix in DATA_SUFFIXES if (data := path.with_suffix(suffix)).is_file()]
         if not found:
             raise CalibrationError(
-                f"The spectra that {path.name} describes are not beside it. Put {path.stem}.sli there."
+                f"The spectra that {path.name} describes are not next to it. Put {path.stem}.sli there."
             )
         return path, found[0]
     headers = (path.with_suffix(".hdr"), path.with_suffix(".HDR"), path.with_name(f"{path.name}.hdr"))
@@ -69,7 +69,7 @@ def _pair(path: Path) -> tuple[Path, Path]:
             return header, path
     raise CalibrationError(
         f"{path.name} lacks its header, without which nobody knows what it holds. Put {headers[0].name}"
-        " beside it."
+        " next to it."
     )
 
 
@@ -92,9 +92,9 @@ def _read_data(path: Path, data: Path, header: Mapping[str, str]) -> Floats:
     kind = _KINDS.get(header.get("data type", ""))
     if kind is None or _whole(path, header, "bands", 1) != 1:
         raise CalibrationError(
-            f"{path.name}: a library of one plane of real numbers is wanted; the header says"
+            f"{path.name}: a library of one plane of real numbers is needed; the header says"
             f" bands = {header.get('bands', '?')} and data type = {header.get('data type', '?')}."
-            " Export the library anew."
+            " Export the library again."
         )
     dtype = np.dtype(kind).newbyteorder(">" if header.get("byte order", "0") == "1" else "<")
     offset, wanted = _whole(path, header, "header offset", 0), bands * spectra
@@ -115,7 +115,7 @@ def _whole(path: Path, header: Mapping[str, str], key: str, default: int | None 
     text = header.get(key, "" if default is None else str(default))
     if not text.isdecimal() or (default is None and int(text) == 0):
         raise CalibrationError(
-            f"{path.name}: a whole number is wanted as {key!r}; the header says {text or 'nothing'!r}."
+            f"{path.name}: a whole number is needed as {key!r}; the header says {text or 'nothing'!r}."
             " Correct the header."
         )
     return int(text)
@@ -125,7 +125,7 @@ def _wavelengths_nm(path: Path, header: Mapping[str, str], bands: int) -> Floats
     try:
         given = np.array([float(cell) for cell in header.get("wavelength", "").split(",") if cell.strip()])
     except ValueError as error:
-        raise CalibrationError(f"{path.name}: a wavelength is no number ({error}). Correct it.") from error
+        raise CalibrationError(f"{path.name}: a wavelength is not a number ({error}). Correct it.") from error
     if len(given) != bands or not np.isfinite(given).all():
         raise CalibrationError(
             f"{path.name} names {len(given)} wavelengths for {bands} bands. Add what is missing."
@@ -135,7 +135,7 @@ def _wavelengths_nm(path: Path, header: Mapping[str, str], bands: int) -> Floats
     if factor is None and (units not in ("", "unknown") or given.max() < 100):
         raise CalibrationError(
             f"{path.name}: wavelengths from {given.min():g} to {given.max():g} {units or 'of unstated unit'};"
-            " nanometres or micrometres are wanted. Add 'wavelength units' to the header."
+            " nanometres or micrometres are needed. Add 'wavelength units' to the header."
         )
     return given * (factor or 1.0)
 
@@ -156,13 +156,13 @@ def _reflectance(path: Path, header: Mapping[str, str], values: Floats) -> Float
             deleted |= values == np.float64(header["data ignore value"])
     except ValueError as error:
         raise CalibrationError(
-            f"{path.name}: the scale factor or ignore value is no number ({error}). Correct the header."
+            f"{path.name}: the scale factor or ignore value is not a number ({error}). Correct the header."
         ) from error
     values = np.where(deleted, np.nan, values / (scale if scale > 0 else 1.0))
     most = np.nanmax(values, initial=0.0)
     if most > 100 * MOST:
         raise CalibrationError(
-            f"{path.name} holds values up to {most:g}; reflectance from 0 to 1 is wanted. Add the factor that"
+            f"{path.name} holds values up to {most:g}; reflectance from 0 to 1 is needed. Add the factor that"
             " they were multiplied by to the header, as 'reflectance scale factor'."
         )
     return values * (0.01 if most > MOST else 1.0)

@@ -79,7 +79,7 @@ def _read_table(path: Path) -> ReferenceFile:
         cells = np.array([[float(cell or "nan") for cell in row] for row in rows]).reshape(-1, len(head))
     except ValueError as error:
         raise CalibrationError(
-            f"{path.name}: a cell is no number ({error}). Export the table anew."
+            f"{path.name}: a cell is not a number ({error}). Export the table again."
         ) from error
     columns = [i for i, title in enumerate(head) if title.endswith(MEAN)]
     names = [head[i].removesuffix(MEAN) for i in columns]
@@ -87,7 +87,7 @@ def _read_table(path: Path) -> ReferenceFile:
 
 
 def _without_gaps(nm: Floats, values: Floats) -> Floats:
-    """A spectrum without what lies beyond a gap, seen from the side that holds more of the visible range.
+    """A spectrum without what is beyond a gap, seen from the side that holds more of the visible range.
 
     What was deleted from a library is not made up by a straight line across it.
     """
@@ -109,7 +109,7 @@ def _gathered(path: Path, names: list[str], spectra: list[tuple[Floats, Floats]]
         if np.count_nonzero(known) < MIN_VALUES:
             empty.append(name)
         elif np.any(np.diff(nm[known]) <= 0):
-            raise CalibrationError(f"{path.name}: the wavelengths do not rise. Export the table anew.")
+            raise CalibrationError(f"{path.name}: the wavelengths do not rise. Export the table again.")
         else:
             # Names bring a reference back with its result, so each must be one of a kind.
             own = name if name not in found else f"{name} ({place})"

@@ -34,7 +34,7 @@ def read_spectrum(
     Radiance is returned in W/(sr m2 nm), a stated mW or µW converted; ``radiance=False`` reads a quantity
     without unit such as a reflectance (a stated percentage is converted). Raises `CalibrationError` that
     names file and line for wavelengths in other units, out of order or too few, values that are not numbers,
-    and quantities that are no radiance.
+    and quantities that are not radiance.
     """
     try:
         text = path.read_bytes().decode("utf-8-sig", errors="replace")
@@ -96,7 +96,7 @@ def _check_wavelengths(path: Path, header: str, nm: np.ndarray, covers_nm: tuple
     if nm.max() < 10 or _MICROMETRES.search(header):
         raise CalibrationError(
             f"{path.name}: the wavelengths, {nm.min():g} to {nm.max():g}, are micrometres; nanometres are"
-            " wanted. Export the spectrum in nm."
+            " needed. Export the spectrum in nm."
         )
     if np.any(np.diff(nm) <= 0):
         at = int(np.argmax(np.diff(nm) <= 0))

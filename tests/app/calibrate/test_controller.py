@@ -58,7 +58,7 @@ def test_a_rig_in_use_is_not_taken(tmp_path: Path) -> None:
 
 def test_wrong_folders_and_other_rigs_are_named(bench: CalibrateBench, tmp_path: Path) -> None:
     bench.control.open_campaign(tmp_path)
-    assert "is no campaign" in bench.told
+    assert "is not a campaign" in bench.told
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thing").touch()
     bench.control.begin_campaign(tmp_path / "full")

@@ -45,7 +45,7 @@ def test_a_campaign_is_begun_and_opened_from_the_page(
     stage.idle()
     monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *_: str(tmp_path / "taken"))
     click(stage.page.head.open)
-    assert "is no campaign" in stage.bench.told
+    assert "is not a campaign" in stage.bench.told
     assert stage.bench.state.campaign.value is not None
     assert stage.bench.state.campaign.value.path.name == "first"
     stage.finish()

@@ -136,7 +136,7 @@ def _spoil(folder: Path, name: str) -> None:
     [
         ("missing", "missing", "capture it again"),
         ("misnamed", "misnamed", r"rename it to capture_0002\.png"),
-        ("wrong size", "wrong size", "is 5 x 7 px, 10 x 7 is wanted"),
+        ("wrong size", "wrong size", "is 5 x 7 px, 10 x 7 is needed"),
         ("wrong type", "wrong type", r"1 channel\(s\) of 16 bit"),
         ("unreadable", "unreadable", "is cut off"),
         ("no image", "unreadable", "is not a PNG image"),
@@ -247,7 +247,7 @@ def test_points_without_depth_are_nan_and_wrong_files_refused(folder: Path) -> N
     assert np.argwhere(np.isnan(read[2])).tolist() == [[0, 0], [1, 1], [2, 2]]
     assert np.nanmax(np.abs(read - 700)) < 1e-3
     np.save(folder / "depth.npy", points[..., 0])
-    with pytest.raises(StoreError, match=r"has shape \(7, 10\); \(7, 10, 3\) is wanted"):
+    with pytest.raises(StoreError, match=r"has shape \(7, 10\); \(7, 10, 3\) is needed"):
         open_dataset(folder).points_mm()
     (folder / "depth.npy").write_bytes(b"")
     with pytest.raises(StoreError, match="cannot be read"):

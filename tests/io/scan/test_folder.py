@@ -107,7 +107,7 @@ def test_another_plan_is_refused_and_the_field_named(session: Path, plan: Captur
     slower = plan.settings[1].model_copy(update={"exposure_ms": 25.0})
     other = plan.model_copy(update={"settings": (plan.settings[0], slower)})
     with pytest.raises(
-        StoreError, match=r"plan\.settings\[1\]\.exposure_ms is 20\.0 in the session and 25\.0 now"
+        StoreError, match=r"plan\.settings\[1\]\.exposure_ms is 20\.0 in the scan and 25\.0 now"
     ):
         ScanWriter.open(session, other)
     with ScanWriter.open(session, plan):
@@ -119,7 +119,7 @@ def test_create_never_overwrites(session: Path, plan: CapturePlan, tmp_path: Pat
         ScanWriter.create(session, plan)
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
-    with pytest.raises(StoreError, match="is not a session"):
+    with pytest.raises(StoreError, match="is not a scan"):
         ScanWriter.create(tmp_path / "thesis", plan)
 
 
@@ -144,7 +144,7 @@ def test_frames_of_another_size_or_type_are_refused(
     shot = next(plan.shots())
     with (
         ScanWriter.create(tmp_path / "scan.dsl", plan) as writer,
-        pytest.raises(StoreError, match="but the session takes uint16"),
+        pytest.raises(StoreError, match="but the scan takes uint16"),
     ):
         writer.write(shot, Frame(pixels, 10.0))  # type: ignore[arg-type]
 

@@ -92,15 +92,15 @@ def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
     [
         ({"file type": "ENVI Standard"}, "describes ENVI Standard, not an ENVI spectral library"),
         ({"wavelength": None}, "names 0 wavelengths for 31 bands"),
-        ({"wavelength": "{400, x}"}, "a wavelength is no number"),
-        ({"wavelength units": "Wavenumber"}, "wavenumber; nanometres or micrometres are wanted"),
+        ({"wavelength": "{400, x}"}, "a wavelength is not a number"),
+        ({"wavelength units": "Wavenumber"}, "wavenumber; nanometres or micrometres are needed"),
         ({"wavelength": "{" + ",".join(["500"] * NM.size) + "}"}, "wavelengths occur twice"),
         ({"samples": None}, "'samples'; the header says 'nothing'"),
         ({"lines": 3}, "cut off: 3 spectra of 31 bands are 93 values, and it holds 62"),
         ({"data type": 6}, "data type = 6"),
         ({"bands": 4}, "bands = 4"),
         ({"reflectance scale factor": "0.001"}, "holds values up to 600; reflectance from 0 to 1"),
-        ({"data ignore value": "none"}, "ignore value is no number"),
+        ({"data ignore value": "none"}, "ignore value is not a number"),
     ],
 )
 def test_wrong_libraries_are_named_with_the_reason(
@@ -115,7 +115,7 @@ def test_wrong_libraries_are_named_with_the_reason(
 def test_half_a_library_says_what_is_missing(tmp_path: Path) -> None:
     path = write_library(tmp_path / "a.sli")
     (tmp_path / "a.hdr").rename(tmp_path / "b.hdr")
-    with pytest.raises(CalibrationError, match=r"Put a\.hdr beside it"):
+    with pytest.raises(CalibrationError, match=r"Put a\.hdr next to it"):
         read_references(path)
     with pytest.raises(CalibrationError, match=r"Put b\.sli there"):
         read_references(tmp_path / "b.hdr")
@@ -133,5 +133,5 @@ def test_a_table_of_this_program_holds_several(tmp_path: Path) -> None:
     np.testing.assert_array_equal(first.curve.values, GRASS)
     np.testing.assert_array_equal(second.curve.wavelengths_nm, fine)
     path.write_text(path.read_text("utf-8").replace("\n500,", "\nfive,"), "utf-8")
-    with pytest.raises(CalibrationError, match=r"table\.csv: a cell is no number"):
+    with pytest.raises(CalibrationError, match=r"table\.csv: a cell is not a number"):
         read_references(path)
