@@ -12,11 +12,12 @@ from itertools import product
 import numpy as np
 import torch
 
-from dsl_core.calibration.film.correspondence import PUBLISHED_NM, fit_grid, sample_grating
+from dsl_core.calibration.film.correspondence import fit_grid
 from dsl_core.calibration.film.residual import MAX_DEGREE, WAVELENGTH_RANGE_NM
 from dsl_core.model.rig import ColumnResidual, Rig
 from dsl_core.optics.correspondence import Correspondence, GratingModel, GridModel, HybridModel
 from dsl_core.simulation.published_rig import published_rig
+from tests.cases.grid_samples import PUBLISHED_NM, sample_grating
 
 BANDS_NM = np.arange(430.0, 661.0, 5.0)
 DEPTHS_MM = np.array([500.0, 600.0, 700.0, 850.0, 1000.0])

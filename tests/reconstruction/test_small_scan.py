@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core import pipeline
-from dsl_core.calibration.film.correspondence import fit_grid, sample_grating
+from dsl_core.calibration.film.correspondence import fit_grid
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, PlanError
 from dsl_core.evaluation.summary import Evaluation
@@ -24,6 +24,7 @@ from dsl_core.reconstruction.columns.maps import ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.spectral.published_objective import AdamOptions, PublishedReconstruction
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from dsl_core.workflows import scans
+from tests.cases.grid_samples import sample_grating
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
 GRID = WavelengthGrid(step_nm=10.0)

@@ -26,11 +26,11 @@ from dsl_core.model.rig import CorrespondenceGrid, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.shading import Plane
+from dsl_core.optics.spectra import ORDERS
 from dsl_core.progress import Progress
 
 Floats = NDArray[np.float64]
 
-ORDERS = (1, -1)
 #: First a search over many columns, then fits from within a few.
 FINE_ROUNDS = 2
 #: Tiles, of both orders together, that a capture needs.

@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
 from dsl_core.calibration.light.chain_equations import (
-    ORDERS,
     ZERO_ORDER_ERROR,
     LineScan,
     Unknowns,
@@ -43,7 +42,7 @@ from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, correspondence
-from dsl_core.optics.spectra import chain_response
+from dsl_core.optics.spectra import ORDERS, chain_response
 from dsl_core.solve.smooth_functions import Equations, SmoothPrior, SmoothSolution, solve_given, solve_smooth
 
 __all__ = ["LineScan", "chain_correction"]

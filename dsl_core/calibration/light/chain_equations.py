@@ -15,13 +15,12 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, Footprint
 from dsl_core.optics.line_profile import ProfileTable
 from dsl_core.optics.sensor import bayer_channels
-from dsl_core.optics.spectra import chain_response, hat_moments
+from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.solve.robust import robust_std
 from dsl_core.solve.smooth_functions import Equations, hat_functions
 
 Floats = NDArray[np.float64]
 
-ORDERS = (1, -1)
 #: Bands of the forward model.
 STEP_NM = 2.0
 BANDS_NM = np.arange(400.0, 701.0, STEP_NM)

@@ -26,12 +26,12 @@ from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSampl
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, passed
+from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import Progress
 
 Floats = NDArray[np.float64]
 
-FIRST, SECOND = (1, -1), (2, -2)
 #: Pixels that blur and halo are fitted to.
 PROFILE_PIXELS = 3000
 #: Zero orders moved farther than this (px) mean that target or rig moved between captures.
@@ -76,7 +76,7 @@ def plane_pixels(rig: Rig, scan: LineScan, filter_nm: float) -> PlanePixels:
     model = GratingModel(rig)
     whole: dict[int, NDArray[np.bool_]] = {}
     ends = np.array([filter_nm - 15.0, filter_nm + 15.0])
-    for order in (*FIRST, *SECOND):
+    for order in (*ORDERS, *SECOND_ORDERS):
         at = model.trace(
             torch.as_tensor(scan.pixels), torch.as_tensor(scan.depth_mm), order, ends
         ).rows.numpy()
@@ -99,7 +99,7 @@ def fit_bandpass(
     placed = [_placed(each, light) for each, light in zip(filters, lights, strict=True)]
     found = found_wavelengths(rig, placed)
     warnings = _check(filters, placed, found)
-    fits = {order: fit_efficiency(order, _ratios(order, filters, lights)) for order in FIRST}
+    fits = {order: fit_efficiency(order, _ratios(order, filters, lights)) for order in ORDERS}
     share, share_std = second_order_share(_second(filters, lights, fits))
     white, white_std = _white(rig, profile_scan(scan), profile)
     bands = [
@@ -109,7 +109,7 @@ def fit_bandpass(
     response = fit_response(rig, bands, white, white_std, reflectance)
     efficiency = {order: fit.curve for order, fit in fits.items()}
     if np.isfinite(share_std):
-        for order in FIRST:
+        for order in ORDERS:
             efficiency[2 * order] = second_order_curve(fits[order].curve, share, share_std)
     return BandpassCalibration(
         filters=tuple(
@@ -135,7 +135,7 @@ def fit_bandpass(
 def _placed(each: SeenFilter, light: Floats) -> PlacedFilter:
     offsets = {
         order: (each.light.orders[order].offset_px, each.light.orders[order].offset_std_px)
-        for order in FIRST
+        for order in ORDERS
         if np.isfinite(each.light.orders[order].offset_px)
     }
     return PlacedFilter(each.filter_nm, effective_nm(light), each.measured_curve, offsets)
@@ -151,7 +151,7 @@ def _check(
     doubts: list[str] = []
     for each, place, where in zip(filters, placed, found, strict=True):
         first = [
-            each.light.orders[order] for order in FIRST if np.isfinite(each.light.orders[order].offset_px)
+            each.light.orders[order] for order in ORDERS if np.isfinite(each.light.orders[order].offset_px)
         ]
         width = max((light.width_px for light in first), default=0.0)
         share = min((light.share for light in first), default=1.0)
@@ -194,7 +194,7 @@ def _second(
             float(light[c] @ fits[order].curve.at(FINE_NM) / light[c].sum()),
         )
         for each, light in zip(filters, lights, strict=True)
-        for order in FIRST
+        for order in ORDERS
         for seen in [each.light.orders[2 * order]]
         for c in range(3)
         if np.isfinite(seen.std[c]) and light[c].sum() > 0

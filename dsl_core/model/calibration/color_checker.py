@@ -10,7 +10,6 @@ from dsl_core.model.base import Record
 from dsl_core.model.rig import Rgb
 
 Point = tuple[float, float]
-Row3 = tuple[float, float, float]
 #: How a chart is turned, by its quarter turns clockwise.
 ORIENTATIONS = ("upright", "turned clockwise", "upside down", "turned anticlockwise")
 

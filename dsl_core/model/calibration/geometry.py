@@ -8,9 +8,7 @@ from pydantic import Field
 
 from dsl_core.model.base import Record
 from dsl_core.model.board import Board
-from dsl_core.model.geometry import Lens, Pose
-
-Numbers3 = tuple[float, float, float]
+from dsl_core.model.geometry import Lens, Pose, Row3
 
 
 class LensDeviation(Record):
@@ -26,8 +24,8 @@ class LensDeviation(Record):
 class PoseDeviation(Record):
     """Standard deviations of the pose between camera and projector, about x, y, z and along them."""
 
-    rotation_deg: Numbers3
-    translation_mm: Numbers3
+    rotation_deg: Row3
+    translation_mm: Row3
 
 
 class Flatness(Record):

@@ -12,7 +12,6 @@ from dsl_core.model.base import Record
 from dsl_core.model.rig import FlatField, Rgb
 from dsl_core.model.spectral import SpectralCurve
 
-Row3 = tuple[float, float, float]
 Square3 = tuple[Row3, Row3, Row3]
 LightColour = Literal["red", "green", "blue", "white", "black"]
 COLOURS: tuple[LightColour, ...] = ("red", "green", "blue", "white", "black")

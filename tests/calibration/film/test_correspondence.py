@@ -9,17 +9,16 @@ import pytest
 import torch
 
 from dsl_core.calibration.film.correspondence import (
-    PUBLISHED_NM,
     GridSamples,
     fit_grid,
     fit_stage_grid,
-    sample_grating,
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import Correspondence, GratingModel, GridModel, correspondence
 from dsl_core.simulation.published_rig import published_rig
 from tests.cases.film_samples import one_a_tile, samples_of, small_rig
+from tests.cases.grid_samples import PUBLISHED_NM, sample_grating
 
 DEPTHS_MM = np.array([500.0, 600.0, 700.0, 850.0, 1000.0])
 SPREAD_NM = (430.0, 465.0, 500.0, 540.0, 580.0, 620.0, 660.0)

@@ -1,0 +1,165 @@
+"""Each figure of the self-test fails beyond its own limit, and only there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dsl_core.calibration.selftest.figures import (
+    AMBIENT,
+    BEAT_PERCENT,
+    BLACK,
+    BLUR_PX,
+    GAMMA_SPREAD_PERCENT,
+    HOT,
+    LINEARITY_PERCENT,
+    RAMP_PERCENT,
+    WAIT_MS,
+    selftest_figures,
+)
+from dsl_core.model.calibration.selftest import (
+    AmbientCheck,
+    Beat,
+    CameraCheck,
+    CycleCheck,
+    FocusCheck,
+    LatencyCheck,
+    Measured,
+    ProjectorCheck,
+    RampCheck,
+    SelfTest,
+)
+from dsl_core.model.figure import failures
+
+
+def of(value: float) -> Measured:
+    return Measured(value=value, std=0.01)
+
+
+def beat(exposure_ms: float, percent: float) -> Beat:
+    return Beat(
+        exposure_ms=exposure_ms,
+        channels_percent=(of(0.0), of(percent), of(0.0)),
+        ratio_percent=of(0.0),
+        floor_percent=0.01,
+    )
+
+
+GOOD = SelfTest(
+    camera=CameraCheck(
+        bit_depth=12,
+        black_level_dn=of(260.0),
+        intercept_dn=of(260.0),
+        linearity_percent=(of(0.1), of(0.2), of(0.1)),
+        useful_dn=4000.0,
+        saturation_dn=of(4095.0),
+        electrons_per_dn=of(10.0),
+        read_noise_dn=of(2.0),
+        hot_share=of(1e-5),
+    ),
+    projector=ProjectorCheck(
+        ramps=tuple(
+            RampCheck(colour=colour, gamma=of(2.2), residual_percent=of(0.1), falls=0)
+            for colour in ("white", "red", "green", "blue")
+        ),
+        gamma=of(2.2),
+        black_fraction=of(0.001),
+        black_has_ambient=False,
+    ),
+    latency=LatencyCheck(blocking_ms=of(25.0), wait_ms=of(0.0), claimed_ms=50.0, stale_frames=0, checked=30),
+    cycle=CycleCheck(
+        period_ms=of(1000 / 60),
+        modulation=of(0.5),
+        method="timestamps",
+        shortest_ms=1000 / 60,
+        wanted_ms=(160.0,),
+        advised_ms=(500 / 3,),
+        beats=(beat(160.0, 4.0), beat(500 / 3, 0.1)),
+    ),
+    focus=FocusCheck(camera_px=of(0.8), projector_px=of(0.6), worst_px=of(0.7)),
+    ambient=AmbientCheck(rate_dn_per_ms=(of(0.1), of(0.1), of(0.1)), share_of_white=of(0.001)),
+    frames=400,
+    duration_s=60.0,
+)
+
+
+def with_(part: str, **fields: Any) -> SelfTest:
+    return GOOD.model_copy(update={part: getattr(GOOD, part).model_copy(update=fields)})
+
+
+def ramps(**fields: Any) -> tuple[RampCheck, ...]:
+    first, *others = GOOD.projector.ramps
+    return (first.model_copy(update=fields), *others)
+
+
+def test_a_good_rig_passes_though_published_exposures_beat() -> None:
+    figures = selftest_figures(GOOD)
+    assert failures(figures) == ()
+    by_name = {figure.name: figure for figure in figures}
+    assert by_name["beat at 160.00 ms"].high is None
+    assert "166.67 ms" in by_name["beat at 160.00 ms"].advice
+    assert by_name["latency from show to light"].value == 25.0
+    assert by_name["linearity, largest residual of full scale"].value == 0.2
+
+
+@pytest.mark.parametrize(
+    ("at", "beyond", "name"),
+    [
+        (
+            with_("camera", linearity_percent=(of(LINEARITY_PERCENT),) * 3),
+            with_("camera", linearity_percent=(of(0.1), of(0.1), of(LINEARITY_PERCENT + 0.01))),
+            "linearity",
+        ),
+        (with_("camera", black_level_dn=of(10.0)), with_("camera", black_level_dn=of(9.9)), "black level"),
+        (
+            with_("camera", saturation_dn=of(0.9 * 4095)),
+            with_("camera", saturation_dn=of(0.89 * 4095)),
+            "saturation",
+        ),
+        (with_("camera", hot_share=of(HOT)), with_("camera", hot_share=of(2 * HOT)), "hot pixels"),
+        (with_("projector", gamma=of(3.5)), with_("projector", gamma=of(3.6)), "gamma"),
+        (
+            with_("projector", ramps=ramps(gamma=of(2.2 * (1 + GAMMA_SPREAD_PERCENT / 101)))),
+            with_("projector", ramps=ramps(gamma=of(2.2 * (1 + GAMMA_SPREAD_PERCENT / 99)))),
+            "gamma, difference between colours",
+        ),
+        (
+            with_("projector", ramps=ramps(residual_percent=of(RAMP_PERCENT))),
+            with_("projector", ramps=ramps(residual_percent=of(RAMP_PERCENT + 0.1))),
+            "ramps, rms distance from the power law",
+        ),
+        (GOOD, with_("projector", ramps=ramps(falls=1)), "ramps, steps that fall"),
+        (
+            with_("projector", black_fraction=of(BLACK)),
+            with_("projector", black_fraction=of(1.1 * BLACK)),
+            "projector black",
+        ),
+        (
+            with_("latency", wait_ms=of(WAIT_MS)),
+            with_("latency", wait_ms=of(WAIT_MS + 0.1)),
+            "latency not waited for",
+        ),
+        (GOOD, with_("latency", stale_frames=1), "stale frames"),
+        (
+            with_("cycle", beats=(beat(500 / 3, BEAT_PERCENT + 0.029),)),
+            with_("cycle", beats=(beat(500 / 3, BEAT_PERCENT + 0.031),)),
+            "beat at 166.67 ms",
+        ),
+        (
+            with_("focus", worst_px=of(BLUR_PX)),
+            with_("focus", worst_px=of(BLUR_PX + 0.01)),
+            "blur of edges, worst third",
+        ),
+        (
+            with_("ambient", share_of_white=of(AMBIENT)),
+            with_("ambient", share_of_white=of(1.1 * AMBIENT)),
+            "light with the projector black",
+        ),
+    ],
+)
+def test_a_figure_fails_beyond_its_limit(at: SelfTest, beyond: SelfTest, name: str) -> None:
+    assert failures(selftest_figures(at)) == ()
+    (failed,) = failures(selftest_figures(beyond))
+    assert failed.name.startswith(name)
+    assert failed.advice

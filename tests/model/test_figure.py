@@ -1,0 +1,41 @@
+"""A figure passes at its limits and fails beyond them, and shows the digits that its deviation allows."""
+
+from __future__ import annotations
+
+import pytest
+
+from dsl_core.model.figure import Figure, failures
+
+
+@pytest.mark.parametrize(
+    ("value", "passed"), [(1.8, True), (2.6, True), (1.7999, False), (2.6001, False), (2.2, True)]
+)
+def test_limits_are_part_of_what_passes(value: float, passed: bool) -> None:
+    assert Figure(name="gamma", value=value, unit="1", low=1.8, high=2.6).passed == passed
+
+
+def test_a_figure_without_limits_passes_and_says_none() -> None:
+    figure = Figure(name="stage", value=-1e9, unit="mm")
+    assert figure.passed
+    assert figure.limits == ""
+    assert Figure(name="stage", value=0, unit="mm", low=0.5).limits == "at least 0.5"
+    assert Figure(name="stage", value=0, unit="mm", high=1234.5).limits == "at most 1234"
+
+
+@pytest.mark.parametrize(
+    ("figure", "text"),
+    [
+        (Figure(name="gamma", value=2.21, std=0.004, unit="1"), "gamma 2.2100 ± 0.0040"),
+        (Figure(name="shift", value=-1.25, std=0.3, unit="px"), "shift -1.25 ± 0.30 px"),
+        (Figure(name="frames", value=4000, unit=""), "frames 4000"),
+        (Figure(name="tilt", value=12.3456, unit="degrees"), "tilt 12.35 degrees"),
+        (Figure(name="nothing", value=0.0, std=0.0, unit="px"), "nothing 0 ± 0 px"),
+    ],
+)
+def test_digits_follow_the_deviation(figure: Figure, text: str) -> None:
+    assert str(figure) == text
+
+
+def test_failures_are_the_figures_outside_their_limits() -> None:
+    good, bad = (Figure(name="x", value=value, unit="", high=1) for value in (0, 2))
+    assert failures((good, bad, good)) == (bad,)
