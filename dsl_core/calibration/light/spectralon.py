@@ -14,11 +14,11 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import (
     MeasuredEmission,
     PlaneQuality,
-    Row3,
     SpectralonCalibration,
     Square3,
     WhiteSignals,
 )
+from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import FlatField, Rgb, Rig, Sensor
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.flat_field import gain_at_pixels

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from dsl_core.model.base import Record
+from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import FlatField, Rgb
 from dsl_core.model.spectral import SpectralCurve
 
