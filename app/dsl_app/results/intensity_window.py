@@ -47,20 +47,13 @@ class IntensityWindow(QDialog):
         for span in self.spans.values():
             span.setZValue(-10)
             self.item.addItem(span, ignoreBounds=True)
+        points = {"pen": None, "symbol": "o", "symbolSize": 3, "symbolPen": None}
+        channels = list(zip(CHANNELS, RGB_COLOURS, strict=True))
         self.measured = [
-            self.item.plot(
-                pen=None,
-                symbol="o",
-                symbolSize=3,
-                symbolPen=None,
-                symbolBrush=colour,
-                name=f"{name} measured",
-            )
-            for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)
+            self.item.plot(**points, symbolBrush=colour, name=f"{name} measured") for name, colour in channels
         ]
         self.model = [
-            self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model")
-            for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)
+            self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model") for name, colour in channels
         ]
         self.faint = QCheckBox("Scale to the first orders")
         self.faint.setToolTip(

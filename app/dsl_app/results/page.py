@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QHBoxLayout,
-    QSplitter,
     QStackedWidget,
     QTabWidget,
     QVBoxLayout,
@@ -35,7 +34,7 @@ from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import Figure
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.forms import label, push_button, splitter
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.workflows.inspection import IntensityGraph
@@ -140,7 +139,7 @@ class ResultsPage(PageWidget):
         column.addWidget(self.stack, 1)
 
     def _content(self) -> QWidget:
-        self.pictures = QSplitter(Qt.Orientation.Horizontal)
+        self.pictures = splitter(Qt.Orientation.Horizontal, (self._image, 1), (self.cloud, 2))
         self.pictures.setObjectName("result-pictures")
         left = QWidget()
         column = QVBoxLayout(left)
@@ -153,16 +152,8 @@ class ResultsPage(PageWidget):
         tabs.tabBar().setDrawBase(False)
         tabs.addTab(self.marks, "Pins, regions, references")
         tabs.addTab(self.search, "Search")
-        right, content = QSplitter(Qt.Orientation.Vertical), QSplitter(Qt.Orientation.Horizontal)
-        for splitter, parts in (
-            (self.pictures, ((self._image, 1), (self.cloud, 2))),
-            (right, ((self._spectra, 3), (tabs, 2))),
-            (content, ((left, 3), (right, 2))),
-        ):
-            splitter.setChildrenCollapsible(False)
-            for place, (widget, stretch) in enumerate(parts):
-                splitter.addWidget(widget)
-                splitter.setStretchFactor(place, stretch)
+        right = splitter(Qt.Orientation.Vertical, (self._spectra, 3), (tabs, 2))
+        content = splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2))
         right.setSizes([400, 340])
         content.setSizes([720, 440])
         return content

@@ -3,17 +3,19 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.page import ResultsPage
 from dsl_app.results.state import ResultsState
-from dsl_app.results.summary import effects_text
+from dsl_app.results.summary import Content, effects_text, summarise
 from dsl_app.results.welcome import Welcome
 from dsl_app.shared.settings import RecentFiles, Settings
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.help_window import help_of
 from pytestqt.qtbot import QtBot
 
+from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.result.result_file import load_result, save_result
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 from tests.app.support.small_result import write_small_result
@@ -58,3 +60,36 @@ def test_the_results_page_says_which_effects_a_scan_had(qtbot: QtBot, tmp_path: 
     assert "left out specular" in page.about.toolTip()
     assert help_of(page.pixel_info) == "hard-cases"
     page.release()
+
+
+def result(**attributes: object) -> ResultArrays:
+    arrays = {"depth_mm": np.zeros((48, 64)), "reflectance": np.zeros((2, 48, 64))}
+    return ResultArrays(Path("/scans/leaf.zarr"), np.array([500.0, 600.0]), arrays, attributes)
+
+
+@pytest.mark.parametrize(
+    ("has_result", "offer", "busy", "content", "message", "can_reconstruct"),
+    [
+        (False, None, "", Content.WELCOME, "", False),
+        (True, None, "", Content.RESULT, "", False),
+        (False, "leaf.dsl", "", Content.OFFER, "leaf.dsl has no result yet. Reconstruct it now?", True),
+        (True, "leaf.dsl", "", Content.OFFER, "leaf.dsl has no result yet. Reconstruct it now?", True),
+        (True, "leaf.dsl", "Open leaf", Content.OFFER, "Open leaf …", False),
+        (False, None, "Open leaf", Content.OFFER, "Open leaf …", False),
+    ],
+)
+def test_the_page_shows_a_result_an_offer_or_the_welcome(
+    has_result: bool, offer: str | None, busy: str, content: Content, message: str, can_reconstruct: bool
+) -> None:
+    found = summarise(result() if has_result else None, None if offer is None else Path(offer), busy)
+    assert (found.content, found.message, found.can_reconstruct) == (content, message, can_reconstruct)
+    assert found.has_result == has_result
+    assert found.title == ("leaf" if has_result else "Results")
+
+
+def test_the_head_tells_size_bands_time_and_path() -> None:
+    found = summarise(result(captured="2026-05-04T09:30:12"), None, "")
+    assert found.about == "64 × 48 px · 2 bands · 2026-05-04 09:30 · /scans/leaf.zarr"
+    assert found.details == "/scans/leaf.zarr"
+    depth = ResultArrays(Path("a.zarr"), np.empty(0), {"depth_mm": np.zeros((48, 64))})
+    assert summarise(depth, None, "").about == "64 × 48 px · depth only · a.zarr"

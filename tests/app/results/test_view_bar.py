@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 from dsl_app.results.controller import ResultsController
-from dsl_app.results.state import ResultsState
-from dsl_app.results.view_bar import ViewBar
+from dsl_app.results.state import QualityMap, ResultsState, ResultView
+from dsl_app.results.view_bar import ViewBar, controls_for
 from dsl_app.session.parts import restore_result, results_part
 from dsl_app.shared.undo import UndoStack
 from pytestqt.qtbot import QtBot
@@ -142,3 +143,28 @@ def test_what_eyes_were_adapted_to_comes_back_with_its_tick(
     assert again.bar.nm.text() == "560 nm"
     again.control.open(few)
     assert again.bar.nm.text() == "460 nm"
+
+
+@pytest.mark.parametrize(
+    ("view", "cloud_by", "quality", "shown"),
+    [
+        (ResultView.COLOUR, ResultView.BAND, QualityMap.SHARE, {"light", "colour_row"}),
+        (ResultView.BAND, ResultView.COLOUR, QualityMap.FLAGS, {"band", "colour_row"}),
+        (ResultView.DEPTH, ResultView.COLOUR, QualityMap.SHARE, {"depth_row"}),
+        (ResultView.QUALITY, ResultView.COLOUR, QualityMap.FLAGS, {"quality", "colour_row"}),
+        (ResultView.QUALITY, ResultView.COLOUR, QualityMap.SPREAD, {"quality", "band", "colour_row"}),
+        (ResultView.QUALITY, ResultView.COLOUR, QualityMap.DEPTH_SPREAD, {"quality", "colour_row"}),
+        (
+            ResultView.CLOUD,
+            ResultView.COLOUR,
+            QualityMap.SHARE,
+            {"light", "cloud", "depth_row", "colour_row"},
+        ),
+        (ResultView.CLOUD, ResultView.DEPTH, QualityMap.SHARE, {"cloud", "depth_row"}),
+    ],
+)
+def test_a_view_has_the_controls_it_needs(
+    view: ResultView, cloud_by: ResultView, quality: QualityMap, shown: set[str]
+) -> None:
+    found = asdict(controls_for(view, cloud_by, quality))
+    assert {name for name, is_shown in found.items() if is_shown} == shown

@@ -16,7 +16,7 @@ from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark
+from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark, splitter
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
@@ -77,11 +77,7 @@ class PairPanel(QWidget):
         upper.setContentsMargins(0, 0, 0, 0)
         upper.addWidget(self._pictures, 1)
         upper.addWidget(self.bar)
-        self.parts = QSplitter(Qt.Orientation.Vertical)
-        self.parts.setChildrenCollapsible(False)
-        for i, (widget, stretch) in enumerate(((above, 5), (self._figures, 4))):
-            self.parts.addWidget(widget)
-            self.parts.setStretchFactor(i, stretch)
+        self.parts = splitter(Qt.Orientation.Vertical, (above, 5), (self._figures, 4))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 8, 0, 0)
         column.addLayout(head)

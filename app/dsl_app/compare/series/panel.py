@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QHBoxLayout,
     QHeaderView,
-    QSplitter,
     QVBoxLayout,
     QWidget,
 )
@@ -25,7 +24,7 @@ from dsl_app.compare.series.table import SeriesTable
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark
+from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark, splitter
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
@@ -79,9 +78,9 @@ class SeriesPanel(QWidget):
             head.addWidget(widget)
         head.addStretch(1)
         head.addWidget(self.report)
-        above = _splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.figures, 2))
-        below = _splitter(Qt.Orientation.Horizontal, (self._plot, 3), (self._picture, 2))
-        self.parts = _splitter(Qt.Orientation.Vertical, (above, 2), (below, 3))
+        above = splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.figures, 2))
+        below = splitter(Qt.Orientation.Horizontal, (self._plot, 3), (self._picture, 2))
+        self.parts = splitter(Qt.Orientation.Vertical, (above, 2), (below, 3))
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 8, 0, 0)
         column.addLayout(head)
@@ -163,12 +162,3 @@ class SeriesPanel(QWidget):
         late = [part.stops for part in (self._plot.made, self._picture.made) if part is not None]
         for stop in (*self._stops, *chain.from_iterable(late)):
             stop()
-
-
-def _splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int]) -> QSplitter:
-    made = QSplitter(direction)
-    made.setChildrenCollapsible(False)
-    for i, (widget, stretch) in enumerate(parts):
-        made.addWidget(widget)
-        made.setStretchFactor(i, stretch)
-    return made

@@ -16,6 +16,7 @@ from dsl_app.results.cloud.render_window import Colours, MouseButton, Place, Ren
 SETTLE_S = 0.25
 
 Act = Callable[[], object]
+Change = Callable[[RenderWindow], object]
 
 
 class CloudRenderer:
@@ -64,37 +65,21 @@ class CloudRenderer:
         """Mark points; the cloud is coarse for a while if the mark ``moves``."""
         self._request(partial(self._mark, name, points, colours, size_px, moves))
 
-    def set_background(self, colour: str) -> None:
-        """Set the colour behind the cloud."""
-        self._request(lambda: self._window.set_background(colour))
+    def call(self, change: Change) -> None:
+        """Change the render window in its thread, and draw."""
+        self._request(lambda: change(self._window))
 
-    def resize(self, width: int, height: int) -> None:
-        """Set the size of pictures, px."""
-        self._request(lambda: self._window.resize(width, height))
+    def move_camera(self, change: Change) -> None:
+        """The same for a step of the camera; the cloud is coarse for a while."""
+        self._request(partial(self._move_camera, change))
 
     def press(self, button: MouseButton, at: Place, shift: bool, control: bool) -> None:
         """Press a mouse button."""
         self._request(partial(self._press, button, at, shift, control))
 
-    def move(self, at: Place, shift: bool, control: bool) -> None:
-        """Move the mouse."""
-        self._request(lambda: self._window.move(at, shift, control))
-
     def release(self, button: MouseButton, at: Place) -> None:
         """Release a mouse button."""
         self._request(partial(self._release, button, at))
-
-    def turn(self, right: int, up: int) -> None:
-        """Rotate the view by steps."""
-        self._request(partial(self._step, lambda: self._window.turn(right, up)))
-
-    def zoom(self, steps: float) -> None:
-        """Move the camera closer by steps, or away."""
-        self._request(partial(self._step, lambda: self._window.zoom(steps)))
-
-    def reset(self) -> None:
-        """Look from the position of the camera."""
-        self._request(lambda: self._window.reset())
 
     def close(self) -> None:
         """End the thread after the current picture, and wait for it."""
@@ -167,8 +152,8 @@ class CloudRenderer:
         if moves:
             self._be_coarse()
 
-    def _step(self, act: Act) -> None:
-        act()
+    def _move_camera(self, change: Change) -> None:
+        change(self._window)
         self._be_coarse()
 
     def _press(self, button: MouseButton, at: Place, shift: bool, control: bool) -> None:

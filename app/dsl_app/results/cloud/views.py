@@ -127,7 +127,7 @@ class InteractiveCloud(CloudView):
     def set_background(self, colour: str) -> None:
         """Set the colour behind the cloud, also where there is no picture yet."""
         self._background = QColor(colour)
-        self.renderer.set_background(colour)
+        self.renderer.call(lambda window: window.set_background(colour))
         self.update()
 
     def projection(self) -> NDArray[np.float64]:
@@ -136,7 +136,7 @@ class InteractiveCloud(CloudView):
 
     def reset(self) -> None:
         """Look from the position of the camera."""
-        self.renderer.reset()
+        self.renderer.call(lambda window: window.reset())
 
     def release(self) -> None:
         """End the render thread."""
@@ -176,7 +176,8 @@ class InteractiveCloud(CloudView):
         return super().event(event)
 
     def _resize_pictures(self) -> None:
-        self.renderer.resize(*self._px(QPointF(self.width(), self.height())))
+        width, height = self._px(QPointF(self.width(), self.height()))
+        self.renderer.call(lambda window: window.resize(width, height))
 
     def _px(self, at: QPointF) -> tuple[int, int]:
         ratio = self.devicePixelRatioF()
@@ -193,7 +194,8 @@ class InteractiveCloud(CloudView):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Continue to rotate, pan or zoom."""
         if not self._mouse(event) and event.buttons():
-            self.renderer.move(self._px(event.position()), *_modifiers(event))
+            at, modifiers = self._px(event.position()), _modifiers(event)
+            self.renderer.call(lambda window: window.move(at, *modifiers))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         """Stop rotating, panning or zooming."""
@@ -203,17 +205,20 @@ class InteractiveCloud(CloudView):
 
     def wheelEvent(self, event: QWheelEvent) -> None:
         """Zoom."""
-        self.renderer.zoom(event.angleDelta().y() / NOTCH)
+        self._zoom(event.angleDelta().y() / NOTCH)
+
+    def _zoom(self, steps: float) -> None:
+        self.renderer.move_camera(lambda window: window.zoom(steps))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Rotate and zoom by keys."""
         step = arrow_step(event)
         if step is not None:
-            self.renderer.turn(step[0], -step[1])
+            self.renderer.move_camera(lambda window: window.turn(step[0], -step[1]))
         elif event.key() in (Qt.Key.Key_Plus, Qt.Key.Key_Equal, Qt.Key.Key_Minus):
-            self.renderer.zoom(-1.0 if event.key() == Qt.Key.Key_Minus else 1.0)
+            self._zoom(-1.0 if event.key() == Qt.Key.Key_Minus else 1.0)
         elif event.key() == Qt.Key.Key_Home:
-            self.renderer.reset()
+            self.reset()
         else:
             super().keyPressEvent(event)
 

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QHeaderView,
     QLabel,
-    QPushButton,
     QScrollArea,
     QTreeWidget,
     QTreeWidgetItem,
@@ -25,6 +24,7 @@ from dsl_app.results.marks.comparison import comparison_html
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import label, push_button
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
@@ -60,8 +60,7 @@ class MarksPanel(QWidget):
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         for column in (1, 2):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        self.hint = QLabel(EMPTY)
-        self.hint.setProperty("role", "muted")
+        self.hint = label(EMPTY, "muted")
         self.hint.setWordWrap(True)
         self.figures = QLabel()
         self.figures.setAccessibleName("Comparison with references")
@@ -73,22 +72,22 @@ class MarksPanel(QWidget):
         self.below.setWidgetResizable(True)
         self.below.setFrameShape(QFrame.Shape.NoFrame)
         self.tree.setMinimumHeight(88)
-        self.reference = QPushButton("Add reference…")
-        self.reference.setToolTip(
-            "Open a spectrum (text with nm and reflectance) or an ENVI library (.sli) to compare with"
+        self.reference = push_button(
+            "Add reference…",
+            "Open a spectrum (text with nm and reflectance) or an ENVI library (.sli) to compare with",
         )
-        self.remove = QPushButton("Remove")
-        self.remove.setToolTip("Remove the selected pin, region or reference (Delete)")
-        self.copy = QPushButton("Copy spectra")
-        self.copy.setToolTip(
-            "Copy the ticked spectra for a spreadsheet: nm, mean, deviation, n, uncertainty (Ctrl+C)"
+        self.remove = push_button("Remove", "Remove the selected pin, region or reference (Delete)")
+        self.copy = push_button(
+            "Copy spectra",
+            "Copy the ticked spectra for a spreadsheet: nm, mean, deviation, n, uncertainty (Ctrl+C)",
         )
-        self.export = QPushButton("Export spectra…")
-        self.export.setToolTip("Write the same table as CSV, with the origin of the result")
+        self.export = push_button(
+            "Export spectra…", "Write the same table as CSV, with the origin of the result"
+        )
         column_box = QVBoxLayout(self)
         column_box.setContentsMargins(0, 0, 0, 0)
-        for widget in (self.hint, self.tree):
-            column_box.addWidget(widget, 1 if widget is self.tree else 0)
+        column_box.addWidget(self.hint)
+        column_box.addWidget(self.tree, 1)
         # Two rows, as the smallest window is too narrow for one.
         for buttons in ((self.reference, self.remove), (self.copy, self.export)):
             row = QHBoxLayout()

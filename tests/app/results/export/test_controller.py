@@ -1,0 +1,98 @@
+"""Exporting a result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.results.export.controller import FORMATS
+from dsl_app.results.layers import Layers, rgb_of
+from dsl_app.results.state import ResultView
+
+from tests.app.support.results_controller import Bench
+from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import write_small_result
+
+
+def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((3, 3))
+    targets = {
+        "ply": tmp_path / "a.ply",
+        "csv": tmp_path / "a.csv",
+        "envi": tmp_path / "a.hdr",
+        "tiff": tmp_path / "a.tiff",
+    }
+    assert bench.control.export.taken(targets) == []
+    bench.control.export.write(targets, overwrite=False)
+    assert "Wrote 9 files" in bench.told
+    assert len(bench.control.export.taken(targets)) == 9
+    bench.control.export.write(targets, overwrite=False)
+    assert "exists already" in bench.told
+    bench.control.export.write(targets, overwrite=True)
+    assert "Wrote 9 files" in bench.told
+
+
+def test_pictures_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path) -> None:
+    import cv2
+
+    bench.control.step_band(-3)
+    bench.control.relight("A", adapted=False)
+    bench.state.view.set(ResultView.QUALITY)
+    bench.control.export.write({"png": tmp_path / "a.png"}, overwrite=False)
+    files = {path.name: np.asarray(cv2.imread(str(path)))[..., ::-1] for path in tmp_path.glob("a_*.png")}
+    assert set(files) == {"a_rgb_A_unadapted.png", "a_depth.png", "a_530nm.png", "a_flags.png"}
+    result, picture = bench.state.result.value, bench.state.picture.value
+    assert result is not None
+    assert picture is not None
+    lit = picture[..., 3] > 0
+    np.testing.assert_array_equal(files["a_rgb_A_unadapted.png"][lit], picture[lit, :3])
+    layer = Layers(result).layer(bench.state)
+    assert layer is not None
+    flagged = result["flags"] != 0
+    assert flagged.sum() == 2
+    np.testing.assert_array_equal(files["a_flags.png"][:24, :36][flagged], rgb_of(layer)[flagged])
+
+
+@pytest.mark.parametrize(
+    ("name", "forms", "replace", "trouble"),
+    [
+        ("new", (), False, "Select at least one format."),
+        ("", ("ply",), False, "Enter a name for the files."),
+        ("new", ("ply",), False, ""),
+        ("old", ("ply", "png"), False, "old.ply already exists. Choose another name, or allow replacing."),
+        ("old", ("ply",), True, ""),
+        ("old", ("ply", "envi"), False, "old.ply, old.hdr already exist. Choose another"),
+    ],
+)
+def test_what_stands_in_the_way_of_an_export_is_said(
+    bench: Bench, tmp_path: Path, name: str, forms: tuple[str, ...], replace: bool, trouble: str
+) -> None:
+    for suffix in ("ply", "hdr"):
+        (tmp_path / f"old.{suffix}").touch()
+    targets = {form.key: tmp_path / f"{name}{form.suffix}" for form in FORMATS if form.key in forms}
+    found = bench.control.export.trouble(str(tmp_path), name, targets, replace)
+    assert found.startswith(trouble)
+    assert bool(found) == bool(trouble)
+    nowhere = str(tmp_path / "nowhere")
+    assert "not a folder" in bench.control.export.trouble(nowhere, "a", {"ply": tmp_path}, True)
+
+
+@pytest.mark.parametrize(
+    ("spectra", "pinned", "refused"),
+    [
+        (True, True, {}),
+        (True, False, {"csv": "Pin a pixel first"}),
+        (False, False, {"csv": "Pin a pixel first", **dict.fromkeys(("envi", "exr"), "depth only")}),
+    ],
+)
+def test_formats_that_lack_spectra_or_pins_are_refused(
+    tmp_path: Path, spectra: bool, pinned: bool, refused: dict[str, str]
+) -> None:
+    bench = Bench(write_small_result(tmp_path, spectra=spectra))
+    if pinned:
+        bench.control.marks.pin((3, 3))
+    for form in FORMATS:
+        refusal = bench.control.export.refusal(form)
+        assert refused.get(form.key, "") in refusal
+        assert bool(refusal) == (form.key in refused)

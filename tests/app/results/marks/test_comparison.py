@@ -1,0 +1,52 @@
+"""The tables of the selected mark."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from dsl_app.results.marks.comparison import comparison_html
+from dsl_app.shared.theme import LIGHT
+
+from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import BLUE, write_reference
+
+
+def select(bench: Bench, place: int) -> str:
+    bench.state.selected.set(bench.state.marks.value[place].key)
+    return comparison_html(bench.state, LIGHT)
+
+
+def test_a_pin_is_compared_with_references_and_measured_to_other_pins(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((3, 3))
+    assert select(bench, 0) == ""
+    bench.control.marks.pin((3, 13))
+    bench.control.marks.add_reference(write_reference(tmp_path / "double.csv", 2 * BLUE))
+    html = select(bench, 0)
+    # Half as bright, but of the same shape: scaled by two, it has no error left.
+    assert "double" in html
+    assert f"{np.sqrt(np.mean(BLUE**2)):.4f}" in html
+    assert "0.0000" in html
+    assert "2.000" in html
+    # Ten rows of 701.5 mm depth at 1/100 of it each.
+    assert "70.15 ± " in html
+    bench.control.marks.show(bench.state.marks.value[2].key, False)
+    assert "double" not in select(bench, 0)
+
+
+def test_regions_have_no_distance_and_references_no_table(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.add_outline(SQUARE)
+    bench.control.marks.pin((3, 3))
+    bench.control.marks.add_reference(write_reference(tmp_path / "same.csv", BLUE))
+    assert "distance" not in select(bench, 0)
+    assert "same" in select(bench, 0)
+    assert select(bench, 2) == ""
+
+
+def test_a_short_reference_says_its_range(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((30, 5))
+    short = tmp_path / "short.csv"
+    short.write_text("\n".join(f"{nm},0.5" for nm in range(500, 551, 5)))
+    bench.control.marks.add_reference(short)
+    assert "only 500–550 nm, free scale" in select(bench, 0)

@@ -1,0 +1,123 @@
+"""Pins, regions and references: added, undone, saved, copied and exported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.io.result.annotations_file import load_annotations
+from tests.app.support.results_controller import SQUARE, Bench
+from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import BLUE, DARK, write_reference, write_small_result
+from tests.io.spectra.test_reference_file import BRICK, write_library
+
+
+def test_pins_and_regions_are_made_undone_and_done_again(bench: Bench) -> None:
+    bench.control.marks.pin((3, 3))
+    bench.control.marks.add_outline(SQUARE)
+    region = bench.state.marks.value[1]
+    assert (region.pixels, region.used, region.spectrum.sigmas) == (20, 20, 1.0)
+    np.testing.assert_allclose(region.spectrum.mean, BLUE, atol=1e-4)
+    assert bench.state.selected_mark is region
+    bench.undo.undo()
+    assert bench.names == ["pin 1"]
+    bench.undo.redo()
+    assert bench.names == ["pin 1", "region 1"]
+    bench.control.marks.remove(region.key)
+    bench.undo.undo()
+    assert bench.state.marks.value[1] is region
+
+
+def test_what_has_no_spectrum_is_not_marked(bench: Bench) -> None:
+    bench.control.marks.pin(DARK)
+    assert "no spectrum" in bench.told
+    bench.control.marks.add_outline(((90, 90), (95, 90), (95, 95)))
+    assert "No pixel" in bench.told
+    assert bench.names == []
+
+
+def test_marks_are_saved_next_to_the_result(bench: Bench, tmp_path: Path) -> None:
+    marks = bench.control.marks
+    marks.pin((3, 3))
+    marks.rename(bench.state.marks.value[0].key, "sky")
+    mask = np.zeros((24, 36), bool)
+    mask[4:8, 20:30] = True
+    marks.add_pixels(mask)
+    marks.add_reference(write_reference(tmp_path / "tile.csv", BLUE))
+    marks.show(bench.state.marks.value[2].key, False)
+    again = Bench(tmp_path / "small.zarr")
+    assert again.names == ["sky", "region 1", "tile"]
+    assert again.state.marks.value[1].used == 40
+    assert [mark.shown for mark in again.state.marks.value] == [True, True, False]
+    assert again.undo.undo_text == ""
+    (tmp_path / "tile.csv").unlink()
+    gone = Bench(tmp_path / "small.zarr").state.marks.value[2]
+    assert (gone.name, "tile.csv" in gone.trouble) == ("tile", True)
+
+
+def test_a_damaged_file_of_marks_does_not_keep_the_result_shut(tmp_path: Path) -> None:
+    path = write_small_result(tmp_path)
+    (tmp_path / "small.marks.json").write_text("{")
+    bench = Bench(path)
+    assert bench.state.result.value is not None
+    assert "cannot be read" in bench.told
+
+
+def test_a_file_without_spectrum_is_told(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("hello")
+    assert bench.control.open(tmp_path / "a.csv")
+    assert "a.csv" in bench.told
+
+
+def test_marks_on_disk_follow_undo(bench: Bench, tmp_path: Path) -> None:
+    bench.control.marks.pin((3, 3))
+    assert len(load_annotations(tmp_path / "small.zarr").pins) == 1
+    bench.undo.undo()
+    assert load_annotations(tmp_path / "small.zarr").pins == ()
+
+
+def test_spectra_are_copied_and_exported_and_read_again_as_references(bench: Bench, tmp_path: Path) -> None:
+    marks, copied, path = bench.control.marks, list[str](), tmp_path / "spectra.csv"
+    marks.copy_spectra(copied.append)
+    assert (copied, marks.can_export()) == ([], False)
+    assert "No spectrum is ticked" in bench.told
+    marks.add_outline(SQUARE)
+    marks.pin((3, 3))
+    marks.show(bench.state.marks.value[1].key, False)
+    marks.copy_spectra(copied.append)
+    assert "Copied 1 spectrum" in bench.told
+    head, first = (line.split("\t") for line in copied[0].splitlines()[:2])
+    assert head == [
+        "wavelength_nm",
+        "region 1: reflectance (1)",
+        "region 1: deviation of its pixels (1)",
+        "region 1: n (pixels)",
+        "region 1: uncertainty of a pixel (1)",
+    ]
+    assert float(first[4]) == pytest.approx(0.01)
+    marks.export_spectra(path, overwrite=False)
+    assert f"Wrote 1 spectrum to {path}" in bench.told
+    marks.export_spectra(path, overwrite=False)
+    assert "exists already" in bench.told
+    assert bench.control.open(path)
+    reference = bench.state.marks.value[-1]
+    assert reference.kind == "reference"
+    np.testing.assert_allclose(reference.spectrum.mean, BLUE, atol=1e-4)
+
+
+def test_a_library_asks_which_spectrum_and_its_name_finds_it_again(bench: Bench, tmp_path: Path) -> None:
+    path = write_library(tmp_path / "plants.sli")
+    assert bench.control.open(path)
+    library = bench.state.library.value
+    assert library is not None
+    assert bench.names == []
+    bench.control.marks.add_references(path, library.content.references[1:])
+    assert bench.state.library.value is None
+    assert bench.names == ["Brick"]
+    again = Bench(tmp_path / "small.zarr")
+    np.testing.assert_allclose(again.state.marks.value[0].spectrum.mean, BRICK, rtol=1e-6)
+    path.with_suffix(".hdr").unlink()
+    assert bench.control.open(path)
+    assert "lacks its header" in bench.told

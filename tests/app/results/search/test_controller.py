@@ -1,0 +1,70 @@
+"""Looking for a spectrum in the whole picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from dsl_app.results.search.panel import HINT, search_text
+from dsl_app.results.state import SearchMode
+
+from tests.app.support.results_controller import Bench
+from tests.app.support.results_controller import bench as bench
+
+
+def test_looking_for_a_spectrum_finds_its_material(bench: Bench) -> None:
+    bench.control.search.start(SearchMode.SPECTRUM)
+    assert "Select a pin" in bench.told
+    bench.control.point_at((30, 5))
+    bench.control.search.start(SearchMode.SPECTRUM)
+    search = bench.state.search.value
+    assert search is not None
+    assert search.name == "pixel 30, 5"
+    assert search.found[:, 18:].all()
+    assert not search.found[:, :18].any()
+    bench.control.search.set_limits(2.0, 2.0)
+    assert bench.state.search.value is not None
+    assert bench.state.search.value.found[0].all()
+    bench.control.search.set_mode(SearchMode.METAMERS)
+    assert not bench.state.search.value.found.any()
+    bench.control.search.clear()
+    assert bench.state.search.value is None
+
+
+def test_a_reference_of_part_of_the_range_is_not_looked_for(bench: Bench, tmp_path: Path) -> None:
+    short = tmp_path / "short.csv"
+    short.write_text("\n".join(f"{nm},{nm / 1000}" for nm in range(400, 551, 10)))
+    bench.control.open(short)
+    bench.control.search.start(SearchMode.SPECTRUM)
+    assert "400 to 550 nm" in bench.told
+    assert "430 to 660 nm" in bench.told
+    assert bench.state.search.value is None
+
+
+def test_the_share_found_is_of_pixels_with_a_spectrum(bench: Bench) -> None:
+    bench.control.point_at((30, 5))
+    bench.control.search.start(SearchMode.SPECTRUM)
+    search = bench.state.search.value
+    assert search is not None
+    assert search.share == 18 * 24 / (36 * 24 - 1)
+    nowhere = replace(search.likeness, angle_rad=np.full_like(search.likeness.angle_rad, np.nan))
+    assert replace(search, likeness=nowhere).share is None
+
+
+def test_what_was_found_is_said_in_a_sentence(bench: Bench) -> None:
+    assert search_text(None) == HINT
+    bench.control.point_at((30, 5))
+    bench.control.search.start(SearchMode.SPECTRUM)
+    search = bench.state.search.value
+    assert search is not None
+    assert search_text(search) == (
+        "50.06% of the pixels with a spectrum have the spectrum of pixel 30, 5 (angle up to 0.05 rad)."
+    )
+    metamers = replace(search, mode=SearchMode.METAMERS, within_rad=0.1)
+    assert search_text(metamers) == (
+        "0.00% of the pixels with a spectrum look like pixel 30, 5 (ΔE00 up to 2) but differ by more than 0.1"
+        " rad."
+    )
+    nowhere = replace(search.likeness, angle_rad=np.full_like(search.likeness.angle_rad, np.nan))
+    assert search_text(replace(search, likeness=nowhere)) == "No pixel of this result has a spectrum."

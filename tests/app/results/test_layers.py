@@ -1,0 +1,77 @@
+"""What each view paints, and in which colours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from dsl_app.results.layers import Layers, rgb_of, within
+from dsl_app.results.state import QualityMap, ResultsState, ResultView
+
+from dsl_core.io.result.result_arrays import load_arrays
+from tests.app.support.small_result import BLUE, DARK, RED, UNREACHED, write_small_result
+
+
+@pytest.fixture
+def layers(tmp_path: Path) -> Layers:
+    return Layers(load_arrays(write_small_result(tmp_path)))
+
+
+def state_of(view: ResultView, quality: QualityMap = QualityMap.FLAGS, band: int = 0) -> ResultsState:
+    state = ResultsState()
+    state.view.set(view)
+    state.quality.set(quality)
+    state.band.set(band)
+    return state
+
+
+def test_limits_keep_known_depths_between_them() -> None:
+    depth_mm = np.array([690.0, 700.0, 710.0, 720.0, np.nan])
+    assert within(depth_mm, (700.0, 710.0)).tolist() == [False, True, True, False, False]
+    assert within(depth_mm, None).tolist() == [True] * 4 + [False]
+
+
+def test_a_band_is_painted_from_zero_to_one_level_for_all_bands(layers: Layers) -> None:
+    first, last = (layers.layer(state_of(ResultView.BAND, band=band)) for band in (0, 46))
+    assert first is not None
+    assert last is not None
+    assert (first.image[8, 3], first.image[8, 30]) == pytest.approx((BLUE[0], RED[0]))
+    assert first.levels == last.levels == pytest.approx((0.0, 0.7), abs=0.01)
+
+
+def test_the_cloud_has_the_colours_of_the_view_chosen_for_it(layers: Layers) -> None:
+    state = state_of(ResultView.CLOUD)
+    state.cloud_by.set(ResultView.DEPTH)
+    cloud, depth = layers.layer(state), layers.layer(state_of(ResultView.DEPTH))
+    assert cloud is not None
+    assert cloud == depth
+    assert np.isnan(cloud.image[DARK[1], DARK[0]])
+
+
+def test_flags_have_a_legend_with_their_shares(layers: Layers) -> None:
+    layer = layers.layer(state_of(ResultView.QUALITY))
+    assert layer is not None
+    shares = {name: share for _, name, share in layer.keys}
+    assert shares["no flags"] == pytest.approx(1 - 2 / (24 * 36))
+    assert len(shares) == 3
+    colours = rgb_of(layer)
+    assert (colours[DARK[1], DARK[0]] != colours[0, 9]).any()
+    assert (colours[UNREACHED[1], UNREACHED[0]] != colours[0, 9]).any()
+
+
+@pytest.mark.parametrize(
+    ("quality", "value", "label"),
+    [
+        (QualityMap.SHARE, 0.1, "Data share"),
+        (QualityMap.SPREAD, 0.01, "Standard deviation of reflectance"),
+        (QualityMap.DEPTH_SPREAD, 0.25, "Standard deviation of depth (mm)"),
+    ],
+)
+def test_maps_of_quality_show_their_figure(
+    layers: Layers, quality: QualityMap, value: float, label: str
+) -> None:
+    layer = layers.layer(state_of(ResultView.QUALITY, quality))
+    assert layer is not None
+    assert layer.label == label
+    assert layer.image[UNREACHED[1], UNREACHED[0]] == pytest.approx(value)

@@ -1,0 +1,38 @@
+"""A controller of results without a window."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from dsl_app.results.controller import ResultsController
+from dsl_app.results.state import ResultsState
+from dsl_app.shared.undo import UndoStack
+
+from tests.app.support.doubles import InlineRunner, RecordingNotifier
+from tests.app.support.small_result import write_small_result
+
+#: Corners of five by four pixels of the small result.
+SQUARE = ((1.5, 5.5), (6.5, 5.5), (6.5, 9.5), (1.5, 9.5))
+
+
+class Bench:
+    """A controller on a small result, without a window."""
+
+    def __init__(self, path: Path) -> None:
+        self.state, self.undo, self.notifier = ResultsState(), UndoStack(), RecordingNotifier()
+        self.control = ResultsController(self.state, InlineRunner(), self.notifier, self.undo)
+        assert self.control.open(path)
+
+    @property
+    def told(self) -> str:
+        return self.notifier.told[-1][1]
+
+    @property
+    def names(self) -> list[str]:
+        return [mark.name for mark in self.state.marks.value]
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(write_small_result(tmp_path))
