@@ -104,7 +104,7 @@ class UnattendedGuide:
         self.title = session.recipe.title
 
     def place(self, step: Step) -> None:
-        """Fail: nobody is there to place a target."""
+        """Raise `CalibrationError`: no person is there to place a target."""
         raise CalibrationError(f"{step.title}: {CANNOT_PLACE}")
 
     def looked(self, step: Step, figures: Sequence[Figure]) -> bool:

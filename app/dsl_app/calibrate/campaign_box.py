@@ -23,6 +23,7 @@ from PySide6.QtWidgets import (
 from dsl_app.calibrate.presentation import campaign_head
 from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_button
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class CampaignBox(QFrame):
         self._name, self._where = label("", "title"), label("", "muted", wraps=True)
         self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.new = push_button("&New campaign…", "Begin a campaign of the chosen rig in a new folder")
-        self.open = push_button("&Open campaign…", "Continue a campaign that was begun before")
+        self.open = push_button("&Open campaign…", "Continue an existing campaign")
         self.everything = push_button(
             "Calibrate &everything",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
@@ -134,13 +135,8 @@ class CampaignBox(QFrame):
         self.everything.clicked.connect(commands.run_everything)
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)
-        self.stops = [
-            state.campaign.follow(lambda _: self._show()),
-            state.everything.changed.connect(lambda _: self._show()),
-            state.rows.changed.connect(lambda _: self._show()),
-            state.foreign.changed.connect(lambda _: self._show()),
-            self._rig.devices.changed.connect(lambda _: self._show()),
-        ]
+        shown = (state.campaign, state.everything, state.rows, state.foreign, self._rig.devices)
+        self.stops = follow_any(self._show, *shown)
 
     def ask_new(self) -> bool:
         """Ask for a new campaign; whether one was begun."""

@@ -68,7 +68,7 @@ def _read(
         captured = count_captured(campaign, name)
     except DslError as error:
         return Row(name, about, RowState.DAMAGED, str(error)), ""
-    waiting = "A fit waits to be judged." if waits else ""
+    waiting = "A fit is waiting to be judged." if waits else ""
     if accepted is None:
         begun = captured > 0 or waits
         reason = waiting or (f"{captured} captured" if captured else "")

@@ -29,7 +29,7 @@ from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.scan.lock import FolderLock
 from dsl_core.progress import Progress
 
-NO_CAMPAIGN = "No campaign is open. Begin one, or open one that was begun."
+NO_CAMPAIGN = "No campaign is open. Begin a new one, or open an existing one."
 
 
 class CalibrateController:
@@ -71,7 +71,7 @@ class CalibrateController:
         return self.library.offer(path)
 
     def open_campaign(self, folder: Path) -> None:
-        """Open a campaign that was begun before; a wrong folder is named."""
+        """Open an existing campaign; a folder that is not one is named."""
         if not self._is_busy():
             self._take(lambda: CampaignFolder.open(folder))
 
@@ -94,7 +94,7 @@ class CalibrateController:
         self.refresh()
 
     def refresh(self) -> None:
-        """Read again where every calibration stands."""
+        """Read the state of every calibration again."""
         facts, devices = self.state.campaign.value, self._rig.state.devices.value
         self.state.foreign.set(facts is not None and devices is not None and not self._fits(facts))
         self.state.trouble.set(self._obstacle())

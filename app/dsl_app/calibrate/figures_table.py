@@ -1,4 +1,4 @@
-"""Figures beside their limits, with what to do about those that miss them."""
+"""Figures next to their limits, with what to do about those that miss them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.model.figure import Figure
 
-_COLUMNS = ("", "Figure", "Value", "Wanted", "What to do")
+_COLUMNS = ("", "Figure", "Value", "Limits", "What to do")
 _MARK_PX = 26
 #: A hyphen that is the sign of a number, as in ``order -1``.
 _SIGN = re.compile(r"(?<!\w)-(?=\d)")
 
 
 class FiguresTable(ReadTable):
-    """A row a figure: whether it passes, value ± standard deviation with unit, limits, advice."""
+    """A row for each figure: whether it passes, value ± standard deviation with unit, limits, advice."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name, "Values with their standard deviation, against their limits", _COLUMNS)

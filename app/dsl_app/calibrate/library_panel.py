@@ -205,7 +205,7 @@ class LibraryPanel(QGroupBox):
 
 
 class DriftWindow(QDialog):
-    """What a quick shot of a flat target said of a calibration, and what to do about it.
+    """What a quick shot of a flat target showed about a calibration, and what to do about it.
 
     ``again_requested`` asks for another check, ``use_requested`` for scans with this calibration anyway.
     """

@@ -24,6 +24,7 @@ from dsl_app.calibrate.library_panel import LibraryPanel
 from dsl_app.calibrate.presentation import row_display
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.connection.state import RigState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import Banner, label, set_role, show_button
 from dsl_app.shared.widgets.page import PageWidget
@@ -93,9 +94,8 @@ class CalibratePage(PageWidget):
             *self.library.stops,
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
-            state.rows.follow(lambda _: self._show_rows()),
-            state.opening.changed.connect(lambda _: self._show_rows()),
-            state.everything.follow(lambda _: self._show_everything()),
+            *follow_any(self._show_rows, state.rows, state.opening, state.everything),
+            state.everything.follow(self._follow_progress),
         ]
 
     def run(self, name: str) -> None:
@@ -109,9 +109,8 @@ class CalibratePage(PageWidget):
             if row.name in self.rows:
                 self.rows[row.name].show_row(row, self._state.is_busy)
 
-    def _show_everything(self) -> None:
-        self._show_rows()
-        if self._state.everything.value:
+    def _follow_progress(self, progress: str) -> None:
+        if progress:
             self._timer.start()
         else:
             self._timer.stop()

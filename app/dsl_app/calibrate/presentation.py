@@ -16,7 +16,7 @@ from dsl_core.model.figure import Figure
 
 CAMPAIGN_HINT = (
     "No campaign is open. A campaign is a folder that keeps all captures, fits and verdicts of one rig."
-    " Begin a new one, or open one that was begun before."
+    " Begin a new one, or open an existing one."
 )
 NO_VERSION = (
     "<p>The library is empty. It keeps every calibrated rig of this computer, dated and never overwritten:"

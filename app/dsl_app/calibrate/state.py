@@ -48,7 +48,7 @@ ABOUT = {
     "spectralon": About("Spectralon", "Light of the LEDs, evenness, white"),
     "color-checker": About("Color Checker", "Response and emission, from patches"),
     "bandpass": About("Bandpass filters", "Brightness of the film's orders"),
-    "depth-stage": About("Depth stage", "Where the film stands, how it bends"),
+    "depth-stage": About("Depth stage", "Position and bend of the film"),
 }
 
 
@@ -80,7 +80,7 @@ class CampaignFacts:
 
 @dataclass(frozen=True)
 class DriftVerdict:
-    """What a quick shot said of a calibration of the library.
+    """What a quick shot showed about a calibration of the library.
 
     ``spectralon`` says that the target was one, ``overridden`` which settings differed and were ignored.
     """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 T = TypeVar("T")
 
@@ -59,3 +59,9 @@ class Value(Generic[T]):
         """Call a listener now and at every change; the returned function stops it."""
         listener(self._value)
         return self.changed.connect(listener)
+
+
+def follow_any(act: Callable[[], object], *values: Value[Any]) -> list[Callable[[], None]]:
+    """Call ``act`` now and whenever one of the values changes; the returned functions stop it."""
+    act()
+    return [value.changed.connect(lambda _: act()) for value in values]

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
-from dsl_app.shared.evented import Event, Value
+from dsl_app.shared.evented import Event, Value, follow_any
 from dsl_app.shared.undo import Change, UndoStack
 
 
@@ -23,6 +23,17 @@ def test_a_value_tells_of_changes_only() -> None:
     value.set(3)
     value.set(4)
     assert heard == [3, 4]
+
+
+def test_any_of_several_values_is_followed() -> None:
+    number, text, calls = Value(1), Value(""), list[tuple[int, str]]()
+    stops = follow_any(lambda: calls.append((number.value, text.value)), number, text)
+    number.set(2)
+    text.set("a")
+    for stop in stops:
+        stop()
+    number.set(3)
+    assert calls == [(1, ""), (2, ""), (2, "a")]
 
 
 def test_arrays_are_told_every_time() -> None:

@@ -98,7 +98,7 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         flat = record.flat_field
         gain = np.array(flat.gain)
         if min(gain.shape) < 2:
-            self.field.say("The camera sees evenly: no variation over the image stands out from the noise.")
+            self.field.say("The camera is even: no variation over the image stands out from the noise.")
             return
         self.field.begin()
         self.field.item.addItem(self.image)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from dsl_app.calibrate.calibrate_all import products_text
 from dsl_app.calibrate.campaign_status import Recipes
 from dsl_app.calibrate.wizard.background_work import BackgroundWork, Captured, Opened
 from dsl_app.calibrate.wizard.jobs import WizardJobs
@@ -262,8 +263,7 @@ class WizardController:
         state.note.set(f"{state.title} is accepted.")
 
         def written(made: Products) -> None:
-            kept = f" In the library it is {made.entry!r}." if made.entry else ""
-            state.note.set(f"{state.title} is accepted. The rig is saved in {made.rig}.{kept}")
+            state.note.set(f"{state.title} is accepted. {products_text(made)}")
 
         self._jobs.start(
             Doing.KEEPING, "Write the rig", lambda progress: work.write(*self._library()), written

@@ -12,6 +12,7 @@ from dsl_app.calibrate.evidence.base import Evidence, make_evidence
 from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.presentation import fit_display
 from dsl_app.calibrate.wizard.state import Fit, WizardState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label, set_role
@@ -46,9 +47,7 @@ class FitPage(QWidget):
         self.stops = [
             state.fit.follow(self._show_fit),
             state.misfit.follow(self._show_misfit),
-            state.statuses.changed.connect(lambda _: self._show()),
-            state.doing.changed.connect(lambda _: self._show()),
-            state.allowed.changed.connect(lambda _: self._show()),
+            *follow_any(self._show, state.statuses, state.doing, state.allowed),
         ]
 
     def _allow(self, on: bool) -> None:

@@ -1,7 +1,7 @@
-"""A placement as a small scene: where the target's corners lie, what is in the beam, and all of it in words.
+"""A placement as a small scene: the corners of the target, what is in the beam, and all of it in words.
 
-Sizes are those of common targets before the published rig's camera; a drawing of them tells a person what to
-do and is no measurement.
+Sizes are those of common targets in front of the published rig's camera; a drawing of them tells a person what
+to do and is not a measurement.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CHART_COLOURS = (
     "#f3f3f2", "#c8c8c8", "#a0a0a0", "#7a7a79", "#555555", "#343434",
 )  # fmt: skip
 NAMES = {
-    "as it is": "what stands there",
+    "as it is": "target as it is",
     "nothing": "nothing",
     "board": "printed board",
     "spectralon": "white target",
@@ -61,7 +61,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Face:
-    """A flat target before the camera: place of its middle (mm), angles (degrees), half sizes (mm)."""
+    """A flat target in front of the camera: place of its middle (mm), angles (degrees), half sizes (mm)."""
 
     target: str
     middle_mm: Point3
@@ -135,12 +135,12 @@ class Face:
 
     @property
     def distance_text(self) -> str:
-        """How far from the camera, as people measure it."""
+        """Distance from the camera, in cm."""
         return f"{self.middle_mm[2] / 10:.1f}".removesuffix(".0") + " cm"
 
     @property
     def turns(self) -> tuple[str, ...]:
-        """How it is turned, in words; nothing for one that faces the camera upright."""
+        """How it is turned, in words; empty for a target that faces the camera upright."""
         return tuple(
             f"{words} {abs(angle):.0f}°"
             for words, angle in (
@@ -153,7 +153,7 @@ class Face:
 
 
 def number(options: Mapping[str, float | str], name: str, default: float = 0.0) -> float:
-    """An option as a number; the default where it is none."""
+    """An option as a number; the default if it is not a number."""
     try:
         return float(options.get(name, default))
     except ValueError:
@@ -161,7 +161,7 @@ def number(options: Mapping[str, float | str], name: str, default: float = 0.0) 
 
 
 def film_text(placement: Placement) -> str:
-    """Whether the film is before the projector, short."""
+    """Whether the film is mounted, in short."""
     return "film on" if placement.film else "film off"
 
 
@@ -172,10 +172,10 @@ def in_words(placement: Placement) -> str:
         how = ", ".join(face.turns) or "facing it"
         first = f"A {name} {face.distance_text} from the camera, {how}."
     elif placement.target == "nothing":
-        first = "Nothing before the camera."
+        first = "Nothing in front of the camera."
     else:
         first = "The target stays as it is."
-    film = "The film is mounted before the projector." if placement.film else "The film is off."
+    film = "The film is mounted in front of the projector." if placement.film else "The film is off."
     nm = placement.filter_nm
-    last = "No filter before the camera." if nm is None else f"A filter of {nm:g} nm before the camera."
+    last = "No filter is on the camera." if nm is None else f"A filter of {nm:g} nm is on the camera."
     return f"{first} {film} {last}"

@@ -10,6 +10,7 @@ from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
 from dsl_app.calibrate.wizard.presentation import step_display
 from dsl_app.calibrate.wizard.state import Seen, WizardState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_core.capture.preview import MANY_SATURATED
@@ -35,14 +36,8 @@ class StepPage(QWidget):
         self.figures = FiguresTable("What the look found")
         self.figures.setFixedHeight(TABLE_PX)
         self._lay_out()
-        self.stops = [
-            state.at.follow(lambda _: self._show()),
-            state.statuses.changed.connect(lambda _: self._show()),
-            state.look.changed.connect(lambda _: self._show()),
-            state.doing.changed.connect(lambda _: self._show()),
-            state.is_checking.changed.connect(lambda _: self._show()),
-            state.seen.follow(self.picture.show_seen),
-        ]
+        shown = (state.at, state.statuses, state.look, state.doing, state.is_checking)
+        self.stops = [*follow_any(self._show, *shown), state.seen.follow(self.picture.show_seen)]
 
     def _lay_out(self) -> None:
         left = QWidget()

@@ -26,6 +26,7 @@ from dsl_app.calibrate.wizard.presentation import Buttons, PageLine, activity, b
 from dsl_app.calibrate.wizard.settings_page import SettingsPage
 from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.calibrate.wizard.step_page import StepPage
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import Banner, label, push_button, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -88,8 +89,7 @@ class CalibrationWizard(QDialog):
             *self.step.stops,
             *self.fit.stops,
             *self.buttons.stops,
-            state.statuses.follow(lambda _: self._show_steps()),
-            state.fit.changed.connect(lambda _: self._show_steps()),
+            *follow_any(self._show_steps, state.statuses, state.fit),
             state.at.changed.connect(lambda _: self._show_page()),
             state.settings.follow(self.settings.show_settings),
             state.settings_trouble.follow(self.settings.say),
@@ -201,9 +201,9 @@ class WizardButtons(QWidget):
     def __init__(self, state: WizardState, commands: WizardController) -> None:
         super().__init__()
         self._state, self._commands = state, commands
-        self.leave = _button("&Leave", "Close; captures and fits are kept, and nothing accepted changes")
+        self.leave = _button("&Leave", "Close the wizard; captures, fits and what was accepted are kept")
         self.back = _button("&Back", "Show the previous page")
-        self.check = _button("Chec&k", "Look repeatedly whether the target is right")
+        self.check = _button("Chec&k", "Check repeatedly whether the target is right")
         self.check.setCheckable(True)
         self.all = _button("Capture a&ll", "Place, look at and capture every step that is left, then fit")
         self.capture = _button("&Capture", "")
@@ -250,18 +250,12 @@ class WizardButtons(QWidget):
         self.discard.clicked.connect(commands.discard)
         self.fit.clicked.connect(commands.fit)
         self.accept.clicked.connect(commands.accept)
+        shown = (state.at, state.doing, state.statuses, state.fit, state.allowed, state.look)
         self.stops = [
-            state.at.changed.connect(lambda _: self._show()),
-            state.doing.changed.connect(lambda _: self._show()),
-            state.statuses.changed.connect(lambda _: self._show()),
-            state.fit.changed.connect(lambda _: self._show()),
-            state.allowed.changed.connect(lambda _: self._show()),
-            state.look.changed.connect(lambda _: self._show()),
-            state.note.changed.connect(lambda _: self._show_activity()),
-            state.progress.changed.connect(lambda _: self._show_activity()),
+            *follow_any(self._show, *shown),
+            *follow_any(self._show_activity, state.note, state.progress),
             state.is_checking.follow(self.check.setChecked),
         ]
-        self._show()
 
     def _show(self) -> None:
         shown = buttons(self._state)

@@ -70,6 +70,6 @@ def test_emission_field_and_white_are_shown(qtbot: QtBot, theme: Theme) -> None:
 def test_an_even_camera_is_said_in_words(qtbot: QtBot) -> None:
     widget = shown(qtbot, "spectralon", calibration(flat_field=EVEN))
     assert widget.field.sentence.isVisible()
-    assert "sees evenly" in widget.field.sentence.text()
+    assert "The camera is even" in widget.field.sentence.text()
     widget.show_fit(Fit(AcceptedCalibration(name="spectralon", title=""), calibration(), session_of({})))
     qtbot.waitUntil(lambda: not widget.field.sentence.isVisible())

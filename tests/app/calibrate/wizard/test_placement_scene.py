@@ -35,15 +35,15 @@ def test_the_placement_is_said_in_words(qtbot: QtBot) -> None:
     qtbot.addWidget(drawing)
     drawing.show_placement(FILTERED)
     assert drawing.accessibleDescription() == (
-        "A white target 65.5 cm from the camera, facing it. The film is mounted before the projector."
-        " A filter of 640 nm before the camera."
+        "A white target 65.5 cm from the camera, facing it. The film is mounted in front of the projector."
+        " A filter of 640 nm is on the camera."
     )
     turned = Placement(
         target="board", film=False, options={"depth_mm": 600.0, "tilt_x_deg": -25.0, "roll_deg": 8.0}
     )
     assert in_words(turned) == (
         "A printed board 60 cm from the camera, upper edge away by 25°, turned clockwise by 8°."
-        " The film is off. No filter before the camera."
+        " The film is off. No filter is on the camera."
     )
     assert in_words(Placement(film=False)).startswith("The target stays as it is. The film is off.")
     assert drawing.accessibleName()
