@@ -1,7 +1,7 @@
 """A placement as a small scene: the corners of the target, what is in the beam, and all of it in words.
 
-Sizes are those of common targets in front of the published rig's camera; a drawing of them tells a person what
-to do and is not a measurement.
+Sizes are those of common targets in front of the published rig's camera; a drawing of them tells a person
+what to do and is not a measurement.
 """
 
 from __future__ import annotations
