@@ -50,7 +50,7 @@ class ExposureSearch:
         return self.found or bool(self.trouble)
 
     def start_from(self, exposure_ms: float) -> float:
-        """The first exposure to try: the one at hand, within the range and on whole cycles."""
+        """The first exposure to try: the current one, within the range and on whole cycles."""
         return min(max(self._whole(exposure_ms), self._low), self._high)
 
     def judge(self, pixels: NDArray[np.uint16], exposure_ms: float) -> float:
@@ -64,10 +64,10 @@ class ExposureSearch:
                     " aperture, or lower the projector's intensity."
                 )
                 return exposure_ms
-            wanted = exposure_ms / SHORTEN
+            following = exposure_ms / SHORTEN
         else:
-            wanted = exposure_ms * min(FILL / max(share, 1e-6), LENGTHEN)
-        following = min(max(self._whole(wanted), self._low), self._high)
+            following = exposure_ms * min(FILL / max(share, 1e-6), LENGTHEN)
+        following = min(max(self._whole(following), self._low), self._high)
         if share < 1.0 and (NEAR <= share <= FILL or following == exposure_ms):
             self._end(share, exposure_ms)
             return exposure_ms

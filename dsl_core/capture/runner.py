@@ -63,7 +63,7 @@ _log = logging.getLogger(__name__)
 class Runner:
     """Runs a plan once; everything but `run` may be called from other threads.
 
-    The runner owns neither the rig nor the sink: who opened them closes them.
+    The runner owns neither the rig nor the sink: whoever opened them closes them.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Runner:
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []
         self._condition = threading.Condition()
-        self._pause_wanted = False
+        self._pause_requested = False
 
     @property
     def status(self) -> Status:
@@ -103,12 +103,12 @@ class Runner:
     def pause(self) -> None:
         """Stop before the next shot until `resume` or `cancel`."""
         with self._condition:
-            self._pause_wanted = True
+            self._pause_requested = True
 
     def resume(self) -> None:
-        """Go on after `pause`."""
+        """Continue after `pause`."""
         with self._condition:
-            self._pause_wanted = False
+            self._pause_requested = False
             self._condition.notify_all()
 
     def cancel(self) -> None:
@@ -124,14 +124,15 @@ class Runner:
         `StoreError` when it cannot be stored, `Cancelled` when someone asked for the end.
         """
         if self._status.state is not State.IDLE:
-            raise RuntimeError("a runner runs once; make a new one to go on with the same sink")
+            raise RuntimeError("a runner runs once; make a new one to continue with the same sink")
         try:
             self._set(State.CHECKING)
             require_possible(self._rig, self._plan)
             self._take_all(list(self._sink.missing()))
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(
-                State.CANCELLED, str(error) or "Interrupted; what is stored stays stored. Resume to go on."
+                State.CANCELLED,
+                str(error) or "Interrupted; what is stored stays stored. Resume it to continue.",
             )
             raise
         except DslError as error:
@@ -157,7 +158,7 @@ class Runner:
             self._report(done)
 
     def _between_shots(self, shot: Shot, done: int) -> None:
-        """Wait while paused; raise `Cancelled` when the end is wanted."""
+        """Wait while paused; raise `Cancelled` once that was requested."""
         if self._must_wait():
             self._pace.hold()
             self._set(State.PAUSED, shot=shot, done=done)
@@ -165,15 +166,15 @@ class Runner:
                 # A token may be cancelled elsewhere without notifying, hence the time-out.
                 while self._must_wait():
                     self._condition.wait(0.1)
-            self._pace.go_on()
+            self._pace.restart()
         if self._token.is_cancelled:
             self._set(State.CANCELLING, shot=shot, done=done)
             raise Cancelled(
-                f"Cancelled after {done} of {self._plan.shot_count} frames; they are stored. Resume to go on."
+                f"Cancelled after {done} of {self._plan.shot_count} frames; they are stored. Resume it to continue."
             )
 
     def _must_wait(self) -> bool:
-        return self._pause_wanted and not self._token.is_cancelled
+        return self._pause_requested and not self._token.is_cancelled
 
     def _report(self, done: int) -> None:
         try:
@@ -181,7 +182,7 @@ class Runner:
         except Cancelled:
             self._token.cancel()  # a finished scan ends as finished; otherwise the next boundary ends it
         except Exception:
-            _log.exception("the progress display failed; the scan goes on")
+            _log.exception("the progress display failed; the scan continues")
 
     def _set(self, state: State, **changes: object) -> None:
         elapsed_s, remaining_s = self._pace.times()
@@ -196,7 +197,7 @@ class Runner:
             try:
                 listener(self._status)
             except Exception:
-                _log.exception("a listener failed; the scan goes on")
+                _log.exception("a listener failed; the scan continues")
 
     def _end(self, state: State, message: str) -> None:
         """Leave the projector dark and say how it ended; a failing projector does not hide the reason."""
@@ -233,7 +234,7 @@ class _Pace:
         self._spent_s = self.times()[0]
         self._since_s = None
 
-    def go_on(self) -> None:
+    def restart(self) -> None:
         self._since_s = self._clock()
 
     def times(self) -> tuple[float, float]:

@@ -68,7 +68,7 @@ class WatchedSink:
         try:
             self._watch(shot, frame)
         except Exception:
-            _log.exception("who watches the scan failed; the scan goes on")
+            _log.exception("a watcher of the scan failed; the scan continues")
 
     def close(self) -> None:
         """Finish the sink."""

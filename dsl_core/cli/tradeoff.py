@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
     from dsl_core.model.rig import Rig
     from dsl_core.planning.choice import Weighed
-    from dsl_core.planning.views import View
+    from dsl_core.planning.samples import SamplePixels
 
 
 def tradeoff(
@@ -149,13 +149,13 @@ def _calibration(devices: DeviceRig, name: str | None) -> Rig:
     return known
 
 
-def _view(rig: Rig, look: Path | None) -> View | None:
+def _view(rig: Rig, look: Path | None) -> SamplePixels | None:
     if look is None:
         return None
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.planning.views import scene_view
+    from dsl_core.planning.samples import scene_samples
 
-    return scene_view(rig, load_result(look))
+    return scene_samples(rig, load_result(look))
 
 
 def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:

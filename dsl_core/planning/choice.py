@@ -16,7 +16,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sett
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
 from dsl_core.planning.prediction import Prediction, predict
-from dsl_core.planning.views import View, plane_view
+from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.solve.front import front
 
@@ -48,7 +48,7 @@ class Weighed:
 def weigh(
     rig: Rig,
     plans: Iterable[CapturePlan],
-    view: View | None = None,
+    view: SamplePixels | None = None,
     *,
     latency_ms: float = 0.0,
     budget_s: float | None = None,
@@ -56,7 +56,7 @@ def weigh(
 ) -> list[Weighed]:
     """Predict every plan that takes no longer than the budget."""
     progress = progress or NoProgress()
-    view = view or plane_view(rig)
+    view = view or plane_samples(rig)
     todo = [plan for plan in plans if budget_s is None or plan.duration_s(latency_ms) <= budget_s]
     found = []
     for done, plan in enumerate(todo, 1):

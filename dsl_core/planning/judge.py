@@ -1,7 +1,7 @@
 """What is expected of a pattern set: its error at virtual pixels of a rig, for spectra drawn at random.
 
 Every set is judged by the reconstruction's own estimators at virtual pixels (see `virtual`): noise of the
-bracket, saturation, columns and prior included. The pixels lie where first orders reach all bands, as
+bracket, saturation, columns and prior included. The pixels are where first orders reach all bands, as
 elsewhere the prior decides whatever is shown; the spectra are random, from calm to narrow. The error of a
 set is the geometric mean of its errors over the spectra, so that none outweighs the others.
 """
@@ -19,12 +19,12 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.planning.references import FINE_NM
-from dsl_core.planning.views import View, plane_view
+from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.solve.threads import one_kernel_thread
 
 Floats = NDArray[np.float64]
-#: Where the pixels lie: depths as shares of the rig's range, and pixels across and down.
+#: Where the pixels are: depths as shares of the rig's range, and pixels across and down.
 DEPTHS, PLACES = (0.3, 0.8), (9, 2)
 #: Fewer pixels with all bands are not enough; then those without count as well.
 LEAST_PLACES = 4
@@ -54,10 +54,10 @@ class Judge:
         self.spectra = training_spectra()
         self.view = self._places()
 
-    def _places(self) -> View:
+    def _places(self) -> SamplePixels:
         low, high = self.rig.depth_range_mm
-        views = [plane_view(self.rig, low + share * (high - low), PLACES) for share in DEPTHS]
-        some = [_part(view, self._complete(view)) for view in views]
+        views = [plane_samples(self.rig, low + share * (high - low), PLACES) for share in DEPTHS]
+        some = [view.part(self._complete(view)) for view in views]
         if sum(len(view.pixels) for view in some) >= LEAST_PLACES:
             views = some
         first = views[0]
@@ -71,7 +71,7 @@ class Judge:
             )
         return first
 
-    def _complete(self, view: View) -> NDArray[np.bool_]:
+    def _complete(self, view: SamplePixels) -> NDArray[np.bool_]:
         """Whether first orders reach every band at the samples of a view."""
         nm, lens = self.grid.centres_nm, self.rig.projector
         pixels, depth = torch.as_tensor(view.pixels), torch.as_tensor(view.depth_mm)
@@ -103,13 +103,3 @@ def training_spectra() -> Floats:
         weights = random.standard_normal((count, len(size))) * size
         rows += list(0.02 + 0.93 / (1 + np.exp(0.4 - weights @ waves)))
     return np.stack(rows)
-
-
-def _part(view: View, chosen: NDArray[np.bool_]) -> View:
-    return replace(
-        view,
-        pixels=view.pixels[chosen],
-        depth_mm=view.depth_mm[chosen],
-        shading=view.shading[chosen],
-        incidence_tan=view.incidence_tan[chosen],
-    )

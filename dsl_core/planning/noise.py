@@ -23,7 +23,7 @@ class Bracket:
     """Gains (ms at full drive), exposures and the sensor of a plan's settings; radiances are in DN per ms.
 
     ``black`` is the radiance of the projector's black, which no level dims: what a black frame holds of it is
-    taken off, its shot noise is not. Beside the first orders of a dark setting it is most of the light.
+    taken off, its shot noise is not. Next to the first orders of a dark setting it is most of the light.
     """
 
     gains_ms: tuple[float, ...]
@@ -75,7 +75,7 @@ def demosaic_factors(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]
 
 
 def sideways_shares(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Share of each colour at pixels that bilinear means take from the columns beside, (pixels, 3)."""
+    """Share of each colour at pixels that bilinear means take from neighbouring columns, (pixels, 3)."""
     return _by_neighbours(rig, pixels, own=0.0, cross=0.5, beside=1.0, below=0.0, diagonal=1.0)
 
 
@@ -89,7 +89,7 @@ def _by_neighbours(
     below: float,
     diagonal: float,
 ) -> NDArray[np.float64]:
-    """A value for each colour at pixels by where its nearest samples lie, (pixels, 3)."""
+    """A value for each colour at pixels by where its nearest samples are, (pixels, 3)."""
     tile = bayer_channels(rig.sensor.bayer, 2, 2)
     y, x = np.divmod(pixels, rig.camera.width_px)
     found = np.empty((len(pixels), 3))

@@ -23,7 +23,7 @@ from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.planning import references
 from dsl_core.planning.references import References
-from dsl_core.planning.views import View, plane_view
+from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.planning.virtual import Outcome, VirtualPixels
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
 from dsl_core.solve.threads import one_kernel_thread
@@ -72,7 +72,7 @@ class Prediction(Record):
 def predict(
     rig: Rig,
     plan: CapturePlan,
-    view: View | None = None,
+    view: SamplePixels | None = None,
     *,
     grid: WavelengthGrid | None = None,
     palette: References | None = None,
@@ -96,13 +96,13 @@ def predict(
         }
     )
     with one_kernel_thread():
-        return _predict(rig, plan, view or plane_view(rig, REFERENCE_MM), grid, palette, latency_ms, peaks)
+        return _predict(rig, plan, view or plane_samples(rig, REFERENCE_MM), grid, palette, latency_ms, peaks)
 
 
 def _predict(
     rig: Rig,
     plan: CapturePlan,
-    view: View,
+    view: SamplePixels,
     grid: WavelengthGrid,
     palette: References | None,
     latency_ms: float,
@@ -132,7 +132,7 @@ def _predict(
     )
 
 
-def _nodes(view: View, bands: Bands, palette: References) -> Floats:
+def _nodes(view: SamplePixels, bands: Bands, palette: References) -> Floats:
     """True spectra (samples, spectra, internal bands): the view's own, or the palette everywhere."""
     if view.spectra is not None and view.wavelengths_nm is not None:
         rows = [np.interp(bands.centres_nm, view.wavelengths_nm, row) for row in view.spectra]
@@ -165,17 +165,10 @@ class _Errors:
         )
 
 
-def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: View) -> float | None:
+def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: SamplePixels) -> float | None:
     """Mean width of 10 nm filters without noise, from data of a fine spectral model; None if none is seen."""
     some = np.linspace(0, len(view.pixels) - 1, PEAK_SAMPLES).round().astype(int)
-    part = replace(
-        view,
-        pixels=view.pixels[some],
-        depth_mm=view.depth_mm[some],
-        shading=view.shading[some],
-        incidence_tan=view.incidence_tan[some],
-        spectra=None,
-    )
+    part = replace(view.part(some), spectra=None)
     pixels = VirtualPixels(rig, plan, grid, part)
     fine = Bands.of(rig, WavelengthGrid(start_nm=grid.start_nm, stop_nm=grid.stop_nm, step_nm=FINE_STEP_NM))
     filters = references.peaks()

@@ -30,7 +30,7 @@ from dsl_core.optics.pixel_model import (
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel, sideways_shares
-from dsl_core.planning.views import View
+from dsl_core.planning.samples import SamplePixels
 from dsl_core.reconstruction.columns.column import Column, refine
 from dsl_core.reconstruction.columns.pattern_column import first_order_share, refine_by_profiles
 from dsl_core.reconstruction.geometry import LIT_SIGMAS
@@ -110,7 +110,7 @@ class VirtualPixels:
         rig: Rig,
         plan: CapturePlan,
         grid: WavelengthGrid,
-        view: View,
+        view: SamplePixels,
         *,
         prior: Prior | None = None,
         surface_window_px: int | None = None,

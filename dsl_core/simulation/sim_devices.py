@@ -82,7 +82,7 @@ class SimCamera(Camera):
         """Expose and return the frame."""
         world = self.world
         pixels = world.expose(self._exposure_ms, self._shot + 1, self._attempt)
-        # Whoever looks twice without announcing a shot sees other noise.
+        # A second look without announcing a shot has other noise.
         self._attempt += 1
         world.clock.wait(self._exposure_ms / 1000)
         self._frame_id += 1
@@ -181,7 +181,7 @@ def spot_light(world: World, spot: tuple[int, int], wavelengths_nm: Floats) -> F
     emission = np.stack([curve.at(wavelengths_nm) for curve in rig.emission])
     column, row = (float(q[0]) for q in zero_order(rig, pixel, depth))
     total = (_drive(world, np.array([column]), np.array([row])) * emission).sum(0)
-    nm = wavelengths_nm.copy()  # torch wants to own what it reads
+    nm = wavelengths_nm.copy()  # torch needs a writable copy
     for order in (1, -1) if world.setup.film else ():
         columns, rows = (q[:, 0].numpy() for q in GratingModel(rig).exact(pixel, depth, order, nm))
         share = rig.efficiency[order].at(wavelengths_nm)

@@ -24,7 +24,7 @@ from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json
 from tests.benchmarks.front_cases import front_cases
 from tests.benchmarks.sweep import Case, Point, run_sweep, write_csv
-from tests.cases.trial import trial_view
+from tests.cases.trial import trial_samples
 
 PERIOD_MS = 1000 / 60
 CLOSE = 0.20
@@ -69,7 +69,7 @@ def all_cases(rig: Rig) -> list[Case]:
 
 
 def _predict(rig: Rig, case: Case) -> Prediction:
-    view = trial_view(binned(rig, case.binning), references.chart())
+    view = trial_samples(binned(rig, case.binning), references.chart())
     grid = WavelengthGrid(step_nm=case.step_nm)
     return predict(rig, case.plan, view, grid=grid, binning=case.binning, latency_ms=LATENCY_MS)
 

@@ -22,7 +22,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.references import FINE_NM, References
-from dsl_core.planning.views import View, pixels_view
+from dsl_core.planning.samples import SamplePixels, chosen_samples
 from dsl_core.reconstruction.surface import default_window_px
 from dsl_core.simulation.rendered_scene import Setup
 from dsl_core.simulation.scenes import materials
@@ -113,7 +113,7 @@ def chart_scene(rig: Rig, palette: Palette, depth_mm: float) -> Scene:
     return Scene("chart", "a small chart", (tilted(centre, 0.0, 0.0, ENDLESS, paint),), colours)
 
 
-def trial_view(rig: Rig, palette: Palette, depth_mm: float = 700.0) -> View:
+def trial_samples(rig: Rig, palette: Palette, depth_mm: float = 700.0) -> SamplePixels:
     """Pixels that trials take their figures from, with the spectra of their patches.
 
     Half of the inside of each patch, from all of its columns. Coarse patterns leave a few columns of the
@@ -129,7 +129,7 @@ def trial_view(rig: Rig, palette: Palette, depth_mm: float = 700.0) -> View:
             for y, x in _two_a_column(np.argwhere(inside & (truth.material == material))):
                 pixels.append((top + y) * rig.camera.width_px + left + x)
                 spectra.append(palette.spectra[material])
-    view = pixels_view(rig, np.array(pixels, np.int64), depth_mm)
+    view = chosen_samples(rig, np.array(pixels, np.int64), depth_mm)
     return replace(view, spectra=np.array(spectra), wavelengths_nm=FINE_NM)
 
 

@@ -19,7 +19,7 @@ from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.demosaic import demosaic_variance
 from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, demosaic_blur_px, without_offset
 from dsl_core.optics.spectra import ORDERS, SECOND_ORDERS
-from dsl_core.planning.views import pixels_view
+from dsl_core.planning.samples import chosen_samples
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.reconstruction.spectral import dense_solver
 from dsl_core.reconstruction.spectral import solver as banded_solver
@@ -77,7 +77,7 @@ class Readers:
 
     def virtual(self) -> VirtualPixels:
         """The prediction."""
-        view = pixels_view(self.rig, np.array([self.flat]), DEPTH_MM)
+        view = chosen_samples(self.rig, np.array([self.flat]), DEPTH_MM)
         return VirtualPixels(self.rig, self.plan, GRID, view, dtype=torch.float64)
 
     @property

@@ -8,7 +8,7 @@ import torch
 
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.planning.views import plane_view
+from dsl_core.planning.samples import plane_samples
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.threads import one_kernel_thread
@@ -25,7 +25,7 @@ SETTINGS = (Setting(exposure_ms=1000 / 6, level=0.2), Setting(exposure_ms=1000 /
 def test_the_truth_lies_in_the_band_that_is_stated(spectral: LineComb | ScanLines) -> None:
     rig = published_rig()
     plan = CapturePlan(code=GrayCode(rows=False), spectral=spectral, settings=SETTINGS)
-    pixels = VirtualPixels(rig, plan, WavelengthGrid(), plane_view(rig, 700.0))
+    pixels = VirtualPixels(rig, plan, WavelengthGrid(), plane_samples(rig, 700.0))
     nodes = np.tile(np.repeat(DARK[:, None], pixels.bands.count, 1), (len(pixels.pixels), 1, 1))
     with one_kernel_thread():
         found = pixels.run(nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))

@@ -21,7 +21,7 @@ from dsl_core.planning.choice import Weighed, candidate_plans, choose, pareto, p
 from dsl_core.planning.designed import DesignedSet, load_design, packed, save_design
 from dsl_core.planning.prediction import Prediction
 from dsl_core.planning.report import write_tradeoff_report
-from dsl_core.planning.views import plane_view
+from dsl_core.planning.samples import plane_samples
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.front import front
 
@@ -65,7 +65,7 @@ def test_a_budget_that_is_no_time_is_refused(text: str) -> None:
 def test_real_plans_are_weighed_and_written(tmp_path: Path) -> None:
     rig = published_rig()
     quick = sorted(candidate_plans(rig), key=lambda plan: plan.duration_s(50))[:3]
-    found = weigh(rig, quick, plane_view(rig, grid=(3, 1)), latency_ms=50)
+    found = weigh(rig, quick, plane_samples(rig, grid=(3, 1)), latency_ms=50)
     best = choose(found)
     path = save_plan(best.plan, tmp_path / "plan.json")
     assert load_plan(path) == best.plan

@@ -9,9 +9,9 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, NoCode, NoSpect
 from dsl_core.model.presets import PRESETS, Preset
 from dsl_core.planning import references
 from dsl_core.planning.prediction import Prediction, predict
-from dsl_core.planning.views import plane_view
+from dsl_core.planning.samples import plane_samples
 from dsl_core.simulation.published_rig import published_rig
-from tests.cases.trial import run_trial, trial_view
+from tests.cases.trial import run_trial, trial_samples
 
 BRIGHT = (Setting(exposure_ms=1000 / 6, level=0.2), Setting(exposure_ms=1000 / 3, level=0.8))
 
@@ -25,7 +25,7 @@ def plan(spectral: ScanLines | LineComb, *settings: Setting) -> CapturePlan:
 
 def figures(spectral: ScanLines | LineComb, *settings: Setting) -> Prediction:
     rig = published_rig()
-    return predict(rig, plan(spectral, *settings), plane_view(rig, grid=(4, 2)), latency_ms=50)
+    return predict(rig, plan(spectral, *settings), plane_samples(rig, grid=(4, 2)), latency_ms=50)
 
 
 def test_less_light_and_fewer_lines_cost_accuracy() -> None:
@@ -43,7 +43,7 @@ def test_less_light_and_fewer_lines_cost_accuracy() -> None:
 def test_every_preset_has_an_error_that_is_a_number(preset: Preset) -> None:
     # A single long setting saturates, so that columns stay unrefined and their amplitudes unknown.
     rig = published_rig()
-    found = predict(rig, preset.plan, plane_view(rig, grid=(4, 2)), latency_ms=50, peaks=False)
+    found = predict(rig, preset.plan, plane_samples(rig, grid=(4, 2)), latency_ms=50, peaks=False)
     assert 0 < found.pixel_rmse < 0.3
     assert 0 < found.depth_std_mm < 10
 
@@ -67,7 +67,7 @@ def test_a_plan_without_patterns_or_code_is_refused() -> None:
 def test_the_twin_agrees(spectral: ScanLines | LineComb) -> None:
     """The comb leaves columns unrefined, which puts the zero order where the model does not expect it."""
     rig, chart = published_rig(), references.chart()
-    found = predict(rig, plan(spectral), trial_view(rig, chart), peaks=False)
+    found = predict(rig, plan(spectral), trial_samples(rig, chart), peaks=False)
     measured = run_trial(rig, plan(spectral), chart)
     assert found.pixel_rmse == pytest.approx(measured.pixel_rmse, rel=0.2)
     assert found.depth_std_mm == pytest.approx(measured.depth_rmse_mm, rel=0.4)

@@ -16,7 +16,7 @@ from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import Bands
 from dsl_core.patterns.images import pattern_image
 from dsl_core.planning.noise import own_channel
-from dsl_core.planning.views import plane_view
+from dsl_core.planning.samples import plane_samples
 from dsl_core.planning.virtual import VirtualPixels
 from dsl_core.reconstruction.columns.column import Column
 from dsl_core.reconstruction.columns.pattern_column import (
@@ -95,7 +95,7 @@ def test_first_orders_of_a_coloured_surface_move_columns_less_when_they_are_mode
     """Lines in an order of their own put other first orders under their two edges."""
     rig, random = published_rig(), random_columns()
     plan = CapturePlan(code=GrayCode(rows=False), spectral=random)
-    pixels = VirtualPixels(rig, plan, WavelengthGrid(step_nm=10), plane_view(rig, grid=(12, 4)))
+    pixels = VirtualPixels(rig, plan, WavelengthGrid(step_nm=10), plane_samples(rig, grid=(12, 4)))
     ramp = np.tile(np.linspace(0.2, 0.6, pixels.bands.count), (len(pixels.pixels), 1, 1))
     first, zero = pixels.signals(torch.as_tensor(ramp, dtype=torch.float32))
     own = torch.as_tensor(own_channel(rig, pixels.view.pixels))

@@ -141,7 +141,7 @@ def test_leaving_out_everything_ends_in_an_ideal_rig() -> None:
     assert world.rig.camera.distortion != rig.camera.distortion
 
 
-def test_a_moved_stage_and_a_brighter_exposure_are_decided_anew() -> None:
+def test_a_moved_stage_and_a_brighter_exposure_are_decided_again() -> None:
     world = world_of("plane", request=EffectRequest(Choice.of("auto")), noise=False)
     world.scene_at = lambda position_mm: world_of("box" if position_mm > 750 else "plane").scene
     assert world.path.extra("interreflection") is None

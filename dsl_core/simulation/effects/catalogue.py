@@ -74,7 +74,7 @@ USUAL_CHOICE = Choice("usual", USUAL)
 def with_effects(path: LightPath, names: Collection[str]) -> LightPath:
     """The path of a world where everything happens, without all but some effects.
 
-    In the order of `EFFECTS`: distortion before shadow, as a lens without it sees the scene anew.
+    In the order of `EFFECTS`: distortion before shadow, as the scene is rendered again for a lens without it.
     """
     for effect in EFFECTS:
         if effect.name not in names:

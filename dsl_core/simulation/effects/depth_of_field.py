@@ -73,9 +73,7 @@ class DepthOfField(ExtraEffect):
         share += 1 - _CameraStep.of(blurs.camera_px).kept()
         widest = float(blurs.camera_px.max()) / _DISC
         reason = (
-            f"circles of confusion reach {widest:.2g} px"
-            if share
-            else "all that is in view lies in one depth"
+            f"circles of confusion reach {widest:.2g} px" if share else "all that is in view is at one depth"
         )
         return limits.of_share(SLACK * share, reason)
 
@@ -134,12 +132,12 @@ def _blur(depth_mm: Floats, scale: float) -> Floats:
     if not len(known):
         return np.zeros(depth_mm.shape)
     circle = scale * np.abs(1 / depth_mm - 1 / float(np.median(known)))
-    # What rounding of depths leaves of a plane is no defocus.
+    # Depths of a plane that differ by rounding are not defocus.
     return np.asarray(np.where(circle > 1e-9, _DISC * np.nan_to_num(circle), 0.0))
 
 
 def layers(sigma_px: Floats) -> tuple[list[float], list[NDArray[np.float32]]]:
-    """Blurs to render, and at every pixel the weights by which they are mixed; the first is no blur.
+    """Blurs to render, and at every pixel the weights by which they are mixed; the first is 0.
 
     Mixed are neighbouring blurs, so that the variance is that of the pixel.
     """

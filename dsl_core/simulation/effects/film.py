@@ -15,7 +15,7 @@ from dsl_core.simulation.effects.tolerance import EffectBound
 from dsl_core.simulation.rendering.spectral_tables import NM
 
 FIRST, SECOND = (1, -1), (2, -2)
-#: Pixels at which orders are traced, across and down, and how far columns may lie beside those between, px.
+#: Pixels at which orders are traced, across and down, and how far columns in between may be off, px.
 _RASTER, _MARGIN_PX = (25, 17), 20.0
 
 
@@ -56,7 +56,7 @@ class SecondOrders(Effect):
         if not limits.path.film:
             return limits.of_dn(0.0, "there is no film")
         if not reaches(limits.path, SECOND):
-            return limits.of_dn(0.0, "their columns lie outside the projector's frame")
+            return limits.of_dn(0.0, "their columns are outside the projector's frame")
         reflectance = limits.path.truth.materials.at(NM)
         share = limits.white(reflectance, SECOND) / limits.from_orders(reflectance, limits.path.orders)
         return limits.of_share(float(share.max()), "their columns reach into the projector's frame")
@@ -69,7 +69,7 @@ class SecondOrders(Effect):
 def reaches(path: LightPath, orders: tuple[int, ...]) -> bool:
     """Whether any pixel sees light of some orders from inside the projector's frame, or nearly.
 
-    Traced on a raster of pixels; columns vary so smoothly that the margin covers what lies between.
+    Traced on a raster of pixels; columns vary so smoothly that the margin covers what is between.
     """
     lens, depth = path.rig.camera, path.truth.depth_mm
     across, down = (

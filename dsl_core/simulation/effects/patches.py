@@ -24,7 +24,7 @@ _GRAZING = 0.02
 #: Form factors below this are rounding.
 _FAINT = 1e-9
 #: Ends of a line of sight that cannot be blocked, as a share of it; places looked at over a height field, and
-#: how deep they must lie in it, mm.
+#: how deep in it they must be, mm.
 _ENDS, _STEPS, _DEEP_MM = 0.02, 12, 1.0
 
 

@@ -16,7 +16,7 @@ from dsl_core.simulation.effects.tolerance import ONE_DN, EffectBound, Tolerance
 class Decision:
     """Whether an effect is rendered, and why.
 
-    What it costs is seconds of computing a frame, beside the rendering in three ``colours`` that some share.
+    ``cost_s`` is seconds of computing a frame, without the rendering in three ``colours`` that some share.
     """
 
     effect: Effect

@@ -32,7 +32,7 @@ class Specular(ExtraEffect):
 
     ``D F G / (4 (n.l) (n.v))`` with Schlick's Fresnel term and Smith's masking (B. Walter et al., EGSR 2007),
     times pi to compare with a perfect diffuser. Light is taken to come from the projector's centre;
-    diffracted light comes from the film up to 10 mm beside it, a small part of any highlight's width.
+    diffracted light comes from the film up to 10 mm next to it, a small part of any highlight's width.
     """
 
     name = "specular"

@@ -1,4 +1,4 @@
-"""Subsurface scattering: light that leaves a translucent material beside where it entered."""
+"""Subsurface scattering: light that leaves a translucent material next to where it entered."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def profile(spread_px: float) -> Floats:
 
 @dataclass(frozen=True)
 class _Region:
-    """One translucent material: the window it lies in, its pixels there, profiles and their sums."""
+    """One translucent material: the window that holds it, its pixels there, profiles and their sums."""
 
     window: tuple[slice, slice]
     inside: NDArray[np.bool_]

@@ -57,7 +57,7 @@ class Shadow(Effect):
             surface_shading(path.rig, path.truth), surface_shading(path.rig, path.truth, False)
         )
         most = float(limits.per_pixel(np.where(hidden, shading, 0.0)).max())
-        reason = f"{100 * float(hidden.mean()):.2g} % of the pixels lie in shadow"
+        reason = f"{100 * float(hidden.mean()):.2g} % of the pixels are in shadow"
         return limits.of_light(SLACK * most * limits.amplification, reason)
 
     def leave_out(self, path: LightPath) -> LightPath:

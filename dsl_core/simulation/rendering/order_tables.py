@@ -31,7 +31,7 @@ class OrderTables:
     middle_px: Tensor  # (A,) column of the middle wavelength
     spread_px: Tensor  # (A,) scale of the columns in the inverse polynomial
     inverse: Tensor  # (DEGREE + 1, A): wavelength minus middle, as polynomial of scaled column
-    limits_nm: tuple[Tensor, Tensor]  # wavelengths whose row lies inside the frame
+    limits_nm: tuple[Tensor, Tensor]  # wavelengths whose row is inside the frame
     reach_px: tuple[Tensor, Tensor]  # smallest and largest column
     sigma_nm: float
     spectra: SpectralTables
@@ -97,7 +97,7 @@ def _horner(coefficients: Tensor, t: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _row_limits(rows: Tensor, height: int) -> tuple[Tensor, Tensor]:
-    """Wavelengths whose row lies inside the frame, from rows at the first, middle and last wavelength."""
+    """Wavelengths whose row is inside the frame, from rows at the first, middle and last wavelength."""
     first, last = rows[0], rows[2]
     slope = (last - first) / float(NM[-1] - NM[0])
     slope = torch.where(slope.abs() < 1e-6, torch.full_like(slope, 1e-6), slope)

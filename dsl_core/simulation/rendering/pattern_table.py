@@ -103,7 +103,7 @@ class PatternTable:
         kept = self.oversample[0]
         samples = (at + 0.5) * kept
         reached = _lookup(first[led], samples, None)
-        # Beyond the frame there is no light: the integral stays, its own goes on with it.
+        # Beyond the frame there is no light: the integral is constant, and its own integral still rises.
         beyond = (samples - (first.shape[2] - 1)).clip(min=0) / kept
         return Edge(at, reached, _lookup(second[led], samples, None) + reached * beyond)
 
@@ -123,7 +123,7 @@ class PatternTable:
         return (above - below) / (stop - start)
 
     def inside(self, start: Tensor, stop: Tensor) -> Tensor:
-        """Share of stretches between columns (px) that lies inside the frame."""
+        """Share of stretches between columns (px) that is inside the frame."""
         above, below = ((column + 0.5).clip(0, self.width_px) for column in (stop, start))
         return (above - below) / (stop - start)
 

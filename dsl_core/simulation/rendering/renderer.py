@@ -41,7 +41,7 @@ class Renderer:
     """Expected signal of one scene on one rig, in DN per ms above black.
 
     ``parts`` are what light comes from as `SceneTruth.parts` lists it, which is what they are if not given;
-    ``orders`` those of the film beside the zero order.
+    ``orders`` those of the film besides the zero order.
     """
 
     def __init__(

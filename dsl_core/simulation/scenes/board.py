@@ -117,13 +117,13 @@ def _markers(printed: Charuco) -> _Markers:
     import cv2
 
     if not hasattr(cv2.aruco, printed.dictionary):
-        raise PlanError(f"OpenCV knows no markers {printed.dictionary!r}. Use a name like DICT_5X5_100.")
+        raise PlanError(f"OpenCV has no markers {printed.dictionary!r}. Use a name like DICT_5X5_100.")
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, printed.dictionary))
-    wanted, there = printed.columns * printed.rows // 2, len(dictionary.bytesList)
-    if there < wanted:
+    needed, found = printed.columns * printed.rows // 2, len(dictionary.bytesList)
+    if found < needed:
         raise PlanError(
-            f"A board of {printed.columns} x {printed.rows} squares needs {wanted} markers;"
-            f" {printed.dictionary} has {there}. Choose a larger dictionary."
+            f"A board of {printed.columns} x {printed.rows} squares needs {needed} markers;"
+            f" {printed.dictionary} has {found}. Choose a larger dictionary."
         )
     size = (printed.columns, printed.rows)
     layout = cv2.aruco.CharucoBoard(size, float(printed.square_mm), float(printed.marker_mm), dictionary)

@@ -53,7 +53,7 @@ def scene_catalogue() -> tuple[SceneEntry, ...]:
 def make_scene(name: str, **options: Option) -> Scene:
     """Build a scene by name; options may be text, as typed on a command line.
 
-    Raises `PlanError` for an unknown name or option, or a value that is no number or out of range.
+    Raises `PlanError` for an unknown name or option, or a value that is not a number or is out of range.
 
     >>> make_scene("plane", depth_mm="650").name
     'plane'

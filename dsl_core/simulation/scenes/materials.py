@@ -89,7 +89,7 @@ def dyed_leaf() -> Spectrum:
 
 
 #: Molar extinction of oxygenated haemoglobin, 1/(cm mol/l), as compiled by Prahl
-#: (omlc.org/spectra/hemoglobin) from Gratzer and Kollias; the double dip of skin lies at 542 and 577 nm.
+#: (omlc.org/spectra/hemoglobin) from Gratzer and Kollias; the double dip of skin is at 542 and 577 nm.
 # fmt: off
 _HBO2_NM = (
     400, 410, 420, 430, 440, 450, 460, 470, 480, 490, 500, 510, 520, 530, 540, 550, 560, 570, 577,

@@ -66,7 +66,7 @@ def sphere(
 
 
 def wax(depth_mm: float = 700.0) -> Scene:
-    """A block and a ball of wax before a dark wall: light leaves them beside where it entered."""
+    """A block and a ball of wax before a dark wall: light leaves them next to where it entered."""
     check_range("depth_mm", depth_mm, 400, 2000, "mm")
     block = Block(
         np.array([_CX - 110.0, _CY - 70.0, depth_mm]), np.array([_CX, _CY + 70.0, depth_mm + 60]), 0

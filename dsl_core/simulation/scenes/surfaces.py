@@ -165,7 +165,7 @@ class Block:
         return np.where((enter <= leave) & (enter > 0), enter, np.inf)
 
     def normals(self, points: Floats) -> Floats:
-        """See `Surface`: the axis whose face lies nearest."""
+        """See `Surface`: the axis whose face is nearest."""
         gap = np.minimum(np.abs(points - self.low_mm[:, None]), np.abs(points - self.high_mm[:, None]))
         result = np.zeros_like(points)
         axis = gap.argmin(axis=0)
@@ -223,7 +223,7 @@ def height_field(height: Height, half_size_mm: tuple[float, float], painter: Pai
     """A height field whose range and steepest slope are taken from a 1 mm raster of its middle part.
 
     Outside ``half_size_mm`` the height must be flatter and deeper than inside. A tenth is added to the slope
-    and a millimetre to the range for what lies between the samples.
+    and a millimetre to the range for what is between the samples.
     """
     x, y = np.meshgrid(*[np.arange(-half, half + 0.5) for half in half_size_mm])
     z = height(x.ravel(), y.ravel()).reshape(x.shape)
@@ -268,7 +268,7 @@ def materials_along(surfaces: tuple[Surface, ...], rays: Floats) -> NDArray[np.i
 
 
 def _first(surfaces: tuple[Surface, ...], rays: Floats) -> tuple[Floats, NDArray[np.int64]]:
-    """Depth of the first hit of every ray, inf for none, and which surface it lies on, -1 for none."""
+    """Depth of the first hit of every ray, inf for none, and which surface it is on, -1 for none."""
     nearest = np.full(rays.shape[1], np.inf)
     owner = np.full(rays.shape[1], -1)
     for index, surface in enumerate(surfaces):

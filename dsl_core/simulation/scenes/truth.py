@@ -17,7 +17,7 @@ from dsl_core.simulation.scenes.surfaces import Surface, materials_along, trace
 FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
 FINE_NM.setflags(write=False)
 
-#: The optical centre of the published camera lies beside the middle of its image; at 700 mm by this much.
+#: The optical centre of the published camera is not in the middle of its image; at 700 mm it is off by this much.
 IMAGE_CENTRE_MM = (6.0, -2.0)
 #: What light comes from: pixel, material and share of the pixel, each (n,).
 Parts = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]
@@ -164,8 +164,8 @@ class Scene:
         )
 
     def _mixed(self, camera: Lens, material: NDArray[np.int32]) -> MixedPixels:
-        """Shares of two materials at pixels beside others; writes the larger one into ``material``."""
-        edges = np.flatnonzero(_beside_others(material))
+        """Shares of two materials at pixels next to others; writes the larger one into ``material``."""
+        edges = np.flatnonzero(_next_to_others(material))
         row, column = np.divmod(edges, camera.width_px)
         across, down = _spots(EDGE_RAYS)
         counts = np.zeros((len(edges), len(self.materials.names)), np.int64)
@@ -184,7 +184,7 @@ class Scene:
         return MixedPixels(edges[two], order[two, 1].astype(np.int32), share)
 
 
-def _beside_others(material: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _next_to_others(material: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Pixels one of whose eight neighbours is of another material."""
     padded = np.pad(material, 1, mode="edge")
     around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
@@ -202,5 +202,5 @@ def _spots(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 def check_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
     """Raise `PlanError` unless ``low <= value <= high``."""
     if not low <= value <= high:
-        wanted = f"{low:g} and {high:g} {unit}".rstrip()
-        raise PlanError(f"Option {name} must lie between {wanted}, not {value:g}.")
+        allowed = f"{low:g} and {high:g} {unit}".rstrip()
+        raise PlanError(f"Option {name} must be between {allowed}, not {value:g}.")

@@ -20,7 +20,7 @@ from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     from dsl_core.planning.prediction import Prediction
-    from dsl_core.planning.views import View
+    from dsl_core.planning.samples import SamplePixels
 
 #: Interval at which to check whether other work has ended, s.
 LOOK_S = 0.1
@@ -83,7 +83,7 @@ class ForecastJob:
         self._lock = threading.Lock()
         self._wanted: CapturePlan | None = None
         self._news: list[ForecastPoint | Refused] = []
-        self._view: View | None = None
+        self._view: SamplePixels | None = None
 
     # In the window's thread ------------------------------------------------------------------------
 
@@ -161,22 +161,22 @@ class ForecastJob:
         store.keep(sized, found)
         return ForecastPoint(plan, found, preset)
 
-    def _look(self) -> View:
+    def _look(self) -> SamplePixels:
         """Sample pixels of the scene; raises `DslError` if there are none."""
-        from dsl_core.planning.views import plane_view, scene_view
+        from dsl_core.planning.samples import plane_samples, scene_samples
 
         if self._view is not None:
             return self._view
         rig, look = self.rigging.rig, self.rigging.look
         if look is None:
-            self._view = plane_view(rig)
+            self._view = plane_samples(rig)
         else:
             from dsl_core.io.result.result_file import load_result
 
-            self._view = scene_view(rig, load_result(look))
+            self._view = scene_samples(rig, load_result(look))
         return self._view
 
-    def _predict(self, plan: CapturePlan, view: View) -> Prediction:
+    def _predict(self, plan: CapturePlan, view: SamplePixels) -> Prediction:
         from dsl_core.planning.prediction import predict
 
         return predict(self.rigging.rig, plan, view, latency_ms=self.rigging.latency_ms)

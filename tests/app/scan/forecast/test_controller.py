@@ -226,11 +226,11 @@ def test_the_scene_of_a_result_can_be_planned_for(
 ) -> None:
     seen: list[object] = []
 
-    def scene_view(rig: Rig, result: object) -> str:
+    def scene_samples(rig: Rig, result: object) -> str:
         seen.append(result)
         return "the scene"
 
-    monkeypatch.setattr(views, "scene_view", scene_view)
+    monkeypatch.setattr(views, "scene_samples", scene_samples)
     control = forecast(bench, tmp_path)
     state, done = control.state, len(counted)
     look = save_result(load_result(write_small_result(tmp_path)).load(), tmp_path / "first.zarr")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +27,7 @@ RIM = 0.04
 
 
 @dataclass(frozen=True)
-class View:
+class SamplePixels:
     """Sample pixels: flat indices, depth, shading and incidence, each of shape (samples,).
 
     ``lit_share`` is the share of the picture that the projector lights. ``spectra`` (samples, bands) at
@@ -42,8 +42,19 @@ class View:
     spectra: Floats | None = None
     wavelengths_nm: Floats | None = None
 
+    def part(self, chosen: NDArray[np.bool_] | NDArray[np.int64]) -> SamplePixels:
+        """Some of the samples, by a mask or by their numbers."""
+        return replace(
+            self,
+            pixels=self.pixels[chosen],
+            depth_mm=self.depth_mm[chosen],
+            shading=self.shading[chosen],
+            incidence_tan=self.incidence_tan[chosen],
+            spectra=None if self.spectra is None else self.spectra[chosen],
+        )
 
-def plane_view(rig: Rig, depth_mm: float = 700.0, grid: tuple[int, int] = GRID) -> View:
+
+def plane_samples(rig: Rig, depth_mm: float = 700.0, grid: tuple[int, int] = GRID) -> SamplePixels:
     """A plane that faces the camera, where the projector lights it; raises `PlanError` if nowhere."""
     depth = _plane(depth_mm).depth_mm(rig)
     lit = _inside(rig, depth)
@@ -55,7 +66,7 @@ def plane_view(rig: Rig, depth_mm: float = 700.0, grid: tuple[int, int] = GRID) 
     return _of_plane(rig, depth_mm, _spread(lit, grid), float(lit.mean()))
 
 
-def pixels_view(rig: Rig, pixels: NDArray[np.int64], depth_mm: float = 700.0) -> View:
+def chosen_samples(rig: Rig, pixels: NDArray[np.int64], depth_mm: float = 700.0) -> SamplePixels:
     """Chosen pixels (flat indices) of a plane that faces the camera."""
     return _of_plane(rig, depth_mm, pixels, 1.0)
 
@@ -64,13 +75,13 @@ def _plane(depth_mm: float) -> Plane:
     return Plane(np.array([0.0, 0.0, 1.0 / depth_mm]))
 
 
-def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: float) -> View:
+def _of_plane(rig: Rig, depth_mm: float, pixels: NDArray[np.int64], lit_share: float) -> SamplePixels:
     plane = _plane(depth_mm)
     depth, shares = plane.depth_mm(rig), plane_shading(rig, plane).ravel()[pixels]
-    return View(pixels, depth.ravel()[pixels], shares, _incidence(rig, depth, pixels), lit_share)
+    return SamplePixels(pixels, depth.ravel()[pixels], shares, _incidence(rig, depth, pixels), lit_share)
 
 
-def scene_view(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8)) -> View:
+def scene_samples(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8)) -> SamplePixels:
     """Pixels of a quick look at a scene, with the depth, shading and spectrum found there.
 
     Raises `PlanError` when the look has no spectra, another size, or no valid pixel.
@@ -87,7 +98,7 @@ def scene_view(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8)) ->
         raise PlanError("The quick look has no pixel with a spectrum. Look again with more light.")
     pixels = _spread(valid, grid)
     depth = result["depth_mm"].values.astype(np.float64)
-    return View(
+    return SamplePixels(
         pixels,
         depth.ravel()[pixels],
         result["shading"].values.ravel()[pixels].astype(np.float64),
