@@ -17,7 +17,7 @@ from dsl_core.simulation.scenes.surfaces import Surface, materials_along, trace
 FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
 FINE_NM.setflags(write=False)
 
-#: The optical centre of the published camera is not in the middle of its image; at 700 mm it is off by this much.
+#: The published camera's optical centre is not in the middle of its image; at 700 mm it is off by this much.
 IMAGE_CENTRE_MM = (6.0, -2.0)
 #: What light comes from: pixel, material and share of the pixel, each (n,).
 Parts = tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]
