@@ -112,17 +112,7 @@ def reconstruct(
     spectra = None
     if options.spectra:
         with timer.stage("spectra"):
-            spectra = solve_spectra(
-                options.solver,
-                rig,
-                plan,
-                options.grid,
-                options.correspondence,
-                stack,
-                known_pixels(geometry),
-                device=options.device,
-                progress=progress,
-            )
+            spectra = solve_spectra(rig, plan, options, stack, known_pixels(geometry), progress)
     with timer.stage("colour and result"):
         return assemble(rig, plan, options.grid, geometry, spectra)
 

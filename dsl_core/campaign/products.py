@@ -14,7 +14,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, read_entry
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import load_rig, save_rig
-from dsl_core.io.staging import staged
+from dsl_core.io.staging import write_record, write_text
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.rig import Rig
 
@@ -68,10 +68,8 @@ def write_calibration_report(
     """Write the page, replacing an existing one, whole or not at all; raises `StoreError`."""
     from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
 
-    page = render_calibration_report(CalibrationContent(rig, accepted, history, costs))
-    with staged([path], overwrite=True) as (draft,):
-        draft.write_text(page, encoding="utf-8")
-    return path
+    content = CalibrationContent(rig, accepted, history, costs)
+    return write_text(path, lambda: render_calibration_report(content), overwrite=True)
 
 
 def _store(
@@ -94,9 +92,7 @@ def export_entry(entry: LibraryEntry, target: Path, form: str, overwrite: bool =
     """
     match form:
         case "entry":
-            with staged([target], overwrite=overwrite) as (draft,):
-                draft.write_text(entry.model_dump_json(indent=1) + "\n", encoding="utf-8")
-            return [target]
+            return [write_record(target, entry, overwrite=overwrite)]
         case "rig":
             return [save_rig(entry.rig, target, overwrite=overwrite)]
         case "published":

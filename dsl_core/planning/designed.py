@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.staging import staged
+from dsl_core.io.staging import write_record
 from dsl_core.model.base import Record
 from dsl_core.model.plan import Columns
 from dsl_core.resources import resource_path
@@ -51,9 +51,7 @@ def packed(levels: NDArray[np.uint8]) -> str:
 
 def save_design(made: DesignedSet, path: Path, overwrite: bool = False) -> Path:
     """Write a set; raises `StoreError`."""
-    with staged([path], overwrite=overwrite) as (draft,):
-        draft.write_text(made.model_dump_json(indent=1) + "\n", encoding="utf-8")
-    return path
+    return write_record(path, made, overwrite=overwrite)
 
 
 def load_design(path: Path) -> DesignedSet:

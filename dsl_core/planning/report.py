@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import figure_uri
-from dsl_core.io.staging import staged
+from dsl_core.io.staging import write_text
 from dsl_core.planning.choice import Weighed, pareto
 from dsl_core.solve.front import front
 
@@ -31,9 +31,7 @@ def write_tradeoff_report(
         chosen=chosen,
         plot=plot_uri(weighed, chosen),
     )
-    with staged([path], overwrite=overwrite) as (draft,):
-        draft.write_text(page, encoding="utf-8")
-    return path
+    return write_text(path, page, overwrite=overwrite)
 
 
 def plot_uri(weighed: Sequence[Weighed], chosen: Weighed) -> str:

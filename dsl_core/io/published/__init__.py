@@ -10,10 +10,13 @@ from __future__ import annotations
 
 from dsl_core.io.published.calibration import (
     PublishedCalibration,
+    SpectralTables,
     check_calibration,
     export_calibration,
     holds_calibration,
     load_calibration,
+    load_tables,
+    save_tables,
 )
 from dsl_core.io.published.dataset import (
     PUBLISHED_SETTINGS,
@@ -23,7 +26,6 @@ from dsl_core.io.published.dataset import (
 )
 from dsl_core.io.published.layout import FileRecord, check_dataset
 from dsl_core.io.published.stereo import Stereo, load_stereo, save_stereo
-from dsl_core.io.published.tables import SpectralTables, load_tables, save_tables
 
 __all__ = [
     "PUBLISHED_SETTINGS",

@@ -256,7 +256,7 @@ class PngInfo:
 
 
 def probe_png(path: Path) -> PngInfo | str:
-    """The header of a PNG, or in words why the file is not a whole one."""
+    """The header of a PNG (specification, 11.2), undecoded, or in words why the file is not a whole one."""
     try:
         with path.open("rb") as file:
             head = file.read(33)

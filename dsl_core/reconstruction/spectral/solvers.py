@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dsl_core.errors import PlanError
-from dsl_core.model.options import SOLVERS, names
+from dsl_core.model.options import SOLVERS, Options, names
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
-from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.merge import LineStack
@@ -30,26 +29,24 @@ def check_solver(solver: str, rig: Rig, plan: CapturePlan, model: str) -> None:
 
 
 def solve_spectra(
-    solver: str,
     rig: Rig,
     plan: CapturePlan,
-    grid: WavelengthGrid,
-    model: str,
+    options: Options,
     stack: LineStack,
     pixels: Pixels,
-    *,
-    device: str = "cpu",
     progress: Progress | None = None,
 ) -> SpectralMaps:
-    """Spectra of known pixels; raises `PlanError` for an unknown solver or patterns that it cannot read.
+    """Spectra of known pixels, with the solver and the model of correspondence that ``options`` name.
 
-    Raises `CalibrationError` for a model that the calibration does not hold.
+    Raises `PlanError` for an unknown solver or patterns that it cannot read, `CalibrationError` for a model
+    that the calibration does not hold.
     """
-    check_solver(solver, rig, plan, model)
-    if solver == "colour-basis":
-        return ColourBasis(rig, grid, pixels).run(progress)
-    kind = _KINDS.get(solver)
-    data = (rig, plan, grid, correspondence(rig, model), stack.radiance, stack.std, pixels)
+    check_solver(options.solver, rig, plan, options.correspondence)
+    if options.solver == "colour-basis":
+        return ColourBasis(rig, options.grid, pixels).run(progress)
+    kind = _KINDS.get(options.solver)
+    model = correspondence(rig, options.correspondence)
+    data = (rig, plan, options.grid, model, stack.radiance, stack.std, pixels)
     if kind is None:
-        return SpectralReconstruction(*data, device=device).run(progress)
-    return kind(*data, device=device).run(progress)
+        return SpectralReconstruction(*data, device=options.device).run(progress)
+    return kind(*data, device=options.device).run(progress)
