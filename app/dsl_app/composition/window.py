@@ -282,7 +282,7 @@ class Composition(QObject):
             state, rig, parts.runner, window.toasts, parts.undo, hidden=_demo_folder()
         )
         self.calibration_in_use.serve_scans(controller)
-        self.session.serve_scan(controller)
+        self.session.scans = controller
         foreseen = ForecastState()
         forecast = ForecastController(
             foreseen,
@@ -316,7 +316,7 @@ class Composition(QObject):
         window, parts, state = self.window, self.window.parts, ResultsState()
         controller = ResultsController(state, parts.runner, window.toasts, parts.undo)
         welcome = Welcome(parts.recent, window.open_path, lambda: self.demo.show())
-        self.session.serve_results(controller)
+        self.session.results = controller
         page = ResultsPage(state, controller, parts.runner, welcome)
         page.open_chosen.connect(window.open_path)
         page.reconstruct_again_requested.connect(lambda: window.do("reconstruct_again"))
@@ -333,7 +333,7 @@ class Composition(QObject):
         state, series_state = PairState(), SeriesState()
         controller = PairController(state, parts.runner, toasts)
         series = SeriesController(series_state, parts.runner, toasts, parts.undo)
-        self.session.serve_comparison(controller, series)
+        self.session.pair, self.session.series = controller, series
         return ComparePage(state, controller, series_state, series)
 
 

@@ -21,68 +21,36 @@ SAVE_MS = 1000
 
 
 class SessionRestore(QObject):
-    """Knows the controllers of the pages that were made so far."""
+    """Saves and restores what the pages show; each page that is made registers its controller here."""
 
     def __init__(self, window: MainWindow) -> None:
         super().__init__(window)
         self._window = window
-        self._results: ResultsController | None = None
-        self._scans: ScanController | None = None
-        self._compare: PairController | None = None
-        self._series: SeriesController | None = None
+        self.results: ResultsController | None = None
+        self.scans: ScanController | None = None
+        self.pair: PairController | None = None
+        self.series: SeriesController | None = None
         self.store = SessionStore(window.parts.settings_path.parent / "sessions", self.collect)
         self._timer = QTimer(self)
         self._timer.setInterval(SAVE_MS)
         self._timer.timeout.connect(self.save)
 
-    # Pages -----------------------------------------------------------------------------------------
-
-    def serve_results(self, control: ResultsController) -> None:
-        """Save what the Results page shows."""
-        self._results, state = control, control.state
-        self.store.watch(
-            state.result,
-            state.view,
-            state.cloud_by,
-            state.quality,
-            state.band,
-            state.light,
-            state.adapted,
-            state.cursor,
-            state.depth_limits,
-        )
-
-    def serve_scan(self, control: ScanController) -> None:
-        """Save what the Scan page plans."""
-        self._scans, state = control, control.state
-        self.store.watch(
-            state.plan,
-            state.target,
-            state.phase,
-            state.interrupted,
-            state.then_reconstruct,
-            state.calibration,
-        )
-
-    def serve_comparison(self, control: PairController, series: SeriesController) -> None:
-        """Save what the Compare page compares: two results, and a series."""
-        self._compare, self._series = control, series
-        several = series.state
-        self.store.watch(control.state.first, control.state.second)
-        self.store.watch(several.rows, several.kind, several.figure, several.against, several.region)
-
     # Save ------------------------------------------------------------------------------------------
 
     def collect(self) -> Session:
         """What is open now."""
+        page, pages = self._window.page, (self.results, self.scans, self.pair, self.series)
+        if not any(pages):
+            # The import below needs all slices.
+            return Session(page=page)
         from dsl_app.session.parts import compare_part, results_part, scan_part, series_part
 
         return Session(
-            page=self._window.page,
-            results=None if self._results is None else results_part(self._results.state),
-            scan=None if self._scans is None else scan_part(self._scans.state),
-            compare=None if self._compare is None else compare_part(self._compare.state),
-            series=None if self._series is None else series_part(self._series.state),
+            page=page,
+            results=None if self.results is None else results_part(self.results.state),
+            scan=None if self.scans is None else scan_part(self.scans.state),
+            compare=None if self.pair is None else compare_part(self.pair.state),
+            series=None if self.series is None else series_part(self.series.state),
         )
 
     def save(self) -> None:
@@ -115,23 +83,23 @@ class SessionRestore(QObject):
         window = self._window
         if session.results is not None:
             window.page_of("results")
-            assert self._results is not None
+            assert self.results is not None
             if not session.results.path.exists():
                 window.open_path(session.results.path)
             else:
-                parts.restore_result(session.results, self._results)
+                parts.restore_result(session.results, self.results)
         if session.scan is not None:
             window.page_of("scan")
-            assert self._scans is not None
-            parts.restore_scan(session.scan, self._scans)
+            assert self.scans is not None
+            parts.restore_scan(session.scan, self.scans)
         if session.compare is not None:
             window.page_of("compare")
-            assert self._compare is not None
-            parts.restore_comparison(session.compare, self._compare)
+            assert self.pair is not None
+            parts.restore_comparison(session.compare, self.pair)
         if session.series is not None:
             page = window.page_of("compare")
-            assert self._series is not None
-            parts.restore_series(session.series, self._series)
+            assert self.series is not None
+            parts.restore_series(session.series, self.series)
             if session.compare is None:
                 assert isinstance(page, ComparePage)
                 page.show_series()

@@ -10,12 +10,10 @@ import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from pydantic import ValidationError
 
 from dsl_app.session.records import Session
-from dsl_app.shared.evented import Value
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside, write_atomic
 
@@ -24,43 +22,30 @@ _PREFIX = "session-"
 
 
 class SessionStore:
-    """Writes what ``collect`` gives, some time after one of the watched values changed."""
+    """Writes what ``collect`` gives whenever that has changed since the last `save`."""
 
     def __init__(self, folder: Path, collect: Callable[[], Session], process: int | None = None) -> None:
         """``process`` is this program's number; its own by default."""
         self._folder, self._collect = folder, collect
         self._process = os.getpid() if process is None else process
         self._path = folder / f"{_PREFIX}{self._process}.json"
-        self._written: Session | None = None
-        self._is_changed = False
+        self._latest: Session | None = None
         self._has_complained = False
 
-    def watch(self, *values: Value[Any]) -> None:
-        """Write soon after any of these changes."""
-        for value in values:
-            value.changed.connect(lambda _: self.touch())
-
-    def touch(self) -> None:
-        """Something changed: write at the next `save`."""
-        self._is_changed = True
-
     def save(self) -> str:
-        """Write if something changed since last time; returns a sentence the first time that it fails.
+        """Write the session if it has changed; returns a sentence the first time that this fails.
 
-        Called by a timer, so that many changes cost one write.
+        Called by a timer, so that many changes cost one write. An empty session gets no file.
         """
-        if not self._is_changed:
-            return ""
-        self._is_changed = False
         session = self._collect()
-        if session == self._written:
+        if session == self._latest or (self._latest is None and not session.names):
             return ""
+        self._latest = session
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             write_atomic(self._path, session.model_dump_json(indent=1).encode())
         except (OSError, StoreError) as error:
             return self._complain(f"The open session cannot be saved for recovery after a crash: {error}")
-        self._written = session
         return ""
 
     def _complain(self, text: str) -> str:

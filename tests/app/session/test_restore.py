@@ -29,7 +29,6 @@ from dsl_app.session.parts import (
 )
 from dsl_app.session.records import ResultsPart, ScanPart, SeriesPart, Session
 from dsl_app.session.store import SessionStore, is_running
-from dsl_app.shared.evented import Value
 from dsl_app.shared.undo import UndoStack
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
@@ -57,22 +56,26 @@ def gone() -> int:
 
 
 def test_a_session_is_written_only_after_a_change(tmp_path: Path) -> None:
-    store = SessionStore(tmp_path / "sessions", lambda: LEAF, process=7)
-    store.save()
+    sessions = iter([Session(), Session(page="scan"), LEAF, LEAF, Session(page="scan")])
+    store = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
+    for _ in range(2):
+        assert store.save() == ""
+    # Nothing is open yet.
     assert not (tmp_path / "sessions").exists()
-    band = Value(1)
-    store.watch(band)
-    band.set(2)
     assert store.save() == ""
     (file,) = (tmp_path / "sessions").iterdir()
     assert Session.model_validate_json(file.read_bytes()) == LEAF
+    file.write_text("not written again")
+    store.save()
+    assert file.read_text() == "not written again"
+    store.save()
+    assert Session.model_validate_json(file.read_bytes()) == Session(page="scan")
     store.remove()
     assert not file.exists()
 
 
 def test_what_a_crash_left_is_found_once(tmp_path: Path, gone: int) -> None:
     crashed = SessionStore(tmp_path, lambda: LEAF, process=gone)
-    crashed.touch()
     crashed.save()
     store = SessionStore(tmp_path, Session)
     assert store.crashed_session() == (LEAF, "")
@@ -81,7 +84,6 @@ def test_what_a_crash_left_is_found_once(tmp_path: Path, gone: int) -> None:
 
 def test_what_a_running_program_has_open_is_left_to_it(tmp_path: Path) -> None:
     other = SessionStore(tmp_path, lambda: LEAF, process=os.getpid())
-    other.touch()
     other.save()
     assert is_running(os.getpid())
     assert SessionStore(tmp_path, Session, process=NOBODY).crashed_session() == (None, "")
@@ -100,9 +102,7 @@ def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
     (tmp_path / "sessions").write_text("a file in the way")
     sessions = iter([LEAF, Session(page="scan")])
     store = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
-    store.touch()
     assert "cannot be saved" in store.save()
-    store.touch()
     assert store.save() == ""
 
 
