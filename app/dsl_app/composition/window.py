@@ -19,6 +19,7 @@ from dsl_app.shared.settings import data_folder
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shell.application import make_window, open_first_page
 from dsl_app.shell.main_window import MainWindow
+from dsl_app.shell.warm_up import PAGE_MODULES
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.wizard.controller import WizardController
@@ -33,27 +34,6 @@ if TYPE_CHECKING:
     from dsl_core.devices.base import Projector
 
 
-#: What every page needs.
-_SHARED = ("dsl_app.connection.controller", "dsl_app.rig.projector_screens", "dsl_app.session.restore")
-#: What each page is made of; imported by a thread if it is the first page to open.
-IMPORTS = {
-    "rig": (*_SHARED, "dsl_core.devices.registry", "dsl_app.rig.page"),
-    "calibrate": (*_SHARED, "dsl_app.calibrate.controller", "dsl_app.calibrate.page"),
-    "scan": (
-        *_SHARED,
-        "dsl_app.scan.controller",
-        "dsl_app.scan.forecast.controller",
-        "dsl_app.scan.effects.controller",
-        "dsl_app.scan.page",
-    ),
-    "results": (*_SHARED, "dsl_app.results.controller", "dsl_app.results.page"),
-    "compare": (
-        *_SHARED,
-        "dsl_app.compare.pair.controller",
-        "dsl_app.compare.series.controller",
-        "dsl_app.compare.page",
-    ),
-}
 #: How long the first page is on screen before the rig is connected, ms.
 CONNECT_AFTER_MS = 200
 
@@ -90,7 +70,7 @@ class Composition(QObject):
         ``in_background`` imports that page in a thread once the window is painted.
         """
         self.window = make_window(self.pages, folder, theme, self.commands, self.handlers)
-        open_first_page(self.window, IMPORTS if in_background else None)
+        open_first_page(self.window, PAGE_MODULES if in_background else None)
         return self.window
 
     @property

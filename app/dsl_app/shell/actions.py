@@ -221,8 +221,3 @@ ACTIONS: tuple[Action, ...] = (
     Action("report_bundle", "Save a &report bundle…", "Help", "", "Log, settings and versions in one file"),
     Action("about", "&About", "Help", separator=True),
 )
-
-
-def find_action(key: str) -> Action:
-    """The action of a key; raises `KeyError`."""
-    return {action.key: action for action in ACTIONS}[key]

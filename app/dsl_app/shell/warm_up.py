@@ -11,11 +11,33 @@ import os
 import sys
 import threading
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 _log = logging.getLogger(__name__)
-#: In small steps: first what connecting a rig needs, then pages, calibrations, results and the 3D view.
-STEPS = (
+#: What every page needs.
+_SHARED = ("dsl_app.connection.controller", "dsl_app.rig.projector_screens", "dsl_app.session.restore")
+#: What each page is made of.
+PAGE_MODULES = {
+    "rig": (*_SHARED, "dsl_core.devices.registry", "dsl_app.rig.page"),
+    "scan": (
+        *_SHARED,
+        "dsl_app.scan.controller",
+        "dsl_app.scan.forecast.controller",
+        "dsl_app.scan.effects.controller",
+        "dsl_app.scan.page",
+    ),
+    "results": (*_SHARED, "dsl_app.results.controller", "dsl_app.results.page"),
+    "calibrate": (*_SHARED, "dsl_app.calibrate.controller", "dsl_app.calibrate.page"),
+    "compare": (
+        *_SHARED,
+        "dsl_app.compare.pair.controller",
+        "dsl_app.compare.series.controller",
+        "dsl_app.compare.page",
+    ),
+}
+#: What connecting a rig needs.
+_FIRST = (
     "scipy.linalg",
     "scipy.ndimage",
     "scipy.optimize",
@@ -25,18 +47,9 @@ STEPS = (
     "dsl_core.simulation.sim_devices",
     "zarr",
     "dsl_core.pipeline",
-    "dsl_app.rig.page",
-    "dsl_app.scan.controller",
-    "dsl_app.scan.forecast.controller",
-    "dsl_app.scan.effects.controller",
-    "dsl_app.scan.page",
-    "dsl_app.results.controller",
-    "dsl_app.results.page",
-    "dsl_app.calibrate.controller",
-    "dsl_app.calibrate.page",
-    "dsl_app.compare.pair.controller",
-    "dsl_app.compare.series.controller",
-    "dsl_app.compare.page",
+)
+#: Calibrations, results and the 3D view.
+_LAST = (
     "dsl_app.calibrate.wizard.window",
     "pandas",
     "xarray",
@@ -56,6 +69,7 @@ STEPS = (
     "vtkmodules.vtkViewsContext2D",
     "vtkmodules.vtkInteractionStyle",
 )
+STEPS = tuple(dict.fromkeys((*_FIRST, *chain.from_iterable(PAGE_MODULES.values()), *_LAST)))
 #: Pause between two steps, s.
 REST_S = 0.05
 #: Large libraries of some packages: while the system loads them, Python's lock is free.

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from dsl_app.session.records import ResultsPart, Session
+from dsl_app.session.store import SessionStore, is_running
+
+#: A number that no process has.
+NOBODY = 2**30
+LEAF = Session(page="results", results=ResultsPart(path=Path("leaf.zarr")))
+
+
+def test_a_session_is_written_only_after_a_change(tmp_path: Path) -> None:
+    sessions = iter([Session(), Session(page="scan"), LEAF, LEAF, Session(page="scan")])
+    store = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
+    for _ in range(2):
+        assert store.save() == ""
+    # Nothing is open yet.
+    assert not (tmp_path / "sessions").exists()
+    assert store.save() == ""
+    (file,) = (tmp_path / "sessions").iterdir()
+    assert Session.model_validate_json(file.read_bytes()) == LEAF
+    file.write_text("not written again")
+    store.save()
+    assert file.read_text() == "not written again"
+    store.save()
+    assert Session.model_validate_json(file.read_bytes()) == Session(page="scan")
+    store.remove()
+    assert not file.exists()
+
+
+def test_what_a_crash_left_is_found_once(tmp_path: Path, gone: int) -> None:
+    crashed = SessionStore(tmp_path, lambda: LEAF, process=gone)
+    crashed.save()
+    store = SessionStore(tmp_path, Session)
+    assert store.crashed_session() == (LEAF, "")
+    assert store.crashed_session() == (None, "")
+
+
+def test_what_a_running_program_has_open_is_left_to_it(tmp_path: Path) -> None:
+    other = SessionStore(tmp_path, lambda: LEAF, process=os.getpid())
+    other.save()
+    assert is_running(os.getpid())
+    assert SessionStore(tmp_path, Session, process=NOBODY).crashed_session() == (None, "")
+
+
+def test_a_damaged_session_is_put_aside_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / f"session-{NOBODY}.json").write_text('{"results": {"path": ')
+    found, trouble = SessionStore(tmp_path, Session).crashed_session()
+    assert found is None
+    assert "could not be read" in trouble
+    assert (tmp_path / f"session-{NOBODY}.damaged.json").exists()
+    assert SessionStore(tmp_path, Session).crashed_session() == (None, "")
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
+    (tmp_path / "sessions").write_text("a file in the way")
+    sessions = iter([LEAF, Session(page="scan")])
+    store = SessionStore(tmp_path / "sessions", lambda: next(sessions), process=7)
+    assert "cannot be saved" in store.save()
+    assert store.save() == ""
