@@ -16,7 +16,7 @@ from dsl_core.io.result.result_file import load_result, save_result
 from dsl_core.model.plan import CapturePlan, LineComb, NoSpectral
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
-from dsl_core.planning import prediction, views
+from dsl_core.planning import prediction, samples
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.scan_bench import (
     COMB,
@@ -230,7 +230,7 @@ def test_the_scene_of_a_result_can_be_planned_for(
         seen.append(result)
         return "the scene"
 
-    monkeypatch.setattr(views, "scene_samples", scene_samples)
+    monkeypatch.setattr(samples, "scene_samples", scene_samples)
     control = forecast(bench, tmp_path)
     state, done = control.state, len(counted)
     look = save_result(load_result(write_small_result(tmp_path)).load(), tmp_path / "first.zarr")
