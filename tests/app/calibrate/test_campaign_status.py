@@ -22,6 +22,7 @@ def test_rows_say_why_a_calibration_is_not_good(bench: CalibrateBench) -> None:
     bench.later = timedelta(days=91)
     bench.control.refresh()
     assert states(bench) == [RowState.AGEING, RowState.AGEING]
+    assert bench.row("geometry").reason.startswith("91 days old.")
     bench.later = timedelta(0)
     bench.wrong = {"largest_dn": 1.0}
     _, control = bench.wizard("selftest")

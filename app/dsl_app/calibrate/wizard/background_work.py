@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -178,8 +178,8 @@ def _require_good(step: Step, look: Look) -> None:
 class WatchedCamera(Camera):
     """A camera that passes every call on and keeps the latest frame worth showing."""
 
-    def __init__(self, camera: Camera) -> None:
-        self._camera = camera
+    def __init__(self, camera: Camera, clock: Callable[[], float] = time.monotonic) -> None:
+        self._camera, self._clock = camera, clock
         self._lock = threading.Lock()
         self._frame: Frame | None = None
         self._best, self._best_at = 0.0, 0.0
@@ -200,7 +200,7 @@ class WatchedCamera(Camera):
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
         """Take a frame and keep it to be shown."""
         frame = self._camera.snap(timeout_ms)
-        worth, now = self._worth(frame), time.monotonic()
+        worth, now = self._worth(frame), self._clock()
         with self._lock:
             if worth > self._best or now - self._best_at > MEMORY_S:
                 self._best, self._best_at = worth, now
