@@ -80,9 +80,8 @@ def reconstruct(
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
     from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.reconstruction.geometry import reconstruct_geometry
+    from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
-    from dsl_core.reconstruction.sanity import require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
 

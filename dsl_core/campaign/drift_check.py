@@ -82,8 +82,8 @@ def drift_figures(
     from dsl_core.calibration.drift.geometry import geometry_drift
     from dsl_core.calibration.drift.light import film_drift, light_drift
     from dsl_core.patterns.images import spectral_profiles
+    from dsl_core.reconstruction.geometry import require_light
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
-    from dsl_core.reconstruction.sanity import require_light
 
     plan = check_source(source, rig)
     merged = MergedScan(source, rig)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import Setting
 from dsl_core.model.rig import ProjectorResponse, Sensor
-from dsl_core.optics.sensor import bayer_channels, raw_variance
+from dsl_core.optics.sensor import raw_variance
 
 Array = NDArray[np.float32]
 
@@ -85,15 +85,13 @@ class HdrMerger:
         blacks: Sequence[BlackFrame],
         sensor: Sensor,
         *,
-        channel_ratios: NDArray[np.float64] | None = None,
         weighting: Literal["inverse_variance", "trapezoid"] = "inverse_variance",
         saturation_margin_dn: float | None = None,
     ) -> None:
         """Prepare for frames of one size.
 
-        ``channel_ratios``, shape (settings, 3), multiplies the gains per colour (see
-        `normalisation.channel_ratios`). A raw value counts as saturated within ``saturation_margin_dn`` of
-        full scale; by default 2 % of it, several sigmas of shot noise.
+        A raw value counts as saturated within ``saturation_margin_dn`` of full scale; by default 2 % of it,
+        several sigmas of shot noise.
         """
         if len(gains_ms) != len(blacks) or not blacks:
             raise DecodeError(f"{len(gains_ms)} settings need as many black frames, given {len(blacks)}.")
@@ -106,12 +104,7 @@ class HdrMerger:
         margin = 0.02 * self._full_dn if saturation_margin_dn is None else saturation_margin_dn
         self._limit_dn = int(np.ceil(self._full_dn - margin))
         self._weighting = weighting
-        ratios = np.ones((len(blacks), 3)) if channel_ratios is None else channel_ratios
-        colours = bayer_channels(sensor.bayer, _BLOCK_ROWS, self.shape[1])
-        # Gains repeat from block to block of rows, as the mosaic does.
-        self._gain = [
-            (gain * ratio[colours]).astype(np.float32) for gain, ratio in zip(gains_ms, ratios, strict=True)
-        ]
+        self._gain = [np.float32(gain) for gain in gains_ms]
         self._shot = [gain / np.float32(sensor.electrons_per_dn) for gain in self._gain]
         for black in blacks:
             self._check_shape(black.mean)
@@ -158,7 +151,7 @@ class HdrMerger:
         for i, raw in enumerate(raws):
             np.subtract(raw, self._black[i][rows], out=signal[i])
             # The gain of a saturated value is zero, so that it drops out of every sum.
-            np.multiply(self._gain[i][:count], raw < self._limit_dn, out=gains[i])
+            np.multiply(self._gain[i], raw < self._limit_dn, out=gains[i])
             weight += gains[i]
             np.greater(gains[i], 0, out=term)
             term *= signal[i]
@@ -170,7 +163,7 @@ class HdrMerger:
         np.fmax(expected, total, out=expected)
         weight[...] = 0
         for i in range(len(raws)):
-            np.multiply(expected, self._shot[i][:count], out=term)
+            np.multiply(expected, self._shot[i], out=term)
             term += self._floor[i][rows]
             np.divide(gains[i], term, out=term)
             weight += np.multiply(term, gains[i], out=gains[i])
@@ -193,9 +186,9 @@ class HdrMerger:
         radiance = np.zeros_like(expected)
         variance = np.zeros_like(expected)
         for i, weight in enumerate(weights):
-            share = weight / (sum_ * self._gain[i][:count])
+            share = weight / (sum_ * self._gain[i])
             radiance += share * self._signal[i][:count]
-            variance += share**2 * (self._floor[i][rows] + expected * self._shot[i][:count])
+            variance += share**2 * (self._floor[i][rows] + expected * self._shot[i])
         np.copyto(out.radiance, radiance, where=sum_ > 0)
         np.copyto(out.variance, variance, where=sum_ > 0)
 
@@ -208,10 +201,8 @@ class HdrMerger:
 
     def _bound(self, rows: slice, out: MergedFrame) -> None:
         """The least radiance that saturates every setting, where every setting is saturated."""
-        count = rows.stop - rows.start
         bounds = [
-            (self._limit_dn - black[rows]) / gain[:count]
-            for black, gain in zip(self._black, self._gain, strict=True)
+            (self._limit_dn - black[rows]) / gain for black, gain in zip(self._black, self._gain, strict=True)
         ]
         np.copyto(out.radiance, np.max(bounds, axis=0), where=out.saturated)
 

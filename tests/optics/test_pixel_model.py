@@ -128,8 +128,8 @@ class Readers:
         return model
 
 
-#: Far to the left no other order reaches the bands at the edge; in the middle of the frame others do. The banded
-#: equations of lines take their light from a table, so that they agree to a share only.
+#: Far to the left no other order reaches the bands at the edge; in the middle of the frame others do. Banded
+#: equations take the light of lines from a table, so that they agree to a share only.
 CASES = {
     "lines at the edge": (LINES, 100, 0.01),
     "lines": (LINES, 400, 5e-4),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import ProjectorResponse, Sensor
-from dsl_core.optics.sensor import bayer_channels, digitise
+from dsl_core.optics.sensor import digitise
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
 
 Weighting = Literal["inverse_variance", "trapezoid"]
@@ -111,19 +111,6 @@ def test_saturation_margin_decides() -> None:
     used = HdrMerger(GAINS_MS, [exact_black()] * 2, SENSOR, saturation_margin_dn=80).merge(raws)
     dropped = HdrMerger(GAINS_MS, [exact_black()] * 2, SENSOR, saturation_margin_dn=100).merge(raws)
     assert dropped.variance.min() > 5 * used.variance.max()
-
-
-@pytest.mark.parametrize("weighting", ["inverse_variance", "trapezoid"])
-def test_ratios_per_colour_are_undone(weighting: Weighting) -> None:
-    """A gain that is wrong by colour gives back a flat image, rows across blocks included."""
-    ratios = np.array([[1.0, 1.0, 1.0], [0.9, 1.0, 1.2]])
-    channels = bayer_channels(SENSOR.bayer, *SHAPE)
-    raws = [
-        digitise(SENSOR, (10 * g * r[channels]).astype(np.float32), None)
-        for g, r in zip(GAINS_MS, ratios, strict=True)
-    ]
-    merger = HdrMerger(GAINS_MS, [exact_black()] * 2, SENSOR, channel_ratios=ratios, weighting=weighting)
-    np.testing.assert_allclose(merger.merge(raws).radiance, 10, rtol=2e-3)
 
 
 def test_black_noise_is_carried_on() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import torch
@@ -16,8 +15,6 @@ from dsl_core.calibration.orders.efficiency import RatioSample, fit_efficiency
 from dsl_core.model.plan import ScanLines
 from dsl_core.optics.filters import FINE_NM
 from dsl_core.optics.light_path import zero_order_profile
-from dsl_core.reconstruction.hdr import BlackFrame
-from dsl_core.reconstruction.spectral.normalisation import channel_ratios
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.solve.smooth_functions import Equations, SmoothPrior, solve_smooth
 from tests.stability.case import Case, Outcome, spread
@@ -142,14 +139,6 @@ def _tiles(dtype: torch.dtype) -> Outcome:
     return Outcome("flagged" if len(found) == 0 else "wrong", f"{len(found)} tiles used")
 
 
-def _dark_bracket(dtype: torch.dtype) -> Outcome:
-    sensor = published_rig().sensor
-    black = BlackFrame(np.full((16, 16), sensor.black_level_dn, np.float32), np.zeros((16, 16), np.float32))
-    dark = np.full((16, 16), int(sensor.black_level_dn), np.uint16)
-    ratios = channel_ratios([[dark, dark]] * 4, [1.0, 4.0], [black, replace(black)], sensor)
-    return Outcome("wrong", f"ratios {ratios.ratio} out of darkness")
-
-
 CASES = (
     Case("power law", "columns that follow it", _fitted(_grid(lambda z: 40 / z)), "right"),
     Case(
@@ -197,5 +186,4 @@ CASES = (
     Case("lost zero orders", "two thirds of the pixels dark", _zero_order(1e-9), "right"),
     Case("no zero order", "all pixels dark", _zero_order(0.0), "refused", "pixels see the lines"),
     Case("tiles of nothing", "one known pixel of infinite deviation", _tiles, "flagged", "0 tiles"),
-    Case("bracket in the dark", "two settings of black frames", _dark_bracket, "refused", "pixels"),
 )

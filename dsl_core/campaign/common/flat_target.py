@@ -116,9 +116,8 @@ def scanned_geometry(
     source: FrameSource, rig: Rig, progress: Progress | None = None
 ) -> tuple[LineStack, Geometry]:
     """The lines of a scan with code and lines, and its geometry; raises what a reconstruction raises."""
-    from dsl_core.reconstruction.geometry import reconstruct_geometry
+    from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
-    from dsl_core.reconstruction.sanity import require_light, require_pixels
 
     plan = check_source(source, rig)
     merged = MergedScan(source, rig)
