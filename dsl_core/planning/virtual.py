@@ -1,6 +1,6 @@
 """Virtual pixels: the reconstruction's own equations at a few places, without a picture.
 
-At each sample of a view the forward model of `optics.pixel_model` gives what every frame of a plan would read
+At each sample pixel the forward model of `optics.pixel_model` gives what every frame of a plan would read
 for each reference spectrum; the bracket's noise, the black frames' noise and the error of the refined column
 are drawn once (always the same), and the reconstruction's own estimators answer with the equations of the
 column they believe in: next to the edge of a line the zero order, many times the first, is then far from what
@@ -103,7 +103,7 @@ class Draw:
 
 
 class VirtualPixels:
-    """The samples of a view under a plan."""
+    """Sample pixels under a plan."""
 
     def __init__(
         self,
