@@ -130,7 +130,7 @@ class Readers:
 
 #: Far to the left no other order reaches the bands at the edge; in the middle of the frame others do. Banded
 #: equations take the light of lines from a table, so that they agree to a share only.
-CASES = {
+CASES: dict[str, tuple[ScanLines | LineComb, int, float]] = {
     "lines at the edge": (LINES, 100, 0.01),
     "lines": (LINES, 400, 5e-4),
     "comb": (COMB, 400, 1e-6),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 import torch
@@ -22,12 +24,21 @@ from tests.cases.crop import cropped_rig
 COUNT = 4000
 
 
-class Exact(Draw):
-    """Noise that is exactly its deviation."""
+@dataclass(frozen=True)
+class Steady(Draw):
+    """Noise that is everywhere the same."""
+
+    size: float = 0.0
 
     def normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
-        """Ones."""
-        return torch.ones(shape, dtype=torch.float64)
+        """The noise, in its deviations."""
+        return torch.full(shape, self.size, dtype=torch.float64)
+
+
+def steady(size: float) -> Draw:
+    """A draw of nothing but noise of a size."""
+    x = torch.zeros(1)
+    return Steady(x, x, x, x, x, x, x, x, x, torch.Generator(), size)
 
 
 def virtual(rig: Rig, window_px: int) -> VirtualPixels:
@@ -44,11 +55,9 @@ def column_of(std_px: Tensor) -> Column:
 def test_shading_falls_with_the_square_of_the_distance_and_with_the_slope_of_the_surface() -> None:
     rig = published_rig().model_copy(update={"column_std_px": 0.0})
     pixels = virtual(rig, window_px=9)
-    none = torch.zeros(1)
-    draw = Exact(*[none] * 9, torch.Generator())
     error_mm = torch.tensor([[0.3, -0.2, 0.1], [0.0, 0.5, -0.4]], dtype=torch.float64)
     same_std = column_of(torch.full_like(error_mm, 0.05))
-    found = pixels._shading_error(draw, same_std, error_mm)
+    found = pixels._shading_error(steady(1.0), same_std, error_mm)
     # Where the surface faces the projector a wrong slope changes nothing in first order.
     distance = 2 * error_mm / pixels.depth[:, None]
     slope = (error_mm / pixels.depth[:, None]).square().mean(1).sqrt() * rig.camera.fx_px
@@ -67,17 +76,8 @@ def test_relative_error_of_depth_counts_twice_as_the_inverse_square_law_has_it()
     pixel = 290, 445
     relative = here[pixel] / nearer[pixel] - 1
     pixels = virtual(rig, window_px=9)
-    none = torch.zeros(1)
-
-    class Still(Draw):
-        def normal(self, shape: torch.Size | tuple[int, ...]) -> Tensor:
-            """No noise of the slope."""
-            return torch.zeros(shape, dtype=torch.float64)
-
     error_mm = torch.full((2, 1), -1.0, dtype=torch.float64)
-    found = pixels._shading_error(
-        Still(*[none] * 9, torch.Generator()), column_of(torch.full((2, 1), 0.05)), error_mm
-    )
+    found = pixels._shading_error(steady(0.0), column_of(torch.full((2, 1), 0.05)), error_mm)
     assert float(found[0, 0]) == pytest.approx(relative, rel=0.15)
 
 
