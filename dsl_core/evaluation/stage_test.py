@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.evaluation.depth import straightness_mm
-from dsl_core.evaluation.flat_target import SeenTarget
+from dsl_core.evaluation.seen_target import SeenTarget
 from dsl_core.evaluation.verdict import Verdict, estimate_row
 
 Floats = NDArray[np.floating[Any]]

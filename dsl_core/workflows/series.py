@@ -13,7 +13,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.progress import NoProgress, Progress
 
 if TYPE_CHECKING:
-    from dsl_core.evaluation.flat_target import Region, SeenTarget
+    from dsl_core.evaluation.seen_target import Region, SeenTarget
     from dsl_core.evaluation.summary import Truth
     from dsl_core.evaluation.time_sweep import SweepPoint
 
@@ -64,7 +64,7 @@ def read_target(path: Path, region: Region | None = None) -> tuple[SeenTarget, f
 
     Raises `DecodeError` when it shows none, `StoreError` when it cannot be read.
     """
-    from dsl_core.evaluation.flat_target import flat_target
+    from dsl_core.evaluation.seen_target import find_target
     from dsl_core.io.result.result_file import load_result
 
     result = load_result(path)
@@ -72,7 +72,7 @@ def read_target(path: Path, region: Region | None = None) -> tuple[SeenTarget, f
         raise DecodeError(f"{path.name} holds no points in space. Reconstruct its scan again.")
     flags = result["flags"].values if "flags" in result else None
     try:
-        return flat_target(result["points_mm"].values, flags, region), position_of(path, result.attrs)
+        return find_target(result["points_mm"].values, flags, region), position_of(path, result.attrs)
     except DecodeError as error:
         raise DecodeError(f"{path.name}: {error}") from error
 

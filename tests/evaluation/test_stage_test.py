@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import DecodeError
-from dsl_core.evaluation.flat_target import Region, SeenTarget, flat_target
+from dsl_core.evaluation.seen_target import Region, SeenTarget, find_target
 from dsl_core.evaluation.stage_test import stage_table, stage_test
 from tests.cases.stage_series import LEAN, SHAPE, flat_arrays
 
@@ -17,7 +17,7 @@ POSITIONS = (695.2, 718.6, 742.1, 765.5, 788.9, 812.3, 835.8, 859.2)
 
 def target(position_mm: float, region: Region | None = None, **details: Any) -> SeenTarget:
     arrays = flat_arrays(position_mm, **details)
-    return flat_target(arrays["points_mm"], arrays["flags"], region)
+    return find_target(arrays["points_mm"], arrays["flags"], region)
 
 
 def test_a_plane_is_found_beside_a_background_and_without_limited_pixels() -> None:
@@ -42,7 +42,7 @@ def test_the_deviation_of_a_distance_is_that_of_many_repeats() -> None:
 def test_what_lies_farther_is_behind_the_plane() -> None:
     arrays = flat_arrays(700.0, noise_mm=0.05)
     arrays["points_mm"][2, 20, 20] += 0.15
-    found = flat_target(arrays["points_mm"], arrays["flags"])
+    found = find_target(arrays["points_mm"], arrays["flags"])
     assert found.residual_mm[20, 20] > 0.05
 
 
@@ -92,7 +92,7 @@ def test_a_region_is_all_that_counts() -> None:
     points = flat_arrays(700.0)["points_mm"]
     points[:, 8:], points[:, :, 12:] = np.nan, np.nan
     with pytest.raises(DecodeError, match="seen in 2 of 48 patches"):
-        flat_target(points)
+        find_target(points)
 
 
 def test_what_cannot_be_tested_is_refused_in_a_sentence() -> None:
@@ -106,11 +106,11 @@ def test_what_cannot_be_tested_is_refused_in_a_sentence() -> None:
     with pytest.raises(DecodeError, match="3 results and 2 positions"):
         stage_test((700.0, 720.0), three)
     half = flat_arrays(760.0)
-    smaller = flat_target(half["points_mm"][:, :, :40])
+    smaller = find_target(half["points_mm"][:, :, :40])
     with pytest.raises(DecodeError, match="40 x 36 and 48 x 36 pixels"):
         stage_test((700.0, 720.0, 760.0), [*three[:2], smaller])
     nothing = flat_arrays(700.0)
     with pytest.raises(DecodeError, match="has no depth"):
-        flat_target(np.full_like(nothing["points_mm"], np.nan))
+        find_target(np.full_like(nothing["points_mm"], np.nan))
     with pytest.raises(DecodeError, match="are limited"):
-        flat_target(nothing["points_mm"], np.full(SHAPE, 16, np.uint16))
+        find_target(nothing["points_mm"], np.full(SHAPE, 16, np.uint16))

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from dsl_core.evaluation.cost import StageCost
 from dsl_core.evaluation.report.curves import HEIGHT, WIDTH, Chart, wavelength_chart
 from dsl_core.evaluation.report.pages import render_page
-from dsl_core.evaluation.report.pictures import Picture, value_picture
+from dsl_core.evaluation.report.pictures import ReportPicture, value_picture
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.conditions import CaptureConditions
@@ -191,7 +191,7 @@ def _conditions(known: CaptureConditions | None) -> dict[str, str]:
 MIDDLE_NM, MAP_PX = 545.0, 240
 
 
-def rig_maps(rig: Rig) -> list[Picture]:
+def rig_maps(rig: Rig) -> list[ReportPicture]:
     """The flat field, and the residual of each order at 545 nm and middle depth; none for a rig without."""
     pictures = []
     if rig.flat_field is not None:
@@ -202,7 +202,7 @@ def rig_maps(rig: Rig) -> list[Picture]:
     return pictures + _residuals(rig)
 
 
-def _residuals(rig: Rig) -> list[Picture]:
+def _residuals(rig: Rig) -> list[ReportPicture]:
     import torch
 
     from dsl_core.optics.column_residual import residual_columns

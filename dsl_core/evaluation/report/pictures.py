@@ -33,7 +33,7 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Picture:
+class ReportPicture:
     """A picture (data URI) with a caption and either a colour bar (CSS gradient, ends) or keys."""
 
     title: str
@@ -70,17 +70,17 @@ def _png_uri(buffer: BytesIO) -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
-def colour_picture(rgb: Floats, title: str, caption: str) -> Picture:
+def colour_picture(rgb: Floats, title: str, caption: str) -> ReportPicture:
     """The sRGB image (3, h, w), 0..1; pixels without colour are transparent."""
     solid = np.isfinite(rgb).all(axis=0)
     pixels = np.nan_to_num(np.moveaxis(rgb, 0, -1)).clip(0, 1)
     rgba = np.dstack([(pixels * 255 + 0.5).astype(np.uint8), np.where(solid, 255, 0).astype(np.uint8)])
-    return Picture(title, caption, png_uri(rgba))
+    return ReportPicture(title, caption, png_uri(rgba))
 
 
 def value_picture(
     values: Floats, title: str, caption: str, unit: str, colours: str = "viridis", symmetric: bool = False
-) -> Picture:
+) -> ReportPicture:
     """A map (h, w) in false colour between its 1st and 99th percentile; NaN is transparent.
 
     ``symmetric`` centres the colours on zero, for signed errors.
@@ -99,10 +99,10 @@ def value_picture(
     rgba[..., 3] = np.where(np.isfinite(values), 255, 0)
     stops = scheme(np.linspace(0, 1, _STOPS), bytes=True)[:, :3]
     gradient = ", ".join(f"#{r:02x}{g:02x}{b:02x}" for r, g, b in stops.tolist())
-    return Picture(title, caption, png_uri(rgba), gradient, f"{low:.4g} {unit}", f"{high:.4g} {unit}")
+    return ReportPicture(title, caption, png_uri(rgba), gradient, f"{low:.4g} {unit}", f"{high:.4g} {unit}")
 
 
-def flag_picture(flags: NDArray[np.integer], title: str, caption: str) -> Picture:
+def flag_picture(flags: NDArray[np.integer], title: str, caption: str) -> ReportPicture:
     """The flags (h, w), each pixel in the colour of its gravest flag, with words for those that occur."""
     rgba = np.zeros((*flags.shape, 4), np.uint8)
     keys = []
@@ -113,4 +113,4 @@ def flag_picture(flags: NDArray[np.integer], title: str, caption: str) -> Pictur
         if share > 0:
             keys.append(Key(FLAG_COLOURS[flag], REASONS[flag], share))
     keys.append(Key("transparent", "no flag", float(np.mean(flags == 0))))
-    return Picture(title, caption, png_uri(rgba), keys=tuple(keys))
+    return ReportPicture(title, caption, png_uri(rgba), keys=tuple(keys))

@@ -21,7 +21,7 @@ from dsl_core.evaluation.report.curves import (
     spectrum_curve,
 )
 from dsl_core.evaluation.report.pages import render_page
-from dsl_core.evaluation.report.pictures import Picture, colour_picture, flag_picture, value_picture
+from dsl_core.evaluation.report.pictures import ReportPicture, colour_picture, flag_picture, value_picture
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Goal, Verdict, verdicts
 from dsl_core.model.plan import CapturePlan
@@ -103,10 +103,10 @@ def _pixels(content: ReportContent) -> list[tuple[int, int]]:
     ]
 
 
-def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[Picture]:
+def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[ReportPicture]:
     """Every map that the result and its truth allow."""
     result = content.result
-    found: list[Picture] = []
+    found: list[ReportPicture] = []
     if "rgb" in result:
         picture = colour_picture(result["rgb"].values, "Colour", "as seen under daylight (D65), in sRGB")
         rows, columns = result["rgb"].shape[1:]
@@ -114,7 +114,7 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
             (100 * (column + 0.5) / columns, 100 * (row + 0.5) / rows, str(number))
             for number, (row, column) in enumerate(pixels, start=1)
         )
-        found.append(Picture(picture.title, picture.caption, picture.uri, pins=pins))
+        found.append(ReportPicture(picture.title, picture.caption, picture.uri, pins=pins))
     if "depth_mm" in result:
         depth = result["depth_mm"].values
         found.append(value_picture(depth, "Depth", "along the camera axis", "mm", "viridis_r"))

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dsl_core.evaluation.flat_target import SeenTarget
 from dsl_core.evaluation.report.pages import render_page
-from dsl_core.evaluation.report.pictures import Picture, figure_uri, value_picture
+from dsl_core.evaluation.report.pictures import ReportPicture, figure_uri, value_picture
+from dsl_core.evaluation.seen_target import SeenTarget
 from dsl_core.evaluation.stage_test import StageTest, stage_table
 from dsl_core.evaluation.time_sweep import FIGURES, SweepPoint, best_points
 from dsl_core.evaluation.uncertainty import BAND_95
@@ -116,7 +116,7 @@ def sweep_rows(points: Sequence[SweepPoint]) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _residual(name: str, position_mm: float, target: SeenTarget) -> Picture:
+def _residual(name: str, position_mm: float, target: SeenTarget) -> ReportPicture:
     caption = f"{name}: how far behind the plane a pixel lies, RMS {target.plane.rms_mm:.3f} mm"
     title = f"{position_mm:7.1f} mm"
     return value_picture(target.residual_mm, title, caption, "mm", "RdBu_r", symmetric=True)

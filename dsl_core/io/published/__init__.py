@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dsl_core.io.published.calibration import (
     PublishedCalibration,
-    SpectralTables,
+    PublishedTables,
     check_calibration,
     export_calibration,
     holds_calibration,
@@ -32,7 +32,7 @@ __all__ = [
     "FileRecord",
     "PublishedCalibration",
     "PublishedScan",
-    "SpectralTables",
+    "PublishedTables",
     "Stereo",
     "check_calibration",
     "check_dataset",

@@ -48,7 +48,7 @@ class PublishedCalibration:
     """Everything the published files hold; the film's shape and the absolute scale are not in them."""
 
     stereo: Stereo
-    tables: SpectralTables
+    tables: PublishedTables
 
     def rig(self, base: Rig) -> Rig:
         """A rig with these lenses, pose and curves; film, sensor and scales are those of ``base``.
@@ -153,7 +153,7 @@ _GRIDS = {
 
 
 @dataclass(frozen=True)
-class SpectralTables:
+class PublishedTables:
     """Relative curves as published; their common scale is not calibrated."""
 
     response: Rgb
@@ -161,7 +161,7 @@ class SpectralTables:
     efficiency: dict[int, SpectralCurve]
 
 
-def load_tables(folder: Path, wavelengths_nm: ArrayLike | None = None) -> SpectralTables:
+def load_tables(folder: Path, wavelengths_nm: ArrayLike | None = None) -> PublishedTables:
     """Read the three tables; ``wavelengths_nm`` is needed when the number of bands is none of the published.
 
     Raises `CalibrationError` that names the file and the shape it should have.
@@ -169,7 +169,7 @@ def load_tables(folder: Path, wavelengths_nm: ArrayLike | None = None) -> Spectr
     response = _load(folder, "response", wavelengths_nm)
     emission = _load(folder, "emission", wavelengths_nm)
     efficiency = _load(folder, "efficiency", wavelengths_nm)
-    return SpectralTables(
+    return PublishedTables(
         response=(response[0], response[1], response[2]),
         emission=(emission[0], emission[1], emission[2]),
         efficiency=dict(zip(ORDERS, efficiency, strict=True)),

@@ -24,9 +24,9 @@ from dsl_core.io.published.layout import (
     DEPTH_NAME,
     FOLDERS,
     FileRecord,
+    FolderSurvey,
     Place,
     PngInfo,
-    Survey,
     file_name,
     find_folder,
     folder_name,
@@ -57,7 +57,7 @@ class PublishedScan:
     plan: CapturePlan
     bayer: BayerPattern
     bit_depth: int
-    found: Survey = field(repr=False)
+    found: FolderSurvey = field(repr=False)
 
     @property
     def table(self) -> list[FileRecord]:

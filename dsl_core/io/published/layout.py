@@ -71,7 +71,7 @@ def as_published(records: Sequence[FileRecord]) -> tuple[int, int]:
 
 
 @dataclass
-class Survey:
+class FolderSurvey:
     """The usable file of every place, and the table of all files."""
 
     files: dict[Place, Path] = field(default_factory=dict)
@@ -95,9 +95,9 @@ def check_dataset(root: Path, plan: CapturePlan) -> list[FileRecord]:
     return survey(root, plan).records
 
 
-def survey(root: Path, plan: CapturePlan) -> Survey:
+def survey(root: Path, plan: CapturePlan) -> FolderSurvey:
     """Look for every shot of a plan below ``root``."""
-    result = Survey()
+    result = FolderSurvey()
     counts = Counter((shot.role, shot.setting) for shot in plan.shots())
     for (role, setting), count in counts.items():
         _survey_folder(result, root, plan, role, setting, count)
@@ -138,7 +138,7 @@ def _bare(name: str) -> str:
 
 
 def _survey_folder(
-    result: Survey, root: Path, plan: CapturePlan, role: Role, setting: int, count: int
+    result: FolderSurvey, root: Path, plan: CapturePlan, role: Role, setting: int, count: int
 ) -> None:
     folder = find_folder(root, role, setting, plan.settings[setting])
     if folder is None:
@@ -184,7 +184,7 @@ def _is_named(path: Path, role: Role, pattern: int) -> bool:
 
 
 def _survey_frame(
-    result: Survey,
+    result: FolderSurvey,
     root: Path,
     plan: CapturePlan,
     place: Place,

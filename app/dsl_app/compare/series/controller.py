@@ -14,7 +14,7 @@ from dsl_app.shared.known_files import RESULT_NAME
 from dsl_app.shared.notify import Notifier
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import Cancelled, DecodeError, DslError
-from dsl_core.evaluation.flat_target import Region
+from dsl_core.evaluation.seen_target import Region
 from dsl_core.evaluation.stage_test import stage_test
 from dsl_core.evaluation.time_sweep import SweepFigure, require_sweep
 from dsl_core.progress import Progress

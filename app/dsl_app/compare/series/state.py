@@ -7,7 +7,7 @@ from enum import Enum
 from pathlib import Path
 
 from dsl_app.shared.evented import Value
-from dsl_core.evaluation.flat_target import Region, SeenTarget
+from dsl_core.evaluation.seen_target import Region, SeenTarget
 from dsl_core.evaluation.stage_test import StageTest
 from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint
 

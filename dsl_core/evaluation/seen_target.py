@@ -77,7 +77,7 @@ class SeenTarget:
         return float(depth), float(np.sqrt(variance * np.linalg.pinv(sides.T @ sides)[0, 0]))
 
 
-def flat_target(
+def find_target(
     points_mm: Floats, flags: NDArray[np.integer] | None = None, region: Region | None = None
 ) -> SeenTarget:
     """Find the plane of a flat target among points (3, h, w) of an image or a region of it.
