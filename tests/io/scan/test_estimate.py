@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dsl_core.errors import StoreError
+from dsl_core.io.scan.estimate import COMPRESSED_SHARE, MARGIN_BYTES, check_space, estimate, needed_bytes
+from dsl_core.model.plan import CapturePlan
+
+
+def test_an_estimate_counts_frames_seconds_and_bytes(
+    tmp_path: Path, plan: CapturePlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Path] = []
+
+    def usage(place: Path) -> object:
+        asked.append(place)
+        return type("Usage", (), {"free": 123_456_789})()
+
+    monkeypatch.setattr("shutil.disk_usage", usage)
+    found = estimate(plan, tmp_path / "not" / "there" / "scan.dsl", latency_ms=50.0)
+    assert asked == [tmp_path]
+    assert found.frames == plan.shot_count
+    assert found.seconds == pytest.approx(plan.duration_s() + 0.05 * plan.shot_count)
+    assert found.needed_bytes == int(COMPRESSED_SHARE * plan.raw_bytes) + MARGIN_BYTES
+    assert str(found).endswith(f"{found.needed_bytes / 1e6:.0f} MB of 123 MB free")
+
+
+def test_only_the_missing_frames_need_room(
+    tmp_path: Path, plan: CapturePlan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert needed_bytes(plan, 0) == MARGIN_BYTES
+    large = plan.model_copy(update={"camera_size_px": (4000, 3000)})
+    free = needed_bytes(large, 3)
+    monkeypatch.setattr("shutil.disk_usage", lambda place: type("Usage", (), {"free": free})())
+    check_space(tmp_path, large, 3)
+    with pytest.raises(StoreError, match=r"for 4 frames, but .* Free some space or choose another drive"):
+        check_space(tmp_path, large, 4)
