@@ -50,5 +50,5 @@ class CallbackProgress:
     def report(self, stage: str, done: int, total: int) -> None:
         """Forward the report; raise `Cancelled` when the token says so."""
         if self.token.is_cancelled:
-            raise Cancelled(f"Stopped during {stage!r} after {done} of {total} steps, as you asked.")
+            raise Cancelled(f"Stopped during {stage!r} after {done} of {total} steps, as requested.")
         self.callback(stage, done, total)

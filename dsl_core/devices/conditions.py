@@ -60,6 +60,6 @@ def with_calibration(
     if found and not override:
         raise CalibrationError(
             f"The calibration {rig.name!r} is not for these devices: {'; '.join(found)}."
-            " Set them back, calibrate again, or use it all the same with --override-calibration."
+            " Set them back, calibrate again, or use it anyway with --override-calibration."
         )
     return replace(devices, calibration=rig.model_copy(update={"conditions": None}) if found else rig), found

@@ -1,4 +1,4 @@
-"""Lets any writer that wants a path write whole or not at all, and never over what is there."""
+"""Files and folders that are written whole or not at all, and never replace anything by accident."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path
 def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind | None = None) -> None:
     """Raise `StoreError` when a target exists and may not be replaced; asked before long work too.
 
-    A file gives way to a file, a folder only to one of its own ``kind`` and with nothing else in it.
+    A file may replace a file, a folder only one of its own ``kind`` with nothing else in it.
     """
     taken = [target for target in targets if target.exists()]
     for target in taken:
@@ -75,8 +75,8 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
     for target in taken:
         if kind is not None and (why := kind.refusal(target)):
             raise StoreError(
-                f"{target} {why} and is not replaced: {kind.name} gives way to another one, and nothing else"
-                " does. Choose another name."
+                f"{target} {why} and is not replaced: only {kind.name} may be replaced by another."
+                " Choose another name."
             )
 
 

@@ -18,20 +18,22 @@ class SpectralChoice:
 
 #: How the place of each wavelength is computed.
 MODELS: tuple[SpectralChoice, ...] = (
-    SpectralChoice("auto", "The best that the calibration holds", "hybrid, else the grid, else the grating"),
-    SpectralChoice("grating", "Grating equation alone", "needs no depth stage; knows no bend of the film"),
+    SpectralChoice("auto", "Best model in the calibration", "hybrid, else the grid, else the grating"),
+    SpectralChoice("grating", "Grating equation alone", "needs no depth stage; ignores a bend of the film"),
     SpectralChoice("hybrid", "Grating equation and measured residual", "needs a calibrated depth stage"),
     SpectralChoice("grid", "Measured grid", "as published; needs a grid measured on the depth stage"),
 )
 
 #: How spectra are solved for.
 SOLVERS: tuple[SpectralChoice, ...] = (
-    SpectralChoice("best", "Best estimate", "every frame by its noise, with a deviation for each band"),
+    SpectralChoice("best", "Best estimate", "every frame by its noise, with an uncertainty for each band"),
     SpectralChoice(
-        "published", "As published", "Adam on the published objective; many times slower, no deviations"
+        "published",
+        "As published",
+        "Adam on the published objective; many times slower, no uncertainties",
     ),
-    SpectralChoice("nearest-line", "Nearest line", "one frame a band; quick, noisy, no deviations"),
-    SpectralChoice("colour-basis", "Colour alone", "from three colours; quickest, a guess, no deviations"),
+    SpectralChoice("nearest-line", "Nearest line", "one frame a band; quick, noisy, no uncertainties"),
+    SpectralChoice("colour-basis", "Colour alone", "from three colours; quickest, a guess, no uncertainties"),
 )
 
 

@@ -89,7 +89,7 @@ PRESETS: tuple[Preset, ...] = (
     Preset(
         "columns",
         "Published lines",
-        "All lines as published, without the row code: as exact on the twin.",
+        "All lines as published, without the row code: equally accurate on the twin.",
         _plan("columns", ScanLines(), _DARK, _BRIGHT),
     ),
     Preset("reference", "Reference", "As published: row and column code, 318 lines.", CapturePlan()),

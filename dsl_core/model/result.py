@@ -43,7 +43,7 @@ REASONS: dict[Flag, str] = {
         "the measured intensities do not fit any spectrum (mixed materials, interreflection, motion)"
     ),
     Flag.NON_FINITE: "the input or an intermediate value was not a finite number",
-    Flag.CODES_DISAGREE: "codes disagree: light arrives by another way (reflections between surfaces)",
+    Flag.CODES_DISAGREE: "codes disagree: light arrives by another path (reflections between surfaces)",
 }
 
 #: Flags after which depth, respectively the spectrum, is not given at all (NaN).

@@ -131,7 +131,7 @@ def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
     if found:
         raise CalibrationError(
             f"The calibration {rig.name!r} is not for the scan {folder}: {'; '.join(found)} in the scan."
-            " Name the calibration of its rig, or use this one all the same with --override-calibration."
+            " Name the calibration of its rig, or use this one anyway with --override-calibration."
         )
 
 
@@ -171,7 +171,7 @@ def truth_of(
         truth = twin_truth(rig, _grid_of(result))
     if truth is None:
         raise DecodeError(
-            f"The rig {origin[0]!r} knows no truth of its scene."
+            f"The rig {origin[0]!r} has no ground truth of its scene."
             " Name a twin of it with --truth-rig twin and --option."
         )
     return truth

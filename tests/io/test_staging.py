@@ -1,4 +1,4 @@
-"""Nothing gives way but what may: folders to their own kind, files to files, and nothing is lost between."""
+"""Only what may be replaced is: folders by their own kind, files by files, and nothing is lost between."""
 
 from __future__ import annotations
 

@@ -151,9 +151,9 @@ def test_steps_are_captured_anew_on_request(give: Give, tmp_path: Path) -> None:
     assert give("calibrate", "geometry", folder, "--yes", "--redo", "pose").code == 0
     assert len(list((folder / "history" / "geometry").iterdir())) == 1
     assert "has no step night" in give("calibrate", "geometry", folder, "--redo", "night").sentence
-    assert "What it replaced" not in (folder / "report.html").read_text()
+    assert "Replaced calibrations" not in (folder / "report.html").read_text()
     assert give("calibrate", "all", folder, "--yes").code == 0
-    assert "What it replaced" in (folder / "report.html").read_text()
+    assert "Replaced calibrations" in (folder / "report.html").read_text()
 
 
 def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_it_is_listed_scanned_resumed_and_reconstructed(give: Give, tmp_path: Pa
 
     said = give("reconstruct", scan, "--json").json
     assert said["pixels_with_depth"] > 0.3
-    assert "knows no truth" in give("evaluate", tmp_path / "scan.zarr").sentence
+    assert "has no ground truth" in give("evaluate", tmp_path / "scan.zarr").sentence
     truth = ["--truth-rig", "twin", "-o", "size=112x72"]
     figures = give("evaluate", tmp_path / "scan.zarr", *truth, "--json").json["figures"]
     assert figures["depth_rmse_mm"] < 2

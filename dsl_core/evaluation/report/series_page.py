@@ -23,7 +23,7 @@ _SIZE_IN = (8.0, 4.2)
 _COLOURS = {"free": "#4477aa", "fixed": "#cc3311", "best": "#cc3311"}
 _STAGE_NOTE = (
     "A flat target at known positions of a stage. Positions are what the stage says; error bars hold 95 % and"
-    " do not know of errors that all pixels share. A free slope hides an error of scale; a slope of 1 is"
+    " do not include errors that all pixels share. A free slope hides an error of scale; a slope of 1 is"
     " right only for a stage that moves along the camera's axis."
 )
 _SWEEP_NOTE = "Scans of one scene over the seconds of their captures, compared with {}."
@@ -117,7 +117,7 @@ def sweep_rows(points: Sequence[SweepPoint]) -> Table:
 
 
 def _residual(name: str, position_mm: float, target: SeenTarget) -> ReportPicture:
-    caption = f"{name}: how far behind the plane a pixel lies, RMS {target.plane.rms_mm:.3f} mm"
+    caption = f"{name}: distance of each pixel behind the plane, RMS {target.plane.rms_mm:.3f} mm"
     title = f"{position_mm:7.1f} mm"
     return value_picture(target.residual_mm, title, caption, "mm", "RdBu_r", symmetric=True)
 

@@ -213,7 +213,7 @@ def _load(folder: Path, name: str, wavelengths_nm: ArrayLike | None) -> list[Spe
     path = find_table(folder, name)
     if path is None:
         raise CalibrationError(
-            f"{folder / TABLE_NAMES[name][0]} is not there: the table of the {name} is needed."
+            f"{folder / TABLE_NAMES[name][0]} does not exist: the table of the {name} is needed."
         )
     table = np.asarray(_open(path), np.float64)
     rows = table.T if name != "efficiency" and table.ndim == 2 else table

@@ -154,7 +154,7 @@ def _read_nodes(path: Path) -> dict[str, Any]:
     import cv2
 
     if not path.is_file():
-        raise CalibrationError(f"{path} is not there. Give the path of the calibration's XML or YAML file.")
+        raise CalibrationError(f"{path} does not exist. Give the path of the calibration's XML or YAML file.")
     try:
         file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         names = file.root().keys()

@@ -68,8 +68,7 @@ def _pair(path: Path) -> tuple[Path, Path]:
         if header.is_file():
             return header, path
     raise CalibrationError(
-        f"{path.name} lacks its header, without which nobody knows what it holds. Put {headers[0].name}"
-        " next to it."
+        f"{path.name} has no header, which says what it holds. Put {headers[0].name} next to it."
     )
 
 

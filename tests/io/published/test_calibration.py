@@ -125,7 +125,7 @@ def test_unreadable_and_missing_tables(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match=r"CRF\.npy is not an array"):
         load_tables(tmp_path)
     (tmp_path / "CRF.npy").unlink()
-    with pytest.raises(CalibrationError, match=r"CRF\.npy is not there"):
+    with pytest.raises(CalibrationError, match=r"CRF\.npy does not exist"):
         load_tables(tmp_path)
 
 
