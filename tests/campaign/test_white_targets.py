@@ -77,14 +77,9 @@ def spectralon(truth: int, folder: Path) -> tuple[Rig, Rig, SpectralonCalibratio
     return start, SpectralonRecipe().apply(record, start), record
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("white")
-
-
 @pytest.mark.parametrize("truth", [1, 2])
-def test_spectralon_finds_light_white_and_evenness(truth: int, folder: Path) -> None:
-    _, rig, record = spectralon(truth, folder / f"spectralon-{truth}")
+def test_spectralon_finds_light_white_and_evenness(truth: int, module_folder: Path) -> None:
+    _, rig, record = spectralon(truth, module_folder / f"spectralon-{truth}")
     true = true_rig(truth)
     assert not failures(SpectralonRecipe().figures(record))
     np.testing.assert_allclose(whites(rig).sum(1), whites(true).sum(1), rtol=6e-4)
@@ -98,19 +93,19 @@ def test_spectralon_finds_light_white_and_evenness(truth: int, folder: Path) -> 
     assert (gain / gain.mean()).std() < 6e-4
 
 
-def test_spectralon_is_applied_once_and_for_all(folder: Path) -> None:
-    _, rig, record = spectralon(1, folder / "spectralon-1")
+def test_spectralon_is_applied_once_and_for_all(module_folder: Path) -> None:
+    _, rig, record = spectralon(1, module_folder / "spectralon-1")
     again = SpectralonRecipe().apply(record, rig)
     assert again.white_scale == pytest.approx(rig.white_scale, rel=1e-12)
     np.testing.assert_allclose(again.response[0].values, rig.response[0].values, rtol=1e-9)
 
 
-def test_color_checker_refines_what_the_spectralon_left(folder: Path) -> None:
-    _, start, _ = spectralon(1, folder / "spectralon-1")
+def test_color_checker_refines_what_the_spectralon_left(module_folder: Path) -> None:
+    _, start, _ = spectralon(1, module_folder / "spectralon-1")
     # Upside down, as a person might place it.
     devices = twin(1, chart_roll_deg="180")
     recipe = ColorCheckerRecipe()
-    record = calibrate(recipe, devices, start, folder / "color-checker")
+    record = calibrate(recipe, devices, start, module_folder / "color-checker")
     assert isinstance(record, ColorCheckerCalibration)
     assert record.quarter_turns == 2
     assert len(record.patches) == 24
@@ -143,11 +138,11 @@ def test_look_tells_a_bright_even_middle_from_a_chart() -> None:
     ]
 
 
-def test_an_uneven_spectralon_is_told(folder: Path) -> None:
+def test_an_uneven_spectralon_is_told(module_folder: Path) -> None:
     """A chart in the place of the Spectralon: its patches differ, most are far from the median."""
     devices = twin(1)
     recipe = SpectralonRecipe()
-    bench = Bench(devices, folder / "uneven", known(1, devices))
+    bench = Bench(devices, module_folder / "uneven", known(1, devices))
     assert devices.place is not None
     for step in recipe.steps(bench):
         devices.place(Placement(target="color-checker", film=False))
@@ -156,20 +151,20 @@ def test_an_uneven_spectralon_is_told(folder: Path) -> None:
     assert "middle filled by the Spectralon" in [f.name for f in failures(recipe.figures(record))]
 
 
-def test_a_saturated_spectralon_is_told(folder: Path) -> None:
-    start, _, _ = spectralon(1, folder / "spectralon-1")
+def test_a_saturated_spectralon_is_told(module_folder: Path) -> None:
+    start, _, _ = spectralon(1, module_folder / "spectralon-1")
     too_small = start.sensor.model_copy(update={"bit_depth": 10, "black_level_dn": 100.0})
     bright = start.model_copy(update={"sensor": too_small})
     recipe = SpectralonRecipe()
     with pytest.raises(CalibrationError, match=r"White, red, green and blue: Only \d+ pixels"):
-        recipe.fit(Bench(twin(1), folder / "spectralon-1", bright), NONE)
+        recipe.fit(Bench(twin(1), module_folder / "spectralon-1", bright), NONE)
 
 
-def test_a_missing_chart_is_told(folder: Path) -> None:
-    start, _, _ = spectralon(1, folder / "spectralon-1")
+def test_a_missing_chart_is_told(module_folder: Path) -> None:
+    start, _, _ = spectralon(1, module_folder / "spectralon-1")
     devices = twin(1)
     recipe = ColorCheckerRecipe()
-    bench = Bench(devices, folder / "no-chart", start)
+    bench = Bench(devices, module_folder / "no-chart", start)
     (step,) = recipe.steps(bench)
     assert devices.place is not None
     devices.place(Placement(target="spectralon", film=False))
@@ -205,9 +200,9 @@ def test_spectra_may_come_from_files(tmp_path: Path) -> None:
         recipe.capture(bench, first, NONE)
 
 
-def test_an_impossible_reflectance_and_chart_are_told(folder: Path) -> None:
-    start, _, _ = spectralon(1, folder / "spectralon-1")
-    bench = Bench(twin(1), folder / "spectralon-1", start)
+def test_an_impossible_reflectance_and_chart_are_told(module_folder: Path) -> None:
+    start, _, _ = spectralon(1, module_folder / "spectralon-1")
+    bench = Bench(twin(1), module_folder / "spectralon-1", start)
     with pytest.raises(CalibrationError, match="cannot be 99"):
         SpectralonRecipe(reflectance=99.0).fit(bench, NONE)
     with pytest.raises(CalibrationError, match="choose BabelColor Average"):

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,6 +17,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
+from tests.cases.memory import folder_in_memory
 
 KILLS = 20
 ROOT = Path(__file__).parents[2]
@@ -90,16 +89,9 @@ def server(request: pytest.FixtureRequest) -> Iterator[Server]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Iterator[Path]:
-    """A folder in memory where there is one: a killed process loses nothing that it gave to the system.
-
-    Only a power cut tells memory from a disk, and waiting for the disk takes most of the time.
-    """
-    memory = Path("/dev/shm")
-    if not (os.access(memory, os.W_OK) and shutil.disk_usage(memory).free > 1 << 28):
-        yield tmp_path
-        return
-    with tempfile.TemporaryDirectory(prefix="dsl-scan-test-", dir=memory) as name:
-        yield Path(name)
+    """A folder in memory where there is one."""
+    with folder_in_memory(tmp_path) as found:
+        yield found
 
 
 @pytest.mark.timeout(300)

@@ -26,9 +26,9 @@ KNOWN = ("camera", "projector", "pose", "emission", "sensor", "flat_field")
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+def bench(module_folder: Path) -> Bench:
     """All steps captured on a drawn rig."""
-    bench = film_bench(tmp_path_factory.mktemp("bandpass"), 4, KNOWN)
+    bench = film_bench(module_folder, 4, KNOWN)
     response = truth_of(bench.devices).projector_response.model_copy(
         update={"blur_px": 0.6, "halo_peak_per_px": 0.0, "halo_decay_px": 30.0}
     )

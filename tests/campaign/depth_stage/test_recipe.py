@@ -30,9 +30,9 @@ FILTERED = 6
 
 
 @pytest.fixture(scope="module")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+def bench(module_folder: Path) -> Bench:
     """All steps captured; film unknown, geometry as a board tells it, the rest true."""
-    bench = film_bench(tmp_path_factory.mktemp("depth-stage"), 1, SAME)
+    bench = film_bench(module_folder, 1, SAME)
     return take_all(RECIPE, replace(bench, rig=board_calibrated(truth_of(bench.devices), bench.rig, 1)))
 
 
