@@ -158,7 +158,7 @@ def patch_signals(
     for p, pixels in enumerate(samples.pixels):
         for c in range(3):
             own = pixels[channel[pixels] == c]
-            share[p, c] = full[own].mean() if len(own) else 1.0
+            share[p, c] = full[own].mean() if len(own) else 0.0
             values = flat[own[~full[own]]].astype(float)
             if len(values) >= 3:
                 mean[p, c], std[p, c], count[p, c] = _robust_mean(values)

@@ -1,0 +1,145 @@
+"""A chart refines what the data sheets have wrong, judged by patches that the curves never saw."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.colour.color_checker import (
+    LIGHTS,
+    WORST_PERCENT,
+    ChartPictures,
+    color_checker_figures,
+    expected_colours,
+    measure_patches,
+    patch_colours,
+    refine_on_chart,
+)
+from dsl_core.calibration.colour.patches import ChartPose, PatchSignals, patch_samples
+from dsl_core.calibration.light import spectral_refinement
+from dsl_core.calibration.light.spectral_refinement import FINE_NM
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.color_checker import ColorCheckerCalibration
+from dsl_core.model.figure import failures
+from dsl_core.model.rig import Rig
+from dsl_core.optics.charts import chart_reflectance
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.shading import Plane
+from dsl_core.simulation.published_rig import published_rig
+from dsl_core.simulation.random_rig import random_rig
+
+CHART = "BabelColor Average"
+POSE = ChartPose(np.array([[10.0, 8.0], [130.0, 8.0], [130.0, 88.0], [10.0, 88.0]]), 0, 0.0)
+PLANE = Plane(np.array([0.0, 0.1, 1.0]) / 700.0)
+
+
+def signals(rig: Rig, light: int, level: float = 1.0) -> np.ndarray:
+    """Exact signals of the patches under one light, (24, 3), at unit shading."""
+    reflectance = np.stack(list(chart_reflectance(FINE_NM, CHART).values()))
+    response = np.stack([curve.at(FINE_NM) for curve in rig.response])
+    emission = LIGHTS[light] @ np.stack([curve.at(FINE_NM) for curve in rig.emission])
+    return np.asarray(level * rig.white_scale * (reflectance * emission) @ response.T)
+
+
+def seen(rig: Rig, level: float = 1.0, noise: float = 3e-4) -> list[PatchSignals]:
+    rng, found = np.random.default_rng(0), []
+    for light in range(4):
+        mean = signals(rig, light, level)
+        std = noise * (mean + 0.1 * mean.max(0))
+        noisy = mean + std * rng.standard_normal(mean.shape)
+        found.append(PatchSignals(noisy, std, np.full((24, 3), 40), np.zeros((24, 3))))
+    return found
+
+
+@pytest.fixture(scope="module")
+def record() -> ColorCheckerCalibration:
+    """With the published weight alone, which is enough to see that all is put together rightly."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(spectral_refinement, "WEIGHTS", (spectral_refinement.PUBLISHED_WEIGHT * 1e-3,))
+        patch.setattr(spectral_refinement, "REFLECTANCE_ERRORS", (0.0,))
+        return refine_on_chart(known(), seen(truth(), level=1.01), POSE, PLANE, CHART)
+
+
+def truth() -> Rig:
+    return random_rig(2, published_rig())
+
+
+def known() -> Rig:
+    """Emission and white as the Spectralon gave them, the response from a data sheet that fits the white."""
+    true = truth()
+    white = [sum(curve.at(FINE_NM).sum() for curve in rig.response) for rig in (true, published_rig())]
+    return true.model_copy(
+        update={"response": published_rig().response, "white_scale": true.white_scale * white[0] / white[1],
+                "white_scale_rel_std": 0.05}
+    )  # fmt: skip
+
+
+def test_held_out_patches_are_explained_better_than_before(record: ColorCheckerCalibration) -> None:
+    assert record.held_out < 0.5 * record.start
+    assert record.residual <= record.held_out
+    assert record.chart_level == pytest.approx(0.01, abs=0.02)
+    assert [patch.name for patch in record.patches] == list(chart_reflectance(FINE_NM, CHART))
+    assert (record.tilt_deg, record.distance_mm) == (PLANE.tilt_deg, PLANE.distance_mm)
+
+
+def test_curves_that_do_not_help_stay_as_they_were() -> None:
+    true = truth()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(spectral_refinement, "WEIGHTS", (spectral_refinement.PUBLISHED_WEIGHT * 1e-5,))
+        patch.setattr(spectral_refinement, "REFLECTANCE_ERRORS", (0.0,))
+        found = refine_on_chart(true, seen(true, noise=0.01), POSE, PLANE, CHART)
+    assert found.held_out == found.start
+    for before, after in zip(true.response, found.response, strict=True):
+        assert after.at(FINE_NM) == pytest.approx(before.at(FINE_NM), abs=1e-9)
+
+
+def test_colours_to_show_are_measured_and_expected_over_white(record: ColorCheckerCalibration) -> None:
+    measured, expected = patch_colours(record, known())
+    assert measured.shape == expected.shape == (24, 3)
+    assert np.sqrt(np.mean((measured - expected) ** 2)) < 0.02
+    white = list(chart_reflectance(FINE_NM, CHART)).index("white 9.5 (.05 D)")
+    assert measured[white] == pytest.approx(0.9, abs=0.06)
+
+
+def test_expected_colours_are_those_of_the_rig() -> None:
+    assert expected_colours(truth(), CHART) == pytest.approx(signals(truth(), 3), rel=1e-9)
+
+
+def test_figures_pass_and_a_bad_patch_is_named(record: ColorCheckerCalibration) -> None:
+    assert "worst patch" not in " ".join(figure.name for figure in failures(color_checker_figures(record)))
+    spoilt = record.patches[7].model_copy(update={"held_out": 1.1 * WORST_PERCENT / 100})
+    patches = (*record.patches[:7], spoilt, *record.patches[8:])
+    failed = {
+        figure.name: figure
+        for figure in failures(color_checker_figures(record.model_copy(update={"patches": patches})))
+    }
+    (name,) = (name for name in failed if name.startswith("worst patch"))
+    assert record.patches[7].name in name
+    assert record.patches[7].name in failed[name].advice
+
+
+def pictures(rig: Rig) -> ChartPictures:
+    """The chart filling a mosaic of 96 x 140 px, under a shading of one half."""
+    channel = bayer_channels(rig.sensor.bayer, 96, 140)
+    row, column = np.mgrid[:96, :140]
+    patch = (np.clip((row - 8) // 20, 0, 3) * 6 + np.clip((column - 10) // 20, 0, 5)).astype(int)
+    radiance = np.stack([0.5 * signals(rig, light)[patch, channel] for light in range(4)])
+    return ChartPictures(radiance, np.zeros((96, 140), bool), np.full((96, 140), 0.5))
+
+
+def test_patches_are_measured_at_unit_shading_and_saturated_or_small_ones_named() -> None:
+    rig = truth()
+    taken, samples = pictures(rig), patch_samples(POSE.corners_px, (96, 140))
+    found = measure_patches(taken, rig, samples, CHART)
+    for light in range(4):
+        assert found[light].mean == pytest.approx(signals(rig, light), rel=1e-9)
+    name = next(iter(chart_reflectance(FINE_NM, CHART)))
+    full = taken.saturated.copy()
+    full[8:28, 10:30] = True
+    with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker is saturated"):
+        measure_patches(replace(taken, saturated=full), rig, samples, CHART)
+    few = replace(samples, pixels=(samples.pixels[0][:12], *samples.pixels[1:]))
+    with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker shows [0-7] pixels"):
+        measure_patches(taken, rig, few, CHART)

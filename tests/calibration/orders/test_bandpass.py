@@ -1,0 +1,128 @@
+"""From the light of filters to efficiencies and their deviations; filters that cannot be used are named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.calibration.light.chain_equations import LineScan
+from dsl_core.calibration.light.zero_order import ZeroOrderFit
+from dsl_core.calibration.orders.bandpass import SeenFilter, fit_bandpass, profile_scan
+from dsl_core.calibration.orders.order_light import FilterLight, OrderLight
+from dsl_core.errors import CalibrationError
+from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
+from dsl_core.model.plan import ScanLines
+from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
+from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.published_rig import published_rig
+
+RIG = published_rig()
+RIG = RIG.model_copy(update={"camera": RIG.camera.resized(112, 72)})
+CENTRES, REFLECTANCE, SHARE, NOISE = range(440, 651, 15), 0.99, 0.045, 1e-3
+
+
+def seen(centre: float, really_nm: float | None = None, seed: int = 0) -> SeenFilter:
+    """What the rig shows through a filter: every ratio with a noise of a thousandth of the zero order's."""
+    rng = np.random.default_rng((seed, int(centre)))
+    light = passed(RIG, nominal_filter(really_nm or centre))
+    nm = float(light.sum(0) @ FINE_NM / light.sum())
+    orders = {}
+    for order in (1, -1, 2, -2):
+        first = order // abs(order)
+        ratio = light @ RIG.efficiency[first].at(FINE_NM) / light.sum(1)
+        ratio = (ratio if abs(order) == 1 else SHARE * ratio) + 1e-4 * rng.standard_normal(3)
+        sine = order * nm / RIG.film.period_nm
+        offset = RIG.projector.fx_px * sine / np.sqrt(1 - sine**2)
+        orders[order] = OrderLight(order, ratio, np.full(3, 1e-4), offset, 0.2, 0.95, 3.0, 2000)
+    zero = REFLECTANCE * light.sum(1) * (1 + NOISE * rng.standard_normal(3))
+    return SeenFilter(
+        centre, nominal_filter(centre), True, FilterLight(zero, NOISE * zero, orders, (0.0, 0.01), 0.0)
+    )
+
+
+def without_filter() -> tuple[LineScan, ZeroOrderFit]:
+    """White pixels all over the image, and the fit of their amplitudes."""
+    rng = np.random.default_rng(1)
+    pixels = np.sort(rng.choice(112 * 72, 2500, replace=False))
+    colours = bayer_channels(RIG.sensor.bayer, 72, 112).ravel()[pixels]
+    shading = rng.uniform(0.5, 1.0, len(pixels))
+    white = REFLECTANCE * chain_response(RIG, 0, FINE_NM).sum((1, 2))
+    amplitude = white[colours] * shading * (1 + 0.003 * rng.standard_normal(len(pixels)))
+    none = np.zeros(len(pixels))
+    scan = LineScan(
+        ScanLines(width_px=5, step_px=5), pixels, np.full(len(pixels), 700.0), shading,
+        rng.uniform(20.0, 620.0, len(pixels)), amplitude, none, np.zeros((128, len(pixels))),
+        np.ones((128, len(pixels))),
+    )  # fmt: skip
+    good = np.ones(len(pixels), bool)
+    response = RIG.projector_response.model_copy(update={"blur_px": 0.7})
+    return scan, ZeroOrderFit(scan.column_px, amplitude, good, response, (0.01, 1e-5, 0.5), 1.0)
+
+
+@pytest.fixture(scope="module")
+def record() -> BandpassCalibration:
+    scan, profile = without_filter()
+    assert profile_scan(scan).pixels.tolist() == scan.pixels.tolist()
+    return fit_bandpass(RIG, scan, profile, [seen(nm) for nm in CENTRES], REFLECTANCE)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_first_orders_are_within_half_a_percent(record: BandpassCalibration, order: int) -> None:
+    nm = np.arange(450.0, 641.0, 10.0)
+    truth = RIG.efficiency[order].at(nm)
+    assert record.efficiency[order].at(nm) == pytest.approx(truth, rel=5e-3)
+    assert record.misfit[order] <= 2.0
+
+
+def test_the_second_order_has_a_share_and_the_deviations_of_both(record: BandpassCalibration) -> None:
+    assert abs(record.second_order_share - SHARE) < 4 * record.second_order_share_std
+    assert record.second_order_share_std < 0.01 * SHARE
+    for order in (1, -1):
+        first, second = record.efficiency[order], record.efficiency[2 * order]
+        assert second.values == pytest.approx(record.second_order_share * np.array(first.values))
+        assert first.std is not None
+        assert second.std is not None
+        squares = (record.second_order_share * np.array(first.std)) ** 2
+        squares += (record.second_order_share_std * np.array(first.values)) ** 2
+        assert second.std == pytest.approx(np.sqrt(squares))
+
+
+def test_response_and_white_scale_stay_where_they_are_right(record: BandpassCalibration) -> None:
+    after = apply_bandpass(record, RIG)
+    for truth, found in zip(RIG.response, after.response, strict=True):
+        scale = after.white_scale / RIG.white_scale
+        bright = truth.at(FINE_NM) > 0.3 * max(truth.values)
+        assert scale * found.at(FINE_NM)[bright] == pytest.approx(truth.at(FINE_NM)[bright], rel=0.01)
+    assert after.projector_response.blur_px == 0.7
+    assert record.blur_std_px == 0.01
+
+
+def test_filters_are_listed_with_where_their_orders_put_them(record: BandpassCalibration) -> None:
+    assert [each.filter_nm for each in record.filters] == list(CENTRES)
+    for each in record.filters:
+        assert each.found_nm == pytest.approx(each.effective_nm, abs=0.5)
+        assert [sample.order for sample in each.orders] == [-2, -1, 1, 2]
+    assert record.warnings == ()
+
+
+def test_wrong_filters_and_a_target_that_moved_are_named_together() -> None:
+    scan, profile = without_filter()
+    filters = [seen(nm, 530.0 if nm == 500 else None) for nm in CENTRES]
+    filters[-1] = replace(filters[-1], light=replace(filters[-1].light, shift_px=(0.4, 0.01)))
+    with pytest.raises(CalibrationError) as error:
+        fit_bandpass(RIG, scan, profile, filters, REFLECTANCE)
+    assert "The filter of 500 nm: its first orders are where" in str(error.value)
+    assert "the filter of 650 nm: the zero order is +0.40 columns" in str(error.value)
+    assert "545 nm" not in str(error.value)
+
+
+def test_no_filters_and_no_target_are_refused() -> None:
+    scan, profile = without_filter()
+    with pytest.raises(CalibrationError, match="No filter was captured"):
+        fit_bandpass(RIG, scan, profile, [])
+    blind = replace(profile, good=np.zeros(len(profile.good), bool))
+    with pytest.raises(CalibrationError, match="shows too little of the target"):
+        fit_bandpass(RIG, scan, blind, [seen(nm) for nm in CENTRES], REFLECTANCE)
