@@ -169,7 +169,7 @@ class ImportDialog(JobDialog):
 
     def _judge(self) -> None:
         view = import_view(self._state)
-        self.judge(view.trouble, view.remark, view.is_busy)
+        self.show_status(view.trouble, view.remark, view.is_busy)
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""

@@ -23,7 +23,7 @@ Region = tuple[int, int, int, int]
 NO_CAMERA = "No camera is connected. Connect a rig first."
 #: Lost frames in a row after which a camera counts as lost.
 LOST_AFTER = 3
-#: Shortest time between two live frames, s: a twin would else keep a core busy for nobody.
+#: Shortest time between two live frames, s: without it, the simulated rig would keep a core busy.
 LIVE_PERIOD_S = 1 / 30
 #: A frame belongs to the requested exposure if its own differs by less than this share: cameras round.
 SAME_EXPOSURE = 0.02

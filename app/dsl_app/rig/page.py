@@ -20,6 +20,7 @@ from dsl_app.rig.controller import LiveController
 from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.rig.state import rig_view
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, set_role
@@ -139,8 +140,7 @@ class RigPage(PageWidget):
             state.live.follow(self._switch_timer),
             live.exposure_ms.follow(self._show_exposure),
             state.used_by.follow(self.projector.set_user),
-            *(value.changed.connect(lambda _: self._show()) for value in (state.link, state.trouble)),
-            live.is_exposing.changed.connect(lambda _: self._show()),
+            *follow_any(self._show, state.link, state.trouble, live.is_exposing),
         ]
 
     def _toggle_link(self) -> None:

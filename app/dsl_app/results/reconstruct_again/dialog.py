@@ -156,7 +156,7 @@ class ReconstructionDialog(JobDialog):
         self.override.setEnabled(request.calibration != OWN)
 
     def _judge(self) -> None:
-        self.judge(self._state.trouble.value, self._state.cost.value)
+        self.show_status(self._state.trouble.value, self._state.cost.value)
 
     # Do --------------------------------------------------------------------------------------------
 

@@ -96,7 +96,7 @@ class JobDialog(QDialog):
         self.column.addWidget(self.text)
         self.column.addWidget(self.buttons)
 
-    def judge(self, trouble: str, remark: str, is_busy: bool = False) -> None:
+    def show_status(self, trouble: str, remark: str, is_busy: bool = False) -> None:
         """Show what is wrong, else the remark; the work can only start when nothing is wrong."""
         self.text.setText(trouble or remark)
         set_role(self.text, "warn" if trouble else "muted")
