@@ -98,7 +98,7 @@ class ComparePage(PageWidget):
         return (self._series_control if self._shows_series else self._control).command_line()
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self.pair.apply_theme(theme)
         self._series.apply_theme(theme)
 

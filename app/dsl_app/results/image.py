@@ -242,7 +242,7 @@ class ResultImage(QWidget):
             self.overlay.setRect(-0.5, -0.5, width, height)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         self.canvas.setBackground(theme.base)
         self.box.set_colour(theme.accent)

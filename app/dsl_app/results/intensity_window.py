@@ -104,7 +104,7 @@ class IntensityWindow(QDialog):
         )
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         theme_plots((self.plot,), theme)
         self.item.getAxis("top").setPen(theme.line)
         self.item.getAxis("top").setTextPen(theme.muted)

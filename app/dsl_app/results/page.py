@@ -206,7 +206,7 @@ class ResultsPage(PageWidget):
         dialog.open()
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         for panel in self._panels:
             panel.apply_theme(theme)

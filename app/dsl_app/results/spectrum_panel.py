@@ -101,7 +101,7 @@ class SpectrumPanel(QWidget):
         return tuple((curve.solid, mark.name) for mark, curve in self._curves.values())
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         theme_plots((self.plot,), theme)
         self.band_line.setPen(pg.mkPen(theme.accent, width=1, style=Qt.PenStyle.DashLine))

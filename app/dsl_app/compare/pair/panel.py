@@ -131,7 +131,7 @@ class PairPanel(QWidget):
             button.setEnabled(is_enabled)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._pictures.apply_theme(theme)
         self._figures.apply_theme(theme)
 
@@ -180,7 +180,7 @@ class PairFigures(QSplitter):
             )
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         theme_plots((self.plot,), theme)
         self.curves[0].set_colour(theme.pins[0], width=2)
         self.curves[1].set_colour(theme.pins[1], width=2, dashed=True)

@@ -166,7 +166,7 @@ class PairPictures(QWidget):
                 cross.setPos(*pixel)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         self.canvas.setBackground(theme.base)
         for cross in self.crosses:

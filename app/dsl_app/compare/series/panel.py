@@ -152,7 +152,7 @@ class SeriesPanel(QWidget):
         box.setCurrentIndex([path for _, path in display.references].index(self._state.against.value))
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self.table.apply_theme(theme)
         self._plot.apply_theme(theme)
         self._picture.apply_theme(theme)

@@ -108,7 +108,7 @@ class SeriesPicture(QWidget):
             self._control.set_region(self.rectangle.region(shape[1], shape[0]))
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         self.canvas.setBackground(theme.base)
         self.rectangle.apply_theme(theme)

@@ -141,7 +141,7 @@ class SeriesPlot(QWidget):
             item.getAxis(side).setTicks([ticks(10**low, 10**high)])
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         theme_plots((self.plot,), theme)
         self.draw()

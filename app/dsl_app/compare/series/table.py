@@ -102,7 +102,7 @@ class SeriesTable(ReadTable):
             self._control.select(self._state.rows.value[rows[0].row()].path)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         self.show_series()
 

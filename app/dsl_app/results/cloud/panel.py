@@ -256,7 +256,7 @@ class CloudPanel(QWidget):
     # Theme and end ---------------------------------------------------------------------------------
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         if self.view is not None:
             self.view.set_background(theme.base)

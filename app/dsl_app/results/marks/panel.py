@@ -200,7 +200,7 @@ class MarksPanel(QWidget):
         self.figures.setText(text)
 
     def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
+        """Apply the colours of a theme."""
         self._theme = theme
         self._fill()
 

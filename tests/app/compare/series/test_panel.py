@@ -1,84 +1,23 @@
-"""The Compare page's two tabs: what is dropped on a series, its table, plot and pictures."""
+"""The series tab: its table, plot and pictures by mouse and keys."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
-from dsl_app.compare.page import ComparePage
-from dsl_app.compare.pair.controller import PairController
-from dsl_app.compare.pair.state import PairState
-from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.panel import SeriesPanel
-from dsl_app.compare.series.state import NOTHING, SeriesKind, SeriesState
-from dsl_app.shared.jobs.qt_runner import QtRunner
-from dsl_app.shared.theme import DARK, LIGHT
-from dsl_app.shared.undo import UndoStack
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from dsl_app.compare.series.state import NOTHING, SeriesKind
+from dsl_app.shared.theme import DARK
+from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit
+from PySide6.QtWidgets import QFileDialog, QLineEdit
 from pytestqt.qtbot import QtBot
 
-from tests.app.support.doubles import RecordingNotifier
-from tests.cases.stage_series import write_stage, write_sweep
-
-POSITIONS = (700.0, 725.0, 750.0, 775.0)
-
-
-@dataclass
-class Bench:
-    page: ComparePage
-    state: SeriesState
-    pair: PairState
-    undo: UndoStack
-
-    @property
-    def panel(self) -> SeriesPanel:
-        return self.page.series
-
-    def see(self) -> SeriesPanel:
-        self.page.tabs.setCurrentIndex(1)
-        return self.panel
-
-    def drop(self, *paths: Path) -> None:
-        data = QMimeData()
-        data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
-        left, none = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
-        enter = QDragEnterEvent(QPoint(300, 300), Qt.DropAction.CopyAction, data, left, none)
-        QApplication.sendEvent(self.page, enter)
-        assert enter.isAccepted()
-        QApplication.sendEvent(
-            self.page, QDropEvent(QPointF(300, 300), Qt.DropAction.CopyAction, data, left, none)
-        )
-
-
-@pytest.fixture(scope="module")
-def stage(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    folder = tmp_path_factory.mktemp("stage")
-    return [write_stage(folder, position, seed=i) for i, position in enumerate(POSITIONS)]
-
-
-@pytest.fixture
-def bench(qtbot: QtBot) -> Iterator[Bench]:
-    runner, undo, notifier = QtRunner(), UndoStack(), RecordingNotifier()
-    pair, state = PairState(), SeriesState()
-    page = ComparePage(
-        pair,
-        PairController(pair, runner, notifier),
-        state,
-        SeriesController(state, runner, notifier, undo),
-    )
-    qtbot.addWidget(page)
-    page.apply_theme(LIGHT)
-    page.resize(1180, 700)
-    page.show()
-    yield Bench(page, state, pair, undo)
-    page.release()
-    runner.shut_down()
+from tests.app.support.compare_page import POSITIONS, Bench
+from tests.app.support.compare_page import bench as bench
+from tests.app.support.compare_page import stage as stage
+from tests.cases.stage_series import write_sweep
 
 
 def filled(qtbot: QtBot, bench: Bench, stage: list[Path]) -> SeriesPanel:
@@ -86,14 +25,6 @@ def filled(qtbot: QtBot, bench: Bench, stage: list[Path]) -> SeriesPanel:
     bench.drop(*stage)
     qtbot.waitUntil(lambda: len(bench.state.counted) == len(stage), timeout=30_000)
     return panel
-
-
-def test_two_results_dropped_together_are_both_opened(qtbot: QtBot, bench: Bench, stage: list[Path]) -> None:
-    bench.drop(*stage[:2])
-    qtbot.waitUntil(lambda: bench.pair.pair.value is not None, timeout=30_000)
-    pair = bench.pair.pair.value
-    assert pair is not None
-    assert (pair.first.name, pair.second.name) == ("stage 700 mm", "stage 725 mm")
 
 
 def test_an_empty_series_says_what_to_do(qtbot: QtBot, bench: Bench) -> None:
@@ -198,16 +129,3 @@ def test_accuracy_over_time_and_its_report(
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "s.html"), ""))
     QTest.mouseClick(panel.report, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: (tmp_path / "s.html").exists(), timeout=30_000)
-
-
-def test_the_action_leads_to_the_series(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-
-    def refuse(_parent: object, title: str) -> str:
-        asked.append(title)
-        return ""
-
-    monkeypatch.setattr(QFileDialog, "getExistingDirectory", refuse)
-    bench.page.page_actions()["series_add"]()
-    assert bench.page.tabs.currentIndex() == 1
-    assert asked == ["Add a result, or a folder that contains several"]
