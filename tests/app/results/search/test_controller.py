@@ -6,11 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from dsl_app.results.search.controller import SearchController
 from dsl_app.results.search.panel import HINT, search_text
-from dsl_app.results.state import SearchMode
+from dsl_app.results.state import Mark, SearchMode
+from dsl_app.shared.spectrum import Spectrum
 
+from tests.app.support.doubles import ManualRunner, RecordingNotifier
 from tests.app.support.results_controller import Bench
 from tests.app.support.results_controller import bench as bench
+from tests.app.support.small_result import BLUE, NM
 
 
 def test_looking_for_a_spectrum_finds_its_material(bench: Bench) -> None:
@@ -68,3 +72,22 @@ def test_what_was_found_is_said_in_a_sentence(bench: Bench) -> None:
     )
     nowhere = replace(search.likeness, angle_rad=np.full_like(search.likeness.angle_rad, np.nan))
     assert search_text(replace(search, likeness=nowhere)) == "No pixel of this result has a spectrum."
+
+
+def test_a_mark_without_spectrum_is_not_searched_for(bench: Bench) -> None:
+    mark = Mark("pin", "lost", 0, Spectrum(NM, BLUE), pixel=(3, 3), trouble="Its pixel has no spectrum.")
+    bench.state.marks.set((mark,))
+    bench.state.selected.set(mark.key)
+    bench.control.search.start(SearchMode.SPECTRUM)
+    assert "Select a pin" in bench.told
+    assert bench.state.search.value is None
+
+
+def test_a_search_that_ends_after_another_result_was_opened_is_dropped(bench: Bench, tmp_path: Path) -> None:
+    runner, notifier = ManualRunner(), RecordingNotifier()
+    search = SearchController(bench.state, runner, notifier)
+    bench.control.point_at((30, 5))
+    search.start(SearchMode.SPECTRUM)
+    bench.control.open(tmp_path / "small.zarr")
+    runner.run_all()
+    assert bench.state.search.value is None
