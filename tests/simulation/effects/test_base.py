@@ -8,12 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.model.plan import CapturePlan
-from dsl_core.optics.led_cycle import led_weights
 from dsl_core.simulation.effects.base import LightPath, Limits, make_view
 from dsl_core.simulation.effects.catalogue import EFFECTS, Choice
 from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
-from dsl_core.simulation.effects.projector_light import largest_deviation
 from dsl_core.simulation.effects.tolerance import Tolerance
 from dsl_core.simulation.rendered_scene import EffectRequest
 from tests.cases.effect_scenes import (
@@ -31,8 +28,6 @@ from tests.cases.effect_scenes import (
 #: These change how light becomes numbers, or only frames with time and noise; they have tests of their own.
 LATER = {"led-cycle", "shot-noise", "read-noise", "saturation"}
 BY_NAME = {effect.name: effect for effect in EFFECTS}
-
-
 #: What single precision rounds of a full scale.
 ROUNDING_DN = 1e-3
 IMAGES = pictures(np.random.default_rng(3))
@@ -64,51 +59,6 @@ def test_what_a_scene_calls_for_changes_it_by_more_than_the_tolerance_and_less_t
     without = frames_dn(BY_NAME[name].leave_out(path), IMAGES, Limits(path).exposure_ms)
     change = float(np.abs(without - frames).max())
     assert plan.tolerance.value < change <= BY_NAME[name].bound(Limits(path)).dn + ROUNDING_DN
-
-
-def test_leds_in_turn_change_a_frame_within_the_bound() -> None:
-    worlds = [troubled_world("plane"), troubled_world("plane")]
-    worlds[1].request = EffectRequest(Choice("steady", frozenset(BY_NAME) - {"led-cycle"}))
-    worlds[0].request = EffectRequest(Choice.of("all"))
-    exposure_ms, frames = CapturePlan().settings[0].exposure_ms, []
-    for world in worlds:
-        world.noise = False
-        world.show(np.full((HEIGHT, WIDTH), 51, np.uint8))
-        frames.append(world.expose(exposure_ms, 0).astype(float))
-    change = np.abs(frames[0] - frames[1]).max()
-    assert 1 < change <= BY_NAME["led-cycle"].bound(Limits(worlds[0].everything())).dn
-
-
-@pytest.mark.parametrize("periods", [0.2, 0.9, 9.6, 20.34])
-def test_the_largest_share_of_an_led_is_met_by_some_start(periods: float) -> None:
-    shares = [led_weights(start, 100 * periods, 100.0) for start in np.linspace(0, 100, 601)]
-    worst = np.abs(np.array(shares) - 1).max()
-    assert worst == pytest.approx(largest_deviation(periods), rel=2e-2)
-    assert worst <= largest_deviation(periods) + 1e-12
-
-
-@pytest.mark.parametrize("name", ["shot-noise", "read-noise"])
-def test_noise_lies_within_its_bound_and_shows(name: str) -> None:
-    frames = []
-    for names in (frozenset(BY_NAME), frozenset(BY_NAME) - {name}):
-        world = world_of("plane", request=EffectRequest(Choice("some", names)))
-        world.show(np.full((HEIGHT, WIDTH), 51, np.uint8))
-        frames.append(world.expose(20.0, 0).astype(float))
-    change = np.abs(frames[0] - frames[1]).max()
-    # Both frames are rounded.
-    assert 1 < change <= BY_NAME[name].bound(Limits(world.everything())).dn + 1
-
-
-def test_without_saturation_numbers_go_on_to_the_end_of_the_container() -> None:
-    world = world_of(
-        "plane", request=EffectRequest(Choice("some", frozenset(BY_NAME) - {"saturation"})), noise=False
-    )
-    world.show(np.full((HEIGHT, WIDTH), 204, np.uint8))
-    frame = world.expose(1000 / 6, 0)
-    full = world.rig.sensor.full_scale_dn
-    assert full < frame.max()
-    bound = BY_NAME["saturation"].bound(Limits(world.everything()))
-    assert frame.max() - full <= bound.dn
 
 
 @pytest.mark.parametrize("scene", ["plane tilt_y_deg=20", "leaves", "sphere gloss=1e-8", "face"])
