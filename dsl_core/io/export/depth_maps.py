@@ -7,6 +7,7 @@ written by `export_png`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 #: The tag of TIFF that describes an image in words.
 DESCRIPTION = 270
+#: Files with what they hold, in words and as arrays (rows, columns).
+_Planes = dict[Path, tuple[str, NDArray[np.float32 | np.uint16]]]
 
 
 def export_tiff(
@@ -33,19 +36,15 @@ def export_tiff(
     Each file says what it holds and where it comes from. Raises `StoreError`.
     """
     require_suffix(path, ".tiff", ".tif")
-    planes = _depth_planes(result, "A TIFF of depth", path)
-    source = [f"{key}: {value}" for key, value in provenance(result).items()]
-    with staged(list(planes), overwrite=overwrite) as drafts:
-        for draft, (title, values) in zip(drafts, planes.values(), strict=True):
-            check()
-            _write(draft, values, ascii_text("\n".join([title, *source])))
-    return list(planes)
-
-
-def _write(path: Path, values: NDArray[Any], description: str) -> None:
     from PIL import Image
 
-    Image.fromarray(values).save(path, format="TIFF", tiffinfo={DESCRIPTION: description})
+    source = [f"{key}: {value}" for key, value in provenance(result).items()]
+
+    def write(draft: Path, title: str, values: NDArray[Any]) -> None:
+        description = ascii_text("\n".join([title, *source]))
+        Image.fromarray(values).save(draft, format="TIFF", tiffinfo={DESCRIPTION: description})
+
+    return _write_planes(_depth_planes(result, "A TIFF of depth", path), write, overwrite, check)
 
 
 def export_npy(
@@ -56,11 +55,21 @@ def export_npy(
     Raises `StoreError`.
     """
     require_suffix(path, ".npy")
-    planes = _depth_planes(result, "An array of depth", path)
+
+    def write(draft: Path, title: str, values: NDArray[Any]) -> None:
+        np.save(draft, values)
+
+    return _write_planes(_depth_planes(result, "An array of depth", path), write, overwrite, check)
+
+
+def _write_planes(
+    planes: _Planes, write: Callable[[Path, str, NDArray[Any]], None], overwrite: bool, check: Check
+) -> list[Path]:
+    """Write every plane to its file, whole or not at all; returns the files."""
     with staged(list(planes), overwrite=overwrite) as drafts:
-        for draft, (_, values) in zip(drafts, planes.values(), strict=True):
+        for draft, (title, values) in zip(drafts, planes.values(), strict=True):
             check()
-            np.save(draft, values)
+            write(draft, title, values)
     return list(planes)
 
 
@@ -70,9 +79,7 @@ def depth_files(path: Path, has_std: bool, has_flags: bool) -> list[Path]:
     return [path.with_name(f"{path.stem}{ending}{path.suffix}") for ending in endings]
 
 
-def _depth_planes(
-    result: xr.Dataset, format_name: str, path: Path
-) -> dict[Path, tuple[str, NDArray[np.float32 | np.uint16]]]:
+def _depth_planes(result: xr.Dataset, format_name: str, path: Path) -> _Planes:
     """What `depth_files` hold, each with a sentence that says so."""
     require(result, format_name, "depth_mm")
     planes: list[tuple[str, NDArray[np.float32 | np.uint16]]] = [
