@@ -49,12 +49,12 @@ class IntensityGraph:
 
 
 def find_session(result: ResultArrays) -> Path:
-    """The scan beside a result that it was made of; raises `StoreError` when it is not there."""
+    """The scan next to a result that it was made of; raises `StoreError` when it is not there."""
     return session_of(result.path, result.attributes)
 
 
 def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
-    """The scan beside a result with these attributes; raises `StoreError` when it is not there."""
+    """The scan next to a result with these attributes; raises `StoreError` when it is not there."""
     from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.manifest import read_manifest
 
@@ -63,7 +63,7 @@ def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
         if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
             return folder
     raise StoreError(
-        f"The scan of {path.name} is not beside it, so that its frames cannot be read."
+        f"The scan of {path.name} is not next to it, so that its frames cannot be read."
         f" Move the scan of {captured or 'this result'} to {path.parent}."
     )
 
@@ -93,7 +93,7 @@ class FrameBlock:
     plan: CapturePlan
 
     def holds(self, pixel: tuple[int, int]) -> bool:
-        """Whether a pixel (x, y) lies in the block with the neighbours that demosaicing needs."""
+        """Whether a pixel (x, y) is in the block with the neighbours that demosaicing needs."""
         count = self.radiance.shape[:0:-1]
         for at, first, many, size in zip(pixel, self.origin, count, self.plan.camera_size_px, strict=True):
             low = first + (2 if first > 0 else 0)
