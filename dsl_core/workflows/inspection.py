@@ -49,7 +49,7 @@ class IntensityGraph:
 
 
 def find_session(result: ResultArrays) -> Path:
-    """The scan next to a result that it was made of; raises `StoreError` when it is not there."""
+    """The scan that a result was made from, next to it; raises `StoreError` when it is not there."""
     return session_of(result.path, result.attributes)
 
 
@@ -149,13 +149,11 @@ def _calibration(reader: ScanReader, result: ResultArrays) -> Rig:
 
 
 def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, int]) -> IntensityGraph:
-    """What a pixel (x, y) of a block saw; raises `DecodeError` when it lies outside."""
+    """What a pixel (x, y) of a block saw; raises `DecodeError` when it is outside."""
     from dsl_core.optics.demosaic import demosaic, demosaic_variance
 
     if not block.holds(pixel):
-        raise DecodeError(
-            f"Pixel {pixel[0]}, {pixel[1]} lies outside the frames that were read. Read its own."
-        )
+        raise DecodeError(f"Pixel {pixel[0]}, {pixel[1]} is outside the frames that were read. Read its own.")
     x, y = pixel[0] - block.origin[0], pixel[1] - block.origin[1]
     # A neighbourhood with an even corner, large enough for bilinear demosaicing.
     left, top = max(x - 2, 0) // 2 * 2, max(y - 2, 0) // 2 * 2
