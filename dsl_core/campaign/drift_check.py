@@ -33,10 +33,10 @@ LINE_STEP_PX = 40
 PIXELS = 4000
 #: Certified reflectance of a fresh Spectralon over the visible bands.
 SPECTRALON = 0.99
-#: The exposures of the quick shot are not the user's to lower.
+#: The user cannot lower the exposures of the quick shot.
 SATURATED_ADVICE = (
-    "The check has exposures of its own. Put aperture, gain and the projector's brightness back to what they"
-    " were at the calibration, dim the room, and do not hold the target nearer than the calibrated depths."
+    "The check has exposures of its own. Set aperture, gain and the projector's brightness as they were at"
+    " the calibration, dim the room, and do not hold the target nearer than the calibrated depths."
 )
 
 

@@ -21,7 +21,7 @@ from dsl_core.progress import Progress
 
 
 class Guide(Protocol):
-    """Who is asked and told while a calibration runs; may raise `Cancelled` to stop."""
+    """Asks and informs a person while a calibration runs; may raise `Cancelled` to stop."""
 
     def begins(self, session: CalibrationSession, missing: int) -> None:
         """A calibration begins; ``missing`` of its steps have no captures yet."""
@@ -38,7 +38,7 @@ class Guide(Protocol):
 
 @dataclass(frozen=True)
 class Named:
-    """Progress of one step, told under its name."""
+    """Progress of one step, reported under its name."""
 
     progress: Progress
     name: str

@@ -16,7 +16,7 @@ from dsl_core.model.rig import Rig
 
 from .conftest import Give
 
-PLANE = ["-o", "size=160x104", "-o", "scene=plane"]
+PLANE = ["-o", "size=112x72", "-o", "scene=plane"]
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CalibrationLibra
 
 
 def calibrated(white_scale: float = 1.0) -> Rig:
-    with open_rig("twin", {"size": "160x104", "scene": "plane"}) as devices:
+    with open_rig("twin", {"size": "112x72", "scene": "plane"}) as devices:
         assert devices.calibration is not None
         rig = devices.calibration
         figure = Figure(name="rms", value=0.4, std=0.1, unit="px", high=0.3, advice="Repeat it.")

@@ -46,7 +46,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
     """The calibration with a classic Color Checker of 24 patches.
 
     ``chart`` names the table of reflectances in colour-science; ``corners_px`` are column and row of the four
-    outer corners of the patches, in cyclic order from any, where the chart is not found by itself;
+    outer corners of the patches, in cyclic order from any of them, where the chart is not found without;
     ``depth_mm`` is how far away it stands.
     """
 

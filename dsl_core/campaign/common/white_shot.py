@@ -39,7 +39,7 @@ LEVELS, CYCLES = (1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2), 6
 TOO_DARK = 0.02
 #: White after the shortest exposure (DN), and light that is not the projector's (% of white).
 LEAST_DN, MOST_OTHER = 0.5, 20.0
-#: A filter whose colours fit another one so many nm away so much better (chi-square) is another one.
+#: Colours that fit a filter this many nm away this much better (chi-square) are those of another filter.
 COLOUR_NM, COLOUR_GAIN = 14.0, 12.0
 #: White without a filter is at least this many times brighter than through one.
 OPEN_FACTOR = 3.0

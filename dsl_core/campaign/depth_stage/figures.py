@@ -8,11 +8,11 @@ from dsl_core.model.figure import Figure
 
 #: Flatness of a plane and error of a stage's step, mm; error of columns that a fit never saw, px.
 MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
-#: How far planes may move the geometry, in its deviations, without a doubt.
+#: How far planes may move the geometry, in its deviations, before it is in doubt.
 MAX_PULL = 1.8
 #: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
 MAX_BOW_MM, BOW_SIGMAS = 0.2, 3.0
-#: Filters and LEDs may disagree by so much (nm, at a wavelength) or so many deviations: the larger counts.
+#: Filters and LEDs may disagree by this much (nm, at a wavelength) or this many deviations, the larger.
 #: The film's line density makes up for filters that are all off by one share; only the LEDs' spectra tell.
 MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
 
@@ -59,7 +59,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             unit="deviations",
             high=MAX_PULL,
             advice="Use a flatter target, check the stage's scale and the board's printed size, or calibrate"
-            " the geometry again: one of them is not what it seems.",
+            " the geometry again: one of them is wrong.",
         ),
         *_bow(record),
         Figure(name="depth left open by the geometry", value=record.depth_std_mm, unit="mm"),
@@ -103,8 +103,8 @@ def _chain(chain: ChainCorrection | None) -> tuple[Figure, ...]:
         std=std_nm,
         low=-limit,
         high=limit,
-        advice="All filters together pass other light than stated: to the blue when they are tilted. Put them"
-        " flat before the lens, and check their transmissions and the spectroradiometer's wavelengths.",
+        advice="All filters pass other wavelengths than stated, shorter ones when they are tilted. Put them"
+        " flat in front of the lens, and check their transmissions and the spectroradiometer's wavelengths.",
     )
     return correction, filters
 
@@ -121,7 +121,7 @@ def _bow(record: DepthStageCalibration) -> tuple[Figure, ...]:
             std=record.bow_std_mm,
             low=-limit,
             high=limit,
-            advice="Use a flatter target. If it is flat, the lenses are not what the board said: repeat the"
+            advice="Use a flatter target. If it is flat, the lenses were not measured well: repeat the"
             " geometry with poses that fill the picture.",
         ),
     )

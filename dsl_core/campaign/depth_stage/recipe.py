@@ -60,9 +60,9 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
 
     ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the deviation with which it keeps
     them; ``filters_nm`` are nominal centres of bandpass filters. ``code_step_px`` is the step of the lines
-    without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may lie far
+    without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may be far
     apart. ``reflectance`` is that of the target; ``chain`` lets the plane correct the product of response,
-    emission and efficiency; ``grid`` adds a model of the columns that is drawn from the data, which needs
+    emission and efficiency; ``grid`` adds a model of the columns that is derived from the data, which needs
     three positions.
     """
 

@@ -1,4 +1,4 @@
-"""Where to hold a board: poses that together tell lenses and pose of camera and projector."""
+"""Where to hold a board: poses that together determine lenses and pose of camera and projector."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class BoardPose:
     roll_deg: float
 
     def placement(self, board: Board) -> Placement:
-        """What the twin's hand is told, film off."""
+        """The placement for a rig that places targets itself, film off."""
         columns, rows = board.corner_grid
         options: dict[str, float | str] = {
             "columns": columns,
@@ -63,7 +63,7 @@ class BoardPose:
         ]
         how = ", ".join(turns) or "facing the camera"
         return (
-            f"Film off. Hold the board still about {self.depth_mm:.0f} mm before the camera, {place},"
+            f"Film off. Hold the board still about {self.depth_mm:.0f} mm in front of the camera, {place},"
             f" {how}. All of it must be in view and lit by the projector; nothing may move while it is"
             " captured."
         )
@@ -79,8 +79,8 @@ def _place(across: float, down: float) -> str:
 
 
 #: Place in what is free of the view (-1 to 1 each way), depth (0 near, 1 far), tilts x and y, roll (degrees).
-#: Tilts in all directions tell focal lengths (30 degrees left depths 0.14 mm off on one of five drawn rigs,
-#: 42 at most 0.04 mm), corners of the view tell distortion, rolls even out the print.
+#: Tilts in all directions determine focal lengths (30 degrees left depths 0.14 mm off on one of five drawn
+#: rigs, 42 at most 0.04 mm), corners of the view the distortion; rolls even out the print.
 _WISHES = (
     (0.0, 0.0, 0.1, 0.0, 0.0, 3.0),
     (-1.0, -1.0, 0.6, 35.0, -28.0, 8.0),
@@ -116,7 +116,7 @@ def default_poses(board: Board, rig: Rig, count: int) -> tuple[BoardPose, ...]:
 
 
 def _fitted(board: Board, rig: Rig, wish: tuple[float, ...]) -> BoardPose | None:
-    """The pose nearest to a wish whose squares are all in view, if need be farther away; None for none."""
+    """The pose nearest to a wish whose squares are all in view, farther away if necessary; None for none."""
     across, down, far, *turns = wish
     for depth in np.linspace(DEPTHS_MM[0] + far * np.ptp(DEPTHS_MM), DEPTHS_MM[1], 6):
         low, high = _view_mm(rig.camera, float(depth))

@@ -39,7 +39,7 @@ _SPREAD_REPEATS = 8
 #: Waits after a picture, tried from the longest on; then the range between good and bad is halved.
 _WAITS_MS = (400.0, 200.0, 100.0, 50.0, 25.0, 12.0, 6.0, 0.0)
 _BISECTIONS, _TRIALS = 4, 3
-#: After this long the right picture is there for sure.
+#: After this long the right picture is certainly visible.
 _SURE_MS = 1000.0
 
 

@@ -18,7 +18,7 @@ _AIM, _LONGEST_MS = 0.4, 200.0
 _BRIGHTER, _LONG_MS = 40.0, 2000.0
 #: Frames that catch every LED of a colour cycle at least once, and their random waits.
 _GLANCES, _MAP_FRAMES, _MAX_GAP_MS = 6, 16, 40.0
-#: A difference between white and black that is no light.
+#: A difference between white and black that is too small to be light.
 _NO_LIGHT_DN = 10.0
 #: The region: pixels brighter than this share of the brightest ones of their channel.
 _LIT = 0.6
@@ -70,7 +70,7 @@ def survey(recorder: Recorder, rng: np.random.Generator) -> Survey:
     white = _mean(recorder, white_ms, rng)
     recorder.show(BLACK)
     dark = _mean(recorder, white_ms, rng)
-    # Means over neighbours, so that the noise of bright ambient light is no light of the projector.
+    # Means over neighbours, so that the noise of bright ambient light is not taken for the projector's light.
     if float(np.percentile(uniform_filter(white - dark, 9), 99)) < _NO_LIGHT_DN:
         raise _no_light(float(np.percentile(dark, 99)) - black_dn, white_ms)
     region, lit_share = _find_region(white, dark, bayer_channels(info.bayer, *white.shape))
@@ -121,7 +121,7 @@ def _require_obedience(
     if bright > _NO_LIGHT_DN and bright < 1.5 * faint:
         raise DeviceError(
             f"The camera gives {faint:.0f} DN at {pairs[0]:.3g} ms and {bright:.0f} DN at {pairs[1]:.3g} ms"
-            " above black, so it ignores the exposure it is told. Switch off its automatic exposure and gain."
+            " above black, so it ignores the exposure requested. Switch off its automatic exposure and gain."
         )
 
 
