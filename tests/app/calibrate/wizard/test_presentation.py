@@ -314,6 +314,9 @@ def test_what_was_allowed_of_a_fit_is_not_allowed_of_the_next() -> None:
     worse = BAD.model_copy(update={"value": 0.9})
     state.fit.set(fit(worse))
     assert not may_accept(state)
+    state.fit.set(fit(BAD))
+    assert not may_accept(state), "the first figures again, after others"
+    state.fit.set(fit(worse))
     state.allowed.set((worse,))
     state.fit.set(None)
     state.fit.set(fit(worse))
