@@ -1,1 +1,1 @@
-"""What accuracy costs in time: predicted from the model, measured on the twin, and answered with a plan."""
+"""What accuracy costs in time: predicted from the model, and answered with a plan."""

@@ -11,7 +11,7 @@ from dsl_core.model.placement import Placement
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.scenes.truth import Scene
-from dsl_core.simulation.twin_options import Mishaps
+from dsl_core.simulation.twin_options import TwinOptions
 from dsl_core.simulation.world import World
 
 #: Where a stage stands when nothing is asked.
@@ -24,7 +24,7 @@ class TwinHand:
 
     world: World
     filter_seed: int
-    mishaps: Mishaps
+    mishaps: TwinOptions
     _standing: tuple[str, dict[str, float | str]] | None = None
 
     def __call__(self, placement: Placement) -> None:

@@ -56,28 +56,7 @@ Whole = Annotated[int, BeforeValidator(_whole)]
 Switch = Annotated[bool, BeforeValidator(_switch)]
 
 
-class Mishaps(Record):
-    """What a person might do wrong, to try out how calibrations notice."""
-
-    wrong_filter_nm: Number | None = Field(
-        default=None, description="filter in the beam, whichever was asked for"
-    )
-    filter_tilt_deg: Number = Field(default=0.0, description="tilt of the filters")
-    bow_mm: Number = Field(default=0.0, description="how far diffusers bulge over 300 mm")
-    stage_scale: Number = Field(
-        default=1.0, description="how far the stage moves from 700 mm, of what it says"
-    )
-    chart_roll_deg: Number = Field(
-        default=0.0, description="how much further a chart is turned than asked for"
-    )
-    board_shift_mm: Number = Field(
-        default=0.0, description="how far a board stands to the right of its place"
-    )
-    print_scale: Number = Field(default=1.0, description="size of a printed board, of what it should be")
-    target_missing: Switch = Field(default=False, description="on: a wall instead of a board or a chart")
-
-
-class TwinOptions(Mishaps):
+class TwinOptions(Record):
     """Options of the twin. All others are those of its scene, which ``dsl-scan scenes`` lists."""
 
     scene: str = Field(
@@ -114,6 +93,24 @@ class TwinOptions(Mishaps):
     brightness: Number = Field(
         default=1.0, description="light of the projector, of that of the published rig"
     )
+
+    # What a person might do wrong, to try out how calibrations notice.
+    wrong_filter_nm: Number | None = Field(
+        default=None, description="filter in the beam, whichever was asked for"
+    )
+    filter_tilt_deg: Number = Field(default=0.0, description="tilt of the filters")
+    bow_mm: Number = Field(default=0.0, description="how far diffusers bulge over 300 mm")
+    stage_scale: Number = Field(
+        default=1.0, description="how far the stage moves from 700 mm, of what it says"
+    )
+    chart_roll_deg: Number = Field(
+        default=0.0, description="how much further a chart is turned than asked for"
+    )
+    board_shift_mm: Number = Field(
+        default=0.0, description="how far a board stands to the right of its place"
+    )
+    print_scale: Number = Field(default=1.0, description="size of a printed board, of what it should be")
+    target_missing: Switch = Field(default=False, description="on: a wall instead of a board or a chart")
 
     @classmethod
     def of(cls, options: dict[str, str]) -> tuple[TwinOptions, dict[str, str]]:
