@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from dsl_app.composition import demo
 from dsl_app.composition.window import Composition, StartOptions
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.shell.actions import ACTIONS, Action
@@ -33,6 +34,8 @@ def window(qapp: QApplication, home: Path) -> Iterator[MainWindow]:
     """One window with a result and a connected rig for all actions, as a person has it."""
     patch = pytest.MonkeyPatch()
     patch.setenv("DSL_SCAN_HOME", str(home))
+    # The rig of the whole demo takes long to open, and that cannot be cancelled.
+    patch.setattr(demo, "SCENE", {"scene": "plane", "size": "64x48"})
     composition = Composition(StartOptions(TWIN))
     made = composition.open_window(home)
     made.resize(1280, 800)
