@@ -36,3 +36,9 @@ def zero_order_profile(
     near, far = columns - start_px, columns - stop_px
     direct = step_edge(near, response.blur_px) - step_edge(far, response.blur_px)
     return direct + halo_integral(near, response) - halo_integral(far, response)
+
+
+def halo_of_line(distance_px: Tensor, width_px: float, response: ProjectorResponse) -> Tensor:
+    """Halo of a line far from its own columns, relative to the zero-order amplitude; any shape."""
+    decay = response.halo_decay_px
+    return (response.halo_peak_per_px * width_px) * torch.exp(distance_px.abs() * (-1 / decay))

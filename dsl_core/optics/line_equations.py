@@ -16,7 +16,7 @@ from dsl_core.optics.line_profile import SAMPLES, ProfileTable
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 
-#: How much closer than their mean spacing bands may lie, because the response moves their centroids.
+#: How much closer than their mean spacing bands may be, because the response moves their centroids.
 CENTROID_SLACK_PX = 0.5
 #: Bands of usable first orders are never closer, px per nm; evanescent ones, far outside, may coincide.
 MIN_DISPERSION = 0.1

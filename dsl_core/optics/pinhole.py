@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import CalibrationError
 from dsl_core.model.geometry import Lens
 
-#: How far beyond the image circle the radial factor goes on changing (squared radius, unit focal length).
+#: How far beyond the image circle the radial factor still changes (squared radius, unit focal length).
 FADE_RADIUS_SQ = 0.3
 
 

@@ -26,7 +26,7 @@ def relight(
     """Colour in sRGB, shape (3, rows, columns), of a band-first cube under an illuminant of `LIGHTS`.
 
     ``adapted`` shows it as to eyes that are used to the light, so that white stays white (Bradford); without,
-    as beside daylight. Raises ``ValueError`` for an unknown illuminant.
+    as next to daylight. Raises ``ValueError`` for an unknown illuminant.
     """
     xyz = reflectance_to_xyz(cube, wavelengths_nm, light)
     if adapted and light != "D65":

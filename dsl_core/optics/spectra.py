@@ -49,7 +49,7 @@ def hat_moments(
 
     Reflectance is taken as linear between bands, so a band's share of the signal is the response under
     a triangle of half width ``step_nm``. In the zero order, which mixes all light, the two end bands also
-    stand for what lies beyond them. Returns the integrals (DN per ms), shape (3, 3, bands), and the
+    stand for what is beyond them. Returns the integrals (DN per ms), shape (3, 3, bands), and the
     centroids (nm), shape (bands,), of all channels and LEDs together. With both kept exact, curvature of
     the response inside a band matters only in second order.
     """

@@ -15,7 +15,7 @@ NEAREST_SHARE = 0.5
 
 
 def first_order_reach_px(rig: Rig) -> tuple[float, float]:
-    """Distances (px) within which first orders of visible light may lie, whatever the film's density."""
+    """Distances (px) within which first orders of visible light may fall, whatever the film's density."""
     sine = np.array([390.0, 710.0]) / rig.film.period_nm
     at = rig.projector.fx_px * np.tan(np.arcsin(sine.clip(max=0.9)))
     return float(0.85 * at[0]), float(1.15 * at[1])

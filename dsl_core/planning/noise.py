@@ -71,12 +71,12 @@ def demosaic_factors(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]
 
     A sample measured there counts once; bilinear means of two or four samples have a half or a quarter.
     """
-    return _by_neighbours(rig, pixels, own=1.0, cross=0.25, beside=0.5, below=0.5, diagonal=0.25)
+    return _by_neighbours(rig, pixels, own=1.0, cross=0.25, sideways=0.5, below=0.5, diagonal=0.25)
 
 
 def sideways_shares(rig: Rig, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
     """Share of each colour at pixels that bilinear means take from neighbouring columns, (pixels, 3)."""
-    return _by_neighbours(rig, pixels, own=0.0, cross=0.5, beside=1.0, below=0.0, diagonal=1.0)
+    return _by_neighbours(rig, pixels, own=0.0, cross=0.5, sideways=1.0, below=0.0, diagonal=1.0)
 
 
 def _by_neighbours(
@@ -85,7 +85,7 @@ def _by_neighbours(
     *,
     own: float,
     cross: float,
-    beside: float,
+    sideways: float,
     below: float,
     diagonal: float,
 ) -> NDArray[np.float64]:
@@ -98,7 +98,7 @@ def _by_neighbours(
         across = tile[y % 2, (x + 1) % 2] == colour
         down = tile[(y + 1) % 2, x % 2] == colour
         cases = [here, across & down, across, down]
-        found[:, colour] = np.select(cases, [own, cross, beside, below], diagonal)
+        found[:, colour] = np.select(cases, [own, cross, sideways, below], diagonal)
     return found
 
 

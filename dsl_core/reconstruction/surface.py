@@ -89,9 +89,9 @@ def _plane_fits(rays: Map, inverse: Map, weight: Map, window: int) -> tuple[Map,
 def _best_window(
     rays: Map, inverse: Map, shift: int, fit: Map, unit: Map, residual: Map, count: Map
 ) -> tuple[Map, Map, Map, Map]:
-    """For each pixel the window, centred or beside it, whose plane explains it best (Kuwahara's idea).
+    """For each pixel the window, centred or next to it, whose plane explains it best (Kuwahara's idea).
 
-    A centred window mixes both sides of a depth jump; one that lies on the pixel's own side does not.
+    A centred window mixes both sides of a depth jump; one that is on the pixel's own side does not.
     """
     stack = np.concatenate([fit, unit, residual[None], count[None]])
     best = stack.copy()
@@ -101,7 +101,7 @@ def _best_window(
         miss = maps[0] * rays[0] + maps[1] * rays[1] + maps[2] - inverse
         return np.where(maps[7] >= enough, miss**2 + np.maximum(maps[6], 0), np.inf)
 
-    # A window beside the pixel must be clearly better: noise alone should not choose it.
+    # A window next to the pixel must be clearly better: noise alone should not choose it.
     lowest = 0.5 * cost(stack)
     for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
         moved = _moved(stack, dy * shift, dx * shift)

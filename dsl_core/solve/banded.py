@@ -41,7 +41,7 @@ def factorise(matrix: Tensor, overwrite: bool = False) -> Factor:
         torch.div(column, work[0, j], out=lower[:reach, j])
         for a in range(1, reach + 1):
             work[: reach - a + 1, j + a].addcmul_(lower[a - 1, j], work[a : reach + 1, j], value=-1)
-    # What is no number fails both comparisons; infinity would leave zeros behind instead of an answer.
+    # NaN fails both comparisons; infinity would leave zeros behind instead of an answer.
     if not bool(((work[0] > 0) & (work[0] < torch.inf)).all()):
         raise ValueError("a banded system is not positive definite; its weights or prior are not positive")
     return Factor(lower, work[0])
@@ -86,7 +86,7 @@ def inverse_band(factor: Factor) -> Tensor:
     """Elements of the inverse inside the band, stored like the matrix (Takahashi's recursion).
 
     ``block`` holds those between the ``bandwidth`` unknowns after j; unknown k has row and column k modulo
-    bandwidth, so that nothing moves when j goes on.
+    bandwidth, so that nothing moves from one j to the next.
     """
     bandwidth, unknowns = factor.lower.shape[0], factor.diagonal.shape[0]
     inverse = factor.diagonal.new_zeros((bandwidth + 1, *factor.diagonal.shape))

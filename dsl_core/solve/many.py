@@ -13,12 +13,12 @@ from dsl_core.progress import Progress
 T = TypeVar("T")
 #: Called by work where it may stop; raises `Cancelled` when it has to.
 Check = Callable[[], None]
-#: How often somebody is asked whether to go on, s.
+#: How often progress is reported, which may cancel, s.
 ASK_S = 0.2
 
 
 def never() -> None:
-    """A check that lets work go on."""
+    """A check that lets work continue."""
 
 
 def work_through(

@@ -9,10 +9,10 @@ import torch
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import triangulate, zero_order
-from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.light_path import halo_of_line, zero_order_profile
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.reconstruction.columns.column import dark_offset, halo_of_line, refine
+from dsl_core.reconstruction.columns.column import dark_offset, refine
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.scenes.catalogue import make_scene
@@ -108,7 +108,7 @@ def test_where_no_frame_is_unlit_the_dark_offset_is_unknown(
 def test_halo_far_from_a_line_is_the_profile_there() -> None:
     distance = torch.tensor([30.0, -80.0], dtype=torch.float64)
     exact = zero_order_profile(distance, -2.5, 2.5, RESPONSE)
-    assert (halo_of_line(distance, LINES, RESPONSE) / exact - 1).abs().max() < 0.01
+    assert (halo_of_line(distance, LINES.width_px, RESPONSE) / exact - 1).abs().max() < 0.01
 
 
 def test_line_set_counts_lines_and_frames() -> None:

@@ -13,7 +13,9 @@ from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, Footprint
+from dsl_core.optics.light_path import halo_of_line
 from dsl_core.optics.line_profile import ProfileTable
+from dsl_core.optics.pixel_model import MODEL_ERROR
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.solve.robust import robust_std
@@ -24,8 +26,6 @@ Floats = NDArray[np.float64]
 #: Bands of the forward model.
 STEP_NM = 2.0
 BANDS_NM = np.arange(400.0, 701.0, STEP_NM)
-#: Relative error of the linear model in each value (correspondence, profile), added to its variance.
-MODEL_ERROR = 0.01
 #: Least relative error of the zero order of a colour: uniformity of light and target.
 ZERO_ORDER_ERROR = 5e-4
 #: Pixels whose zero order stands this far (robust deviations) from the others' are left out.
@@ -280,10 +280,8 @@ def _of_colour(
 
 def _halo(rig: Rig, scan: LineScan) -> Floats:
     """Halo of each line at each pixel relative to the zero order, (frames, P)."""
-    response = rig.projector_response
-    distance = np.abs(scan.column_px - scan.centres_px[:, None])
-    peak = response.halo_peak_per_px * scan.lines.width_px
-    return np.asarray(peak * np.exp(-distance / response.halo_decay_px))
+    distance = torch.as_tensor(scan.column_px - scan.centres_px[:, None])
+    return halo_of_line(distance, scan.lines.width_px, rig.projector_response).numpy()
 
 
 def steepness(rig: Rig, order: int, bands_nm: Floats, step_nm: float) -> Floats:

@@ -15,13 +15,13 @@ import torch
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.light_path import halo_of_line, zero_order_profile
 from dsl_core.optics.line_set import LineSet
 
 ITERATIONS = 6
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
 MODEL_ERROR = 0.0015
-#: The same for combs, where the first orders of other lines lie under the peak.
+#: The same for combs, where the first orders of other lines are under the peak.
 COMB_ERROR = 0.05
 #: A refined column this far from the decoded one is not the same peak.
 MAX_SHIFT_PX = 2.0
@@ -48,7 +48,7 @@ def refine(
     ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
     saturated. Where the fit fails, the decoded column stays, with the deviation of a whole pixel,
     ``1/sqrt(12)``. Its amplitude is that of the brightest frame near it, or of the fit to what is left where
-    frames are saturated, with an infinite deviation: less would make light of the zero order beside them.
+    frames are saturated, with an infinite deviation: less would make light of the zero order next to them.
     """
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
     q = coarse_px.clone()
@@ -91,7 +91,7 @@ def dark_offset(
 ) -> tuple[Tensor, Tensor]:
     """Mean signal (DN per ms) where no order lights a pixel: what its single black frame got wrong.
 
-    Between the zero order and the first orders, at distances ``unlit_px``, lie columns that reach a pixel
+    Between the zero order and the first orders, at distances ``unlit_px``, are columns that reach a pixel
     only through the halo, which is subtracted. A black frame's noise would be common to all lines of a
     pixel; the mean of dozens of unlit frames takes it out. With its deviation: zero and infinite where a
     pattern set or the film leaves no frame unlit.
@@ -106,18 +106,12 @@ def dark_offset(
         line = lines.nearest(column_px) + side * away
         frame = lines.frame(line)
         distance = column_px - lines.centre_px(line).to(column_px.dtype)
-        dark = torch.gather(radiance, 0, frame) - amplitude * halo_of_line(distance, lines, response)
+        dark = torch.gather(radiance, 0, frame) - amplitude * halo_of_line(distance, lines.width_px, response)
         unlit = (distance.abs() >= unlit_px[0]) & (distance.abs() <= unlit_px[1])
         w = (lines.exists(line) & unlit) / torch.gather(std, 0, frame).to(dark.dtype).clip(min=1e-9) ** 2
         total += torch.where(w > 0, dark * w, 0.0).sum(0)
         weight += w.sum(0)
     return total / weight.clip(min=1e-30), 1 / weight.sqrt()
-
-
-def halo_of_line(distance_px: Tensor, lines: LineSet, response: ProjectorResponse) -> Tensor:
-    """Halo of a line far from its own columns, relative to the zero-order amplitude; any shape."""
-    decay = response.halo_decay_px
-    return (response.halo_peak_per_px * lines.width_px) * torch.exp(distance_px.abs() * (-1 / decay))
 
 
 def _window(

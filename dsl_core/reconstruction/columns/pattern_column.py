@@ -31,7 +31,7 @@ from dsl_core.reconstruction.hdr import setting_gains_ms
 
 #: Candidates reach this far from the decoded column, in steps of, px.
 REACH_PX, STEP_PX = 1.0, 0.125
-#: Relative error of the zero-order model: first orders of other columns lie under it.
+#: Relative error of the zero-order model: first orders of other columns are under it.
 DIRECT_ERROR = 0.02
 #: Light of a pattern, relative to full drive, that may saturate a setting.
 BRIGHT_SHARE = 0.05
@@ -100,9 +100,9 @@ def refine_by_profiles(
     # The brightest usable frame stands for the scale that a share of is granted as error.
     scale = y.amax(1, keepdim=True).clip(min=0)
     weight = torch.where(usable, 1 / (s**2 + (DIRECT_ERROR * scale) ** 2), 0.0)
-    beside = 0.0 if first_orders is None else first_orders
+    others = 0.0 if first_orders is None else first_orders
     shifts = torch.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX).to(coarse_px)
-    fits = [_fit(light.at(coarse_px + shift) + beside, y, weight) for shift in shifts]
+    fits = [_fit(light.at(coarse_px + shift) + others, y, weight) for shift in shifts]
     cost = torch.stack([fit[0] for fit in fits])
     best = cost.argmin(0).clip(1, len(shifts) - 2)
     left, middle, right = (cost.gather(0, (best + i)[None])[0] for i in (-1, 0, 1))

@@ -11,9 +11,9 @@ from torch import Tensor
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
+from dsl_core.optics.light_path import halo_of_line
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pixel_model import MODEL_ERROR, demosaic_blur_px
-from dsl_core.reconstruction.columns.column import halo_of_line
 
 
 @dataclass(frozen=True)
@@ -84,11 +84,11 @@ class TileFrames:
         if lines is not None:
             index = torch.arange(frames.start, frames.stop, device=y.device)[:, None, None]
             distance = self._tensor(self._near.column_px) - lines.centre_px(index).to(y.dtype)
-            y = y - self._tensor(self._near.amplitude) * halo_of_line(distance, lines, self.response)
+            y = y - self._tensor(self._near.amplitude) * halo_of_line(distance, lines.width_px, self.response)
         rgb = self._pick(demosaic(y, self.bayer))
         spread = self._pick(demosaic_variance(variance, self.bayer))
         weight = spread.addcmul_(rgb, rgb, value=MODEL_ERROR**2).reciprocal_()
-        # An infinite variance has weight zero by itself; what is no number must not survive the product.
+        # An infinite variance has weight zero by itself; NaN must not survive the product.
         return torch.nan_to_num_(rgb, 0.0, 0.0, 0.0), torch.nan_to_num_(weight, 0.0, 0.0, 0.0)
 
     def _pick(self, images: Tensor) -> Tensor:
