@@ -1,0 +1,207 @@
+"""Do the tests notice a fault? Single-line faults at random places, each run against the tests of its folder.
+
+``python -m tests.benchmarks.bench_mutations --seed 1 --count 60`` copies the tree, puts one fault at a time
+into the copy, runs the tests of the fault's folder until one fails, and lists which faults were caught. A
+fault swaps an operator or a comparison, changes a number, or leaves out a statement. Takes about an hour.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Where faults are put -> tests that should notice them.
+PLACES = {
+    "dsl_core/optics": ("tests/optics",),
+    "dsl_core/solve": ("tests/solve", "tests/stability"),
+    "dsl_core/reconstruction": ("tests/reconstruction",),
+    "dsl_core/calibration": ("tests/calibration",),
+    "dsl_core/capture": ("tests/capture",),
+    "dsl_core/io": ("tests/io",),
+}
+SWAPS: dict[type[ast.AST], str] = {
+    ast.Add: "-",
+    ast.Sub: "+",
+    ast.Mult: "/",
+    ast.Div: "*",
+    ast.Lt: ">=",
+    ast.LtE: ">",
+    ast.Gt: "<=",
+    ast.GtE: "<",
+    ast.Eq: "!=",
+    ast.NotEq: "==",
+    ast.And: "or",
+    ast.Or: "and",
+    ast.BitAnd: "|",
+    ast.BitOr: "&",
+}
+LIMIT_S = 900.0
+#: Statements whose absence changes no result.
+TALK = ("progress.report(", "_log.", "warnings.")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One line of a module as it would be with a fault in it."""
+
+    path: str
+    line: int
+    before: str
+    after: str
+
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: {self.before.strip()}  ->  {self.after.strip()}"
+
+
+def faults_of(path: str, source: str) -> Iterator[Fault]:
+    """Every fault that a module can have on a single line."""
+    lines = source.splitlines()
+
+    def on(line: int, start: int, end: int, new: str) -> Fault:
+        text = lines[line - 1].encode()
+        return Fault(path, line, text.decode(), (text[:start] + new.encode() + text[end:]).decode())
+
+    tree = ast.parse(source)
+    silent = {id(part) for root in _without_effect(tree) for part in ast.walk(root)}
+    for node in ast.walk(tree):
+        if id(node) in silent:
+            continue
+        match node:
+            case (
+                ast.BinOp(left=left, op=op, right=right)
+                | ast.Compare(left=left, ops=[op], comparators=[right])
+            ) if type(op) in SWAPS and left.end_lineno == right.lineno:
+                assert left.end_lineno is not None
+                assert left.end_col_offset is not None
+                between = lines[right.lineno - 1].encode()[left.end_col_offset : right.col_offset]
+                if between.strip(b" ()") and b"(" not in between and b")" not in between:
+                    yield on(right.lineno, left.end_col_offset, right.col_offset, f" {SWAPS[type(op)]} ")
+            case ast.BoolOp(op=op, values=[first, second]) if first.end_lineno == second.lineno:
+                assert first.end_col_offset is not None
+                between = lines[second.lineno - 1].encode()[first.end_col_offset : second.col_offset]
+                if b"(" not in between and b")" not in between:
+                    yield on(second.lineno, first.end_col_offset, second.col_offset, f" {SWAPS[type(op)]} ")
+            case ast.UnaryOp(op=ast.Not() | ast.USub(), operand=operand) if node.lineno == operand.lineno:
+                yield on(node.lineno, node.col_offset, operand.col_offset, "")
+            case ast.Constant(value=bool(value)):
+                yield on(node.lineno, node.col_offset, node.end_col_offset or 0, str(not value))
+            case ast.Constant(value=int(value)):
+                yield on(node.lineno, node.col_offset, node.end_col_offset or 0, str(value + 1))
+            case ast.Constant(value=float(value)):
+                new = repr(value * 1.5 if value else 1.0)
+                yield on(node.lineno, node.col_offset, node.end_col_offset or 0, new)
+            case ast.AugAssign() | ast.Expr(value=ast.Call()) if node.lineno == node.end_lineno:
+                if lines[node.lineno - 1].strip().startswith(TALK):
+                    continue
+                yield on(node.lineno, node.col_offset, node.end_col_offset or 0, "pass")
+
+
+def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
+    """Annotations and decorators."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation is not None:
+            yield node.annotation
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield from node.decorator_list
+        if isinstance(node, ast.FunctionDef) and node.returns is not None:
+            yield node.returns
+
+
+def draw(count: int, seed: int) -> list[Fault]:
+    """Faults from all places in equal numbers, modules weighted by how many faults they can have."""
+    chance = random.Random(seed)
+    drawn: list[Fault] = []
+    for i, place in enumerate(PLACES):
+        modules = sorted((ROOT / place).rglob("*.py"))
+        possible = [
+            fault
+            for module in modules
+            for fault in faults_of(module.relative_to(ROOT).as_posix(), module.read_text(encoding="utf-8"))
+            if fault.before != fault.after
+        ]
+        many = (count * (i + 1)) // len(PLACES) - (count * i) // len(PLACES)
+        drawn += chance.sample(possible, many)
+    return drawn
+
+
+def tests_of(fault: Fault) -> list[str]:
+    """Test files for a fault, those named like its module or folder first."""
+    place = next(place for place in PLACES if fault.path.startswith(place + "/"))
+    module = Path(fault.path)
+    inner = module.parent.relative_to(place).parts
+
+    def distance(test: Path) -> tuple[bool, bool, bool]:
+        named = test.stem == f"test_{module.stem}"
+        return (not named, not (inner and inner[0] in test.parts), not (inner and inner[0] in test.stem))
+
+    found = [path for tests in PLACES[place] for path in sorted((ROOT / tests).rglob("test_*.py"))]
+    return [path.relative_to(ROOT).as_posix() for path in sorted(found, key=distance)]
+
+
+def is_caught(fault: Fault, tree: Path) -> bool | None:
+    """Whether the tests fail with the fault in a copy of the tree; None where they took too long."""
+    target = tree / fault.path
+    sound = target.read_text(encoding="utf-8")
+    lines = sound.splitlines(keepends=True)
+    lines[fault.line - 1] = fault.after + "\n"
+    target.write_text("".join(lines), encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", "0"]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": f"{tree}{os.pathsep}{tree / 'app'}",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    try:
+        done = subprocess.run(
+            [*command, *tests_of(fault)], cwd=tree, env=environment, capture_output=True, timeout=LIMIT_S,
+            check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return None
+    finally:
+        target.write_text(sound, encoding="utf-8")
+    return done.returncode != 0
+
+
+def main() -> None:
+    """Draw faults, try each, and say which the tests caught."""
+    parser = argparse.ArgumentParser(description="Faults that the tests should notice.")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--part", default="1/1", help="which share to run, such as 1/2 beside 2/2")
+    parser.add_argument("--list", action="store_true", help="only list the faults")
+    asked = parser.parse_args()
+    part, parts = (int(number) for number in asked.part.split("/"))
+    faults = draw(asked.count, asked.seed)[part - 1 :: parts]
+    if asked.list:
+        print(*faults, sep="\n")
+        return
+    survived: list[Fault] = []
+    with tempfile.TemporaryDirectory() as folder:
+        tree = Path(folder) / "tree"
+        hidden = shutil.ignore_patterns(".git", ".venv", "__pycache__", ".*_cache", "dsl-demo*")
+        shutil.copytree(ROOT, tree, ignore=hidden)
+        for number, fault in enumerate(faults, 1):
+            start = time.monotonic()
+            caught = is_caught(fault, tree)
+            said = {True: "caught", False: "SURVIVED", None: "caught (no end)"}[caught]
+            print(f"{number:3d} {said:16s} {time.monotonic() - start:5.0f} s  {fault}", flush=True)
+            if caught is False:
+                survived.append(fault)
+    print(f"{len(faults) - len(survived)} of {len(faults)} faults caught, {len(survived)} survived")
+    print(*survived, sep="\n")
+
+
+if __name__ == "__main__":
+    main()
