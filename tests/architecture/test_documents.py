@@ -46,6 +46,8 @@ def test_files_that_a_document_names_exist(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     named = re.findall(r"\]\(([\w./-]+)\)", text) + re.findall(r"`((?:\w[\w-]*/)+[\w-]+\.\w+)`", text)
     missing = [
-        path for path in named if not any((base / path).exists() for base in (ROOT, ROOT / "dsl_core"))
+        path
+        for path in named
+        if not any((base / path).exists() for base in (ROOT, ROOT / "dsl_core", ROOT / "app" / "dsl_app"))
     ]
     assert missing == []
