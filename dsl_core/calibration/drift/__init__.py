@@ -1,1 +1,1 @@
-"""Whether a rig still is as calibrated."""
+"""Whether a rig is still as calibrated."""
