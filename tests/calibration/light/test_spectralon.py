@@ -59,6 +59,12 @@ def test_white_signals_are_those_at_unit_shading_without_vignetting() -> None:
     assert found.used.mean() > 0.99
 
 
+def test_deviations_of_white_are_those_of_means_over_pixels() -> None:
+    found = measure_white(pictures(np.ones(SHAPE)))
+    pixels = np.array([1, 2, 1])[:, None] * VIGNETTE.size / 4
+    assert np.mean(np.array(found.white.rel_std) * np.sqrt(pixels)) == pytest.approx(2e-3, rel=0.15)
+
+
 def test_dirt_saturation_and_dark_borders_do_not_count() -> None:
     clean = pictures(np.ones(SHAPE))
     dirty = clean.radiance.copy()

@@ -119,6 +119,15 @@ def test_wrong_filters_and_a_target_that_moved_are_named_together() -> None:
     assert "545 nm" not in str(error.value)
 
 
+def test_a_broad_first_order_is_named() -> None:
+    scan, profile = without_filter()
+    filters = [seen(nm) for nm in CENTRES]
+    wide = {m: replace(light, width_px=30.0) for m, light in filters[2].light.orders.items()}
+    filters[2] = replace(filters[2], light=replace(filters[2].light, orders=wide))
+    with pytest.raises(CalibrationError, match="filter of 470 nm: the light of the first orders is spread"):
+        fit_bandpass(RIG, scan, profile, filters, REFLECTANCE)
+
+
 def test_no_filters_and_no_target_are_refused() -> None:
     scan, profile = without_filter()
     with pytest.raises(CalibrationError, match="No filter was captured"):
