@@ -120,4 +120,4 @@ def test_a_library_asks_which_spectrum_and_its_name_finds_it_again(bench: Bench,
     np.testing.assert_allclose(again.state.marks.value[0].spectrum.mean, BRICK, rtol=1e-6)
     path.with_suffix(".hdr").unlink()
     assert bench.control.open(path)
-    assert "lacks its header" in bench.told
+    assert "has no header" in bench.told
