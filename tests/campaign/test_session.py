@@ -144,7 +144,7 @@ def test_a_fit_may_be_discarded_and_one_that_is_refused_waits(
     assert one.candidate() is not None
     one.discard()
     assert one.candidate() is None
-    with pytest.raises(StoreError, match="No fit of fake"):
+    with pytest.raises(StoreError, match="no fit of fake"):
         one.accept()
     one.fit()
     one.redo(one.steps[0])
