@@ -130,8 +130,7 @@ def _signals(
 ) -> PlaneSignals:
     """Frames (frames, rows, columns) at the chosen pixels of the plane."""
     from dsl_core.calibration.drift.light import PlaneSignals
-    from dsl_core.optics.flat_field import relative_gain
-    from dsl_core.optics.sensor import bayer_channels
+    from dsl_core.optics.sensor import bayer_channels, relative_gain
     from dsl_core.optics.shading import plane_shading
 
     return PlaneSignals(

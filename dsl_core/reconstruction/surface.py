@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
-from dsl_core.optics.flat_field import relative_gain
 from dsl_core.optics.pinhole import pixel_rays
+from dsl_core.optics.sensor import relative_gain
 
 Map = NDArray[np.float64]
 

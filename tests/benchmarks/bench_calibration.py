@@ -27,7 +27,7 @@ from dsl_core.evaluation.summary import Evaluation
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.optics.spectra import chain_response
 from dsl_core.workflows import scans
 from tests.benchmarks.common import options, print_table, write_json

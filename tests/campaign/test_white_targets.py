@@ -20,7 +20,7 @@ from dsl_core.model.calibration.spectralon import SpectralonCalibration
 from dsl_core.model.figure import failures
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.optics.spectra import chain_response
 from dsl_core.progress import NoProgress
 from dsl_core.simulation.published_rig import published_rig

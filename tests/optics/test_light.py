@@ -8,8 +8,13 @@ import torch
 from scipy.ndimage import convolve1d
 
 from dsl_core.model.rig import BayerPattern, ProjectorResponse, Sensor
-from dsl_core.optics.light_path import halo_integral, step_edge, zero_order_profile
-from dsl_core.optics.line_profile import ProfileTable, band_profile
+from dsl_core.optics.line_profile import (
+    ProfileTable,
+    band_profile,
+    halo_integral,
+    step_edge,
+    zero_order_profile,
+)
 from dsl_core.optics.sensor import bayer_channels, digitise, raw_variance
 from dsl_core.optics.spectra import chain_response, hat_moments
 from dsl_core.simulation.published_rig import published_rig

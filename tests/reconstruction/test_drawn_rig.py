@@ -10,7 +10,7 @@ from dsl_core import pipeline
 from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.simulation.sim_devices import SimCamera, open_twin
 from tests.cases.twin_scan import MemoryScan, capture
 

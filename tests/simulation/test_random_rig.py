@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dsl_core.model.rig import Rig
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 

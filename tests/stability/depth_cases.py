@@ -10,7 +10,7 @@ import torch
 from dsl_core.model.geometry import Pose
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import GratingModel, triangulate, zero_order
-from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.line_profile import zero_order_profile
 from dsl_core.optics.line_set import LineSet
 from dsl_core.reconstruction.columns.column import refine
 from dsl_core.simulation.published_rig import published_rig

@@ -14,8 +14,7 @@ from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import Correspondence, zero_order
-from dsl_core.optics.flat_field import relative_gain
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, relative_gain
 from dsl_core.optics.shading import Plane, plane_shading
 from dsl_core.optics.spectra import chain_response
 

@@ -21,8 +21,7 @@ from dsl_core.model.calibration.spectralon import (
 from dsl_core.model.geometry import Row3
 from dsl_core.model.rig import FlatField, Rgb, Rig, Sensor
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.flat_field import gain_at_pixels
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, gain_at_pixels
 from dsl_core.solve.smooth_functions import hat_functions
 
 Floats = NDArray[np.float64]

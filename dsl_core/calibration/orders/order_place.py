@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.line_profile import zero_order_profile
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -32,7 +32,7 @@ from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
 from dsl_core.optics.charts import chart_names
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.optics.shading import plane_shading
 from dsl_core.progress import Progress
 

@@ -17,7 +17,7 @@ from dsl_core.errors import CalibrationError
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.optics.shading import plane_shading
 from dsl_core.progress import Progress
 

@@ -195,7 +195,7 @@ def rig_maps(rig: Rig) -> list[ReportPicture]:
     """The flat field, and the residual of each order at 545 nm and middle depth; none for a rig without."""
     pictures = []
     if rig.flat_field is not None:
-        from dsl_core.optics.flat_field import relative_gain
+        from dsl_core.optics.sensor import relative_gain
 
         caption = "relative gain of the camera over its image"
         pictures.append(value_picture(relative_gain(rig), "Flat field", caption, ""))

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.light_path import halo_of_line, zero_order_profile
+from dsl_core.optics.line_profile import halo_of_line, zero_order_profile
 from dsl_core.optics.line_set import LineSet
 
 ITERATIONS = 6

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.flat_field import relative_gain
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, relative_gain
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.effects.base import SLACK, ExtraEffect, Image, ImageStep, LightPath, Limits, Signal
 from dsl_core.simulation.effects.patches import Patches

@@ -20,10 +20,9 @@ from torch import Tensor
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.correspondence import zero_order
-from dsl_core.optics.flat_field import relative_gain
-from dsl_core.optics.light_path import zero_order_profile
+from dsl_core.optics.line_profile import zero_order_profile
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, relative_gain
 from dsl_core.simulation.rendering.first_orders import Runs, add_band, order_light, white_runs
 from dsl_core.simulation.rendering.order_tables import OrderTables
 from dsl_core.simulation.rendering.pattern_table import PatternTable

@@ -8,8 +8,7 @@ import pytest
 from dsl_core.calibration.light.spectralon import UniformPictures, fit_evenness, measure_white
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Sensor
-from dsl_core.optics.flat_field import gain_at_pixels
-from dsl_core.optics.sensor import bayer_channels
+from dsl_core.optics.sensor import bayer_channels, gain_at_pixels
 
 SHAPE = (96, 144)
 Y, X = (axis / max(axis.max(), 1) * 2 - 1 for axis in np.mgrid[: SHAPE[0], : SHAPE[1]].astype(float))

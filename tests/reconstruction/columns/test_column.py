@@ -9,7 +9,7 @@ import torch
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
 from dsl_core.model.rig import ProjectorResponse, Rig
 from dsl_core.optics.correspondence import triangulate, zero_order
-from dsl_core.optics.light_path import halo_of_line, zero_order_profile
+from dsl_core.optics.line_profile import halo_of_line, zero_order_profile
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.reconstruction.columns.column import dark_offset, refine

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from dsl_core.model.rig import FlatField, Rig
-from dsl_core.optics.flat_field import relative_gain
+from dsl_core.optics.sensor import relative_gain
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 
