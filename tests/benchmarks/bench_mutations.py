@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,8 +92,9 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
                 between = lines[second.lineno - 1].encode()[first.end_col_offset : second.col_offset]
                 if b"(" not in between and b")" not in between:
                     yield on(second.lineno, first.end_col_offset, second.col_offset, f" {SWAPS[type(op)]} ")
-            case ast.UnaryOp(op=ast.Not() | ast.USub(), operand=operand) if node.lineno == operand.lineno:
-                yield on(node.lineno, node.col_offset, operand.col_offset, "")
+            case ast.UnaryOp(op=ast.Not() | ast.USub() as op):
+                sign = "not" if isinstance(op, ast.Not) else "-"
+                yield on(node.lineno, node.col_offset, node.col_offset + len(sign), "")
             case ast.Constant(value=bool(value)):
                 yield on(node.lineno, node.col_offset, node.end_col_offset or 0, str(not value))
             case ast.Constant(value=int(value)):
@@ -108,7 +109,7 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
 
 
 def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
-    """Annotations and decorators."""
+    """Annotations, decorators, and the guard of a zip whose parts are equally long."""
     for node in ast.walk(tree):
         if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation is not None:
             yield node.annotation
@@ -116,6 +117,8 @@ def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
             yield from node.decorator_list
         if isinstance(node, ast.FunctionDef) and node.returns is not None:
             yield node.returns
+        if isinstance(node, ast.keyword) and node.arg == "strict":
+            yield node.value
 
 
 def draw(count: int, seed: int) -> list[Fault]:
@@ -135,9 +138,14 @@ def draw(count: int, seed: int) -> list[Fault]:
     return drawn
 
 
+def place_of(fault: Fault) -> str:
+    """The key of `PLACES` that a fault belongs to."""
+    return next(place for place in PLACES if fault.path.startswith(place + "/"))
+
+
 def tests_of(fault: Fault) -> list[str]:
     """Test files for a fault, those named like its module or folder first."""
-    place = next(place for place in PLACES if fault.path.startswith(place + "/"))
+    place = place_of(fault)
     module = Path(fault.path)
     inner = module.parent.relative_to(place).parts
 
@@ -156,22 +164,26 @@ def is_caught(fault: Fault, tree: Path) -> bool | None:
     lines = sound.splitlines(keepends=True)
     lines[fault.line - 1] = fault.after + "\n"
     target.write_text("".join(lines), encoding="utf-8")
+    try:
+        return not pass_in(tree, tests_of(fault))
+    except subprocess.TimeoutExpired:
+        return None
+    finally:
+        target.write_text(sound, encoding="utf-8")
+
+
+def pass_in(tree: Path, tests: Sequence[str]) -> bool:
+    """Whether tests pass in a copy of the tree; raises ``TimeoutExpired`` where they take too long."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", "0"]
     environment = {
         **os.environ,
         "PYTHONPATH": f"{tree}{os.pathsep}{tree / 'app'}",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
-    try:
-        done = subprocess.run(
-            [*command, *tests_of(fault)], cwd=tree, env=environment, capture_output=True, timeout=LIMIT_S,
-            check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return None
-    finally:
-        target.write_text(sound, encoding="utf-8")
-    return done.returncode != 0
+    done = subprocess.run(
+        [*command, *tests], cwd=tree, env=environment, capture_output=True, timeout=LIMIT_S, check=False
+    )
+    return done.returncode == 0
 
 
 def main() -> None:
@@ -192,6 +204,9 @@ def main() -> None:
         tree = Path(folder) / "tree"
         hidden = shutil.ignore_patterns(".git", ".venv", "__pycache__", ".*_cache", "dsl-demo*")
         shutil.copytree(ROOT, tree, ignore=hidden)
+        for place in dict.fromkeys(map(place_of, faults)):
+            if not pass_in(tree, PLACES[place]):
+                raise SystemExit(f"The tests of {place} fail without a fault; nothing can be said of them.")
         for number, fault in enumerate(faults, 1):
             start = time.monotonic()
             caught = is_caught(fault, tree)

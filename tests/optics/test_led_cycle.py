@@ -9,8 +9,10 @@ from dsl_core.simulation.sim_devices import open_twin
 
 
 @pytest.mark.parametrize("start_ms", [0.0, 3.3, 1e6 + 0.7])
-def test_whole_periods_catch_all_leds_alike(start_ms: float) -> None:
-    assert led_weights(start_ms, 500 / 3, 1000 / 60).tolist() == [1, 1, 1]
+@pytest.mark.parametrize("exposure_ms", [500 / 3, 166.6666667, 60_000 + 50 / 3])
+def test_whole_periods_catch_all_leds_alike(start_ms: float, exposure_ms: float) -> None:
+    # Also where the exposure is written with ten digits, or is long.
+    assert led_weights(start_ms, exposure_ms, 1000 / 60).tolist() == [1, 1, 1]
 
 
 def test_a_third_of_a_period_catches_one_led() -> None:

@@ -44,7 +44,7 @@ def test_banded_equations_are_those_of_the_full_model(order: int) -> None:
     radiance, weight = torch.rand(
         (2, 3, plan.spectral_count, PIXELS), generator=generator, dtype=torch.float64
     )
-    system = model.line_equations(columns[0])
+    system = model.line_equations(columns[0], offsets=True)
     lit = model.frames(columns, inside)
     part = slice(lit.start, lit.stop)
     system.add(order, columns, inside, radiance[:, part], weight[:, part], lit.start)
@@ -57,6 +57,13 @@ def test_banded_equations_are_those_of_the_full_model(order: int) -> None:
     right = operator.adjoint(radiance * weight)
     assert (system.right - right).abs().max() < 0.01 * right.abs().max()
     assert not system.right[~inside].any()
+    # An offset of one DN per ms in a colour is data of one in all its frames.
+    assert system.offset is not None
+    for colour in range(3):
+        shifted = torch.zeros_like(radiance)
+        shifted[colour] = 1
+        offset = operator.adjoint(shifted * weight)
+        assert (system.offset[colour] - offset).abs().max() < 0.01 * offset.abs().max()
 
 
 def bright_equations(step_nm: float) -> LineEquations:

@@ -31,6 +31,20 @@ def test_function_is_found_within_its_stated_deviation() -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(sigmas))) < 1.4
 
 
+@pytest.mark.parametrize("factor", [1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0])
+def test_evidence_finds_by_how_much_noise_was_understated(factor: float) -> None:
+    _, design, seen = draw(1, 0.0)
+    # Residuals of exactly the deviation they are meant to have, so that chance plays no part.
+    noise = np.random.default_rng(0).standard_normal(60)
+    noise -= design @ np.linalg.lstsq(design, noise, rcond=None)[0]
+    noise *= 1 / np.sqrt(noise @ noise / (60 - np.linalg.matrix_rank(design)))
+    found = solve_smooth(
+        Equations.of(design, seen + factor * 0.001 * noise, np.full(60, 0.001)),
+        [SmoothPrior(NODES, 1.0, 1.0)],
+    )
+    assert found.noise_factor == pytest.approx(factor, rel=0.1)
+
+
 def test_evidence_sees_that_noise_was_understated() -> None:
     truth, design, seen = draw(1, 0.02)
     found = solve_smooth(Equations.of(design, seen, np.full(60, 0.002)), [SmoothPrior(NODES, 1.0, 1.0)])
@@ -55,4 +69,8 @@ def test_parts_of_the_equations_add_up() -> None:
     np.testing.assert_allclose(
         solve_given(first + second, prior, 1.0).values, solve_given(whole, prior, 1.0).values, rtol=1e-6
     )
-    np.testing.assert_allclose((whole - second).right, first.right, rtol=1e-9, atol=1e-6)
+    rest = whole - second
+    np.testing.assert_allclose(rest.normal, first.normal, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(rest.right, first.right, rtol=1e-9, atol=1e-6)
+    assert rest.square == pytest.approx(first.square)
+    assert rest.count == first.count
