@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.movement import check_movement, pick_reference_shots
+from dsl_core.capture.movement import MovementReport, check_movement, pick_reference_shots
 from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import replay_rig
@@ -69,6 +69,13 @@ def test_fading_and_motion_are_found(change: Change, brightness_ratio: float) ->
     assert not report.is_stable
     assert report.brightness_ratio == pytest.approx(brightness_ratio, abs=0.01)
     assert "Start a new scan" in report.message
+
+
+def test_a_report_states_both_changes_in_percent() -> None:
+    moved = MovementReport((7,), brightness_ratio=0.9, change=0.25, limit=0.03).message
+    assert "brightness changed by -10.0 %, structure by 25.0 %, allowed 3.0 %" in moved
+    still = MovementReport((7,), brightness_ratio=1.01, change=0.004, limit=0.03).message
+    assert "brightness changed by +1.0 %, structure by 0.4 %" in still
 
 
 def test_the_black_level_is_no_light() -> None:

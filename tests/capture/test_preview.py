@@ -34,6 +34,13 @@ def test_colours_come_out_whatever_the_mosaic(bayer: BayerPattern) -> None:
     assert figures.histogram[1, 64] == 24
 
 
+@pytest.mark.parametrize("full_scale_dn", [255, 1023, 4095, 65535])
+def test_a_histogram_spans_the_counts_of_any_camera(full_scale_dn: int) -> None:
+    mosaic = mosaic_of((full_scale_dn, (full_scale_dn + 1) // 4, 0), "RGGB", (6, 8))
+    histogram = statistics(mosaic, "RGGB", full_scale_dn).histogram
+    assert (histogram[0, 255], histogram[1, 64], histogram[2, 0]) == (12, 24, 12)
+
+
 def test_one_saturated_pixel_shows_its_cell_in_red() -> None:
     mosaic = np.full((4, 4), 100, np.uint16)
     mosaic[3, 2] = 4095
