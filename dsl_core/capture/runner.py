@@ -207,7 +207,6 @@ class Runner:
             _log.warning("the projector could not be turned dark: %s", error)
             message += f" The projector could not be turned dark ({error})"
         finally:  # also when a second Ctrl-C comes just now
-            self._pace.hold()
             self._set(state, message=message)
 
 
