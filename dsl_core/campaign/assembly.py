@@ -102,7 +102,7 @@ def require_needs(recipe: AnyRecipe, accepted: Accepted) -> None:
     lacking = [name for name in recipe.needs if name not in accepted]
     if lacking:
         raise CalibrationError(
-            f"The calibration {recipe.name} needs {' and '.join(lacking)}, not accepted yet."
+            f"The calibration {recipe.name} needs {' and '.join(lacking)}, which is not accepted yet."
             f" Calibrate {lacking[0]} first."
         )
 

@@ -35,8 +35,8 @@ PIXELS = 4000
 SPECTRALON = 0.99
 #: The user cannot lower the exposures of the quick shot.
 SATURATED_ADVICE = (
-    "The check has exposures of its own. Set aperture, gain and the projector's brightness as they were at"
-    " the calibration, dim the room, and do not hold the target nearer than the calibrated depths."
+    "The check uses its own exposures. Set aperture, gain and the projector's brightness as they were at"
+    " the calibration, dim the room, and do not place the target closer than the calibrated depths."
 )
 
 

@@ -60,7 +60,7 @@ class ExposureSearch:
         if share >= 1.0:
             if exposure_ms <= self._low:
                 self.trouble = (
-                    f"Even {exposure_ms:.4g} ms saturates, the shortest exposure there is. Close the"
+                    f"Even the shortest exposure, {exposure_ms:.4g} ms, saturates. Close the"
                     " aperture, or lower the projector's intensity."
                 )
                 return exposure_ms
@@ -72,13 +72,15 @@ class ExposureSearch:
             self._end(share, exposure_ms)
             return exposure_ms
         if self._judged >= MOST_FRAMES:
-            self.trouble = "The light changes while it is judged. Hold everything still and try again."
+            self.trouble = (
+                "The light changes while it is being measured. Hold everything still and try again."
+            )
         return following
 
     def _end(self, share: float, exposure_ms: float) -> None:
         if share < TOO_DARK:
             self.trouble = (
-                f"Even {exposure_ms:.4g} ms, the longest exposure there is, reaches only {share:.0%} of full"
+                f"Even the longest exposure, {exposure_ms:.4g} ms, reaches only {share:.0%} of full"
                 " scale. Open the aperture, or raise the projector's intensity."
             )
         else:

@@ -82,11 +82,11 @@ class ShotTaker:
                 return frame
         if len(twins) < 2:
             raise DeviceError(
-                f"The camera delivered the picture of the shot before for {describe_shot(shot)}."
-                " Check that the projector follows and restart the camera, then resume the scan."
+                f"For {describe_shot(shot)}, the camera delivered the picture of the previous shot."
+                " Check that the projector responds and restart the camera, then resume the scan."
             )
         if not self._noiseless:
-            _log.warning("the camera gives one picture for different patterns; taken as free of noise")
+            _log.warning("the camera gives one picture for different patterns; assumed to be free of noise")
         self._noiseless = True
         return twins[-1]
 
@@ -111,7 +111,7 @@ class ShotTaker:
             if abs(actual - shot.exposure_ms) > EXPOSURE_TOLERANCE * shot.exposure_ms:
                 raise DeviceError(
                     f"The camera exposes for {actual:g} ms instead of the {shot.exposure_ms:g} ms of"
-                    f" {describe_shot(shot)}. Choose an exposure that this camera can do."
+                    f" {describe_shot(shot)}. Choose an exposure that this camera supports."
                 )
             self._exposure_ms = shot.exposure_ms
         pattern = (shot.role, shot.pattern, shot.level)
@@ -142,12 +142,12 @@ class ShotTaker:
         """Get ready for another attempt, or give up with a clear sentence."""
         if self._token.is_cancelled:
             raise Cancelled(
-                f"Cancelled while {describe_shot(shot)} failed: {error} Everything before it is stored."
+                f"Cancelled while {describe_shot(shot)} failed: {error} Everything before it is saved."
             ) from error
         if attempt + 1 >= self._policy.attempts:
             raise DeviceError(
                 f"{describe_shot(shot).capitalize()} failed {attempt + 1} times: {error}"
-                " Everything before it is stored; resume the scan when the device works again."
+                " Everything before it is saved; resume the scan when the device works again."
             ) from error
         _log.warning("%s, attempt %d: %s", describe_shot(shot), attempt + 1, error)
         if not isinstance(error, _StaleFrameError):

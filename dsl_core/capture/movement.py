@@ -71,7 +71,7 @@ def check_movement(
     """
     chosen = list(shots)
     if not chosen:
-        raise ValueError("a check for movement needs at least one shot that was taken before")
+        raise ValueError("a check for movement needs at least one shot that was captured before")
     taker = ShotTaker(rig, source.plan, pattern_image, policy or RetryPolicy())
     black_dn = rig.calibration.sensor.black_level_dn if rig.calibration else 0.0
     try:

@@ -61,7 +61,7 @@ def _exposures(rig: DeviceRig, plan: CapturePlan) -> Iterator[str]:
     for i, setting in enumerate(plan.settings):
         if not shortest <= setting.exposure_ms <= longest:
             yield (
-                f"setting {i} exposes for {setting.exposure_ms:g} ms, but the camera can do {shortest:g}"
+                f"setting {i} exposes for {setting.exposure_ms:g} ms, but the camera supports {shortest:g}"
                 f" to {longest:g} ms"
             )
 

@@ -97,7 +97,7 @@ def _cells(mosaic: NDArray[np.uint16], bayer: BayerPattern) -> tuple[NDArray[np.
     rows, columns = (size // 2 * 2 for size in mosaic.shape)
     if mosaic.ndim != 2 or min(rows, columns) < 2:
         raise DecodeError(
-            f"A mosaic has at least 2 x 2 pixels, given {mosaic.shape}. Check the camera's region."
+            f"A mosaic needs at least 2 x 2 pixels, not {mosaic.shape}. Check the camera's region."
         )
     whole = mosaic[:rows, :columns]
     return tuple(np.ascontiguousarray(whole[y::2, x::2]) for y, x in _SITES[bayer])

@@ -132,7 +132,7 @@ class Runner:
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(
                 State.CANCELLED,
-                str(error) or "Interrupted; what is stored stays stored. Resume it.",
+                str(error) or "Interrupted; saved frames are kept. Resume it.",
             )
             raise
         except DslError as error:
@@ -141,7 +141,7 @@ class Runner:
         except BaseException as error:
             self._end(State.FAILED, f"{type(error).__name__}: {error}")
             raise
-        self._end(State.FINISHED, f"All {self._plan.shot_count} frames are stored.")
+        self._end(State.FINISHED, f"All {self._plan.shot_count} frames are saved.")
         return self._status
 
     def _take_all(self, missing: list[Shot]) -> None:
@@ -170,7 +170,7 @@ class Runner:
         if self._token.is_cancelled:
             self._set(State.CANCELLING, shot=shot, done=done)
             raise Cancelled(
-                f"Cancelled after {done} of {self._plan.shot_count} frames; they are stored. Resume it."
+                f"Cancelled after {done} of {self._plan.shot_count} frames; they are saved. Resume it."
             )
 
     def _must_wait(self) -> bool:

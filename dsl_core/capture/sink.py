@@ -44,7 +44,7 @@ class MemorySink:
             return self.frames[shot.index].pixels
         except KeyError:
             raise StoreError(
-                f"{describe_shot(shot).capitalize()} has not been taken. Run the scan to its end first."
+                f"{describe_shot(shot).capitalize()} has not been captured. Run the scan to its end first."
             ) from None
 
     def close(self) -> None:

@@ -145,7 +145,7 @@ def all_(
         typer.Option(help="Name in the library; the default is the name of the campaign's folder."),
     ] = None,
     library: Annotated[
-        bool, typer.Option("--library/--no-library", help="Store the rig in the library.")
+        bool, typer.Option("--library/--no-library", help="Save the rig in the library.")
     ] = True,
     yes: Yes = False,
     accept_failed: AcceptFailed = False,

@@ -77,7 +77,7 @@ def check(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask: the target is in place.")] = False,
     json: Json = False,
 ) -> None:
-    """Check with one quick shot of a flat target whether the rig still matches its calibration."""
+    """Check with one quick capture of a flat target whether the rig still matches its calibration."""
     import tempfile
 
     from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
@@ -111,7 +111,7 @@ def check(
 @calibrations.command()
 def restore(
     name: Annotated[str, typer.Argument(metavar="NAME")],
-    version: Annotated[str, typer.Argument(metavar="DATE", help="A version, or the start of one.")],
+    version: Annotated[str, typer.Argument(metavar="DATE", help="A version, or its first characters.")],
     json: Json = False,
 ) -> None:
     """Make an older version the current one; the previous one stays in the library."""

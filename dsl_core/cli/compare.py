@@ -117,7 +117,7 @@ def sweep(
     check_targets([] if report is None else [report], overwrite=force)
     with output.progress() as progress:
         points, reference = read_sweep(results, against, progress)
-    output.say(f"Compared with {reference.name}; a star marks scans that no faster one beats:")
+    output.say(f"Compared with {reference.name}; a star marks scans that no faster scan beats:")
     _tell(output, sweep_rows(points))
     output.put(
         reference=reference.name,

@@ -117,7 +117,7 @@ def resumed_by(command: str) -> Iterator[None]:
     try:
         yield
     except (KeyboardInterrupt, Cancelled):
-        raise Cancelled(f"Stopped; everything captured is stored. Resume with: {command}") from None
+        raise Cancelled(f"Stopped; everything captured is kept. Resume with: {command}") from None
 
 
 def answer(output: Output, question: str) -> str:

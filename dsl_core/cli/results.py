@@ -78,7 +78,7 @@ def reconstruct(
 def evaluate(
     path: Result,
     truth_rig: Annotated[
-        str | None, typer.Option(help="Rig that knows the truth; the default is the scan's.")
+        str | None, typer.Option(help="Rig that provides the truth; the default is the scan's.")
     ] = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     report: Annotated[

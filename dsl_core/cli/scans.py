@@ -114,7 +114,7 @@ def scan(
     tolerance: Tolerance = None,
     json: Json = False,
 ) -> None:
-    """Capture a plan; every frame is stored on disk before the next is taken."""
+    """Capture a plan; every frame is saved to disk before the next is captured."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
     from dsl_core.io import MANIFEST_NAME
@@ -168,7 +168,7 @@ def _say_gaps(output: Output, target: Path) -> None:
     reader = ScanReader(target)
     missing = len(reader.missing())
     damaged = reader.plan.shot_count - len(reader.sound()) - missing
-    more = f"; damaged, and taken again: {damaged}" if damaged else ""
+    more = f"; damaged, and captured again: {damaged}" if damaged else ""
     output.say(f"{target} lacks {missing} frames{more}.")
     output.put(missing=missing, damaged=damaged)
 
@@ -208,7 +208,7 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
 
 def _done(output: Output, target: Path, frames: int, seconds: float) -> None:
     output.say(
-        f"All {frames} frames are stored in {target} ({seconds:.1f} s). Next: dsl-scan reconstruct {target}"
+        f"All {frames} frames are saved in {target} ({seconds:.1f} s). Next: dsl-scan reconstruct {target}"
     )
     output.put(session=target, frames=frames, seconds=round(seconds, 2), state="finished")
     output.finish()
@@ -221,5 +221,5 @@ def _resumable(target: Path) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, Cancelled):
         raise Cancelled(
-            f"Stopped; every frame taken so far is stored. Resume with: dsl-scan resume {target}"
+            f"Stopped; every frame captured so far is saved. Resume with: dsl-scan resume {target}"
         ) from None

@@ -176,7 +176,7 @@ def _tell(output: Output, front: list[Weighed], chosen: Weighed) -> None:
     e = chosen.expected
     output.say(
         f"Chosen: {chosen.plan.name}: {e.frames} frames in {e.seconds:.0f} s, expected reflectance error"
-        f" {e.pixel_rmse:.4f} a pixel, depth {e.depth_std_mm:.2f} mm, {e.computing_s:.0f} s of computing."
+        f" {e.pixel_rmse:.4f} per pixel, depth {e.depth_std_mm:.2f} mm, {e.computing_s:.0f} s of computing."
     )
     output.put(chosen=chosen.plan.name, expected=e.model_dump())
     output.put(front=[{"plan": each.plan.name, **each.expected.model_dump()} for each in front])

@@ -78,12 +78,12 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     if not points:
         known = ", ".join(sorted({point.name for point in _points()})) or "none"
         raise DeviceError(
-            f"There is no rig {name!r}; installed rigs: {known}."
-            " Install the package that brings it, or choose one of these."
+            f"There is no rig {name!r}; installed rigs: {known}. Install the package that provides it, or"
+            " choose one of these."
         )
     if len(points) > 1:
         packages = " and ".join(_package(point)[0] for point in points)
-        raise DeviceError(f"The packages {packages} both bring a rig {name!r}. Uninstall one of them.")
+        raise DeviceError(f"The packages {packages} both provide a rig {name!r}. Uninstall one of them.")
     try:
         rig = _load(points[0])(dict(options or {}))
     except DslError:

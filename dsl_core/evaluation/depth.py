@@ -43,14 +43,14 @@ def depth_score(depth_mm: Floats, truth_mm: Floats, lit: Mask | None = None) -> 
     if depth_mm.shape != truth_mm.shape or (lit is not None and lit.shape != truth_mm.shape):
         raise DecodeError(
             f"The depth map has {depth_mm.shape} pixels and its truth {truth_mm.shape};"
-            " render the truth for the camera that took the scan."
+            " render the truth for the camera that captured the scan."
         )
     wanted = np.isfinite(truth_mm) if lit is None else np.isfinite(truth_mm) & lit
     measured = wanted & np.isfinite(depth_mm)
     if not measured.any():
         raise DecodeError(
-            f"None of the {int(wanted.sum())} lit pixels with known depth was measured, so that no error"
-            " can be given; the flags of the result say why."
+            f"None of the {int(wanted.sum())} lit pixels with known depth was measured, so no error can be"
+            " given; the flags of the result say why."
         )
     errors = np.where(measured, depth_mm.astype(np.float64) - truth_mm, np.nan)
     error = errors[measured]

@@ -76,7 +76,7 @@ def compare_results(
     both = np.isfinite(first_mm) & np.isfinite(second_mm)
     either = int((np.isfinite(first_mm) | np.isfinite(second_mm)).sum())
     if not both.any():
-        raise DecodeError("No pixel has a depth in both results, so that they cannot be compared.")
+        raise DecodeError("No pixel has a depth in both results, so they cannot be compared.")
     errors = second_mm.astype(np.float64) - first_mm
     error = errors[both]
     depth = ResultDifference(

@@ -97,7 +97,7 @@ def find_target(
     grid, centres, off = _patches(inside, np.where(kept, behind, np.nan))
     if off.size < MIN_PATCHES:
         raise DecodeError(
-            f"The flat target is seen in {off.size} of {grid.size} patches, and {MIN_PATCHES} are needed."
+            f"The flat target is visible in {off.size} of {grid.size} patches, and {MIN_PATCHES} are needed."
             " Choose a region that it fills."
         )
     residual = np.full(points_mm.shape[1:], np.nan, np.float32)

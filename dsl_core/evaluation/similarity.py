@@ -25,8 +25,8 @@ def spectrum_at(bands_nm: NDArray[np.float64], nm: Floats, values: Floats) -> ND
     beyond = np.diff(bands_nm).max() / 2 if len(bands_nm) > 1 else 0.0
     if nm[0] > bands_nm[0] + beyond or nm[-1] < bands_nm[-1] - beyond:
         raise DecodeError(
-            f"The spectrum covers {nm[0]:g} to {nm[-1]:g} nm; to be looked for it must cover the bands of the"
-            f" result, {bands_nm[0]:g} to {bands_nm[-1]:g} nm. Choose a reference of this range."
+            f"The spectrum covers {nm[0]:g} to {nm[-1]:g} nm; to be searched for, it must cover the bands"
+            f" of the result, {bands_nm[0]:g} to {bands_nm[-1]:g} nm. Choose a reference of this range."
         )
     return np.asarray(np.interp(bands_nm, nm, values), np.float64)
 
@@ -41,7 +41,7 @@ def angle_map(cube: Floats, spectrum: Floats) -> Map:
     wanted = np.asarray(spectrum, np.float32)
     if wanted.shape != (len(cube),) or not np.isfinite(wanted).all() or not wanted.any():
         raise DecodeError(
-            f"A spectrum of {wanted.size} bands cannot be looked for in {len(cube)} bands, or it holds no"
+            f"A spectrum of {wanted.size} bands cannot be searched for in {len(cube)} bands, or it has no"
             " finite values. Choose a pixel or region with a complete spectrum."
         )
     product = np.tensordot(wanted / np.linalg.norm(wanted), cube, axes=1)

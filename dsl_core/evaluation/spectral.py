@@ -42,7 +42,7 @@ def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> 
             " resample the truth to the bands of the result."
         )
     if not (np.isfinite(measured).all() and np.isfinite(truth).all()):
-        raise DecodeError("A spectrum to compare holds values that are not finite; leave such pixels out.")
+        raise DecodeError("A spectrum to compare contains values that are not finite; leave such pixels out.")
     measured, truth = np.broadcast_arrays(np.asarray(measured, np.float64), np.asarray(truth, np.float64))
     # einsum, because products of all pixels and bands would need as much memory as the cube.
     product = np.einsum("bn,bn->n", measured, truth)
@@ -95,7 +95,7 @@ def peak_width(wavelengths_nm: Floats, values: Floats, baseline: float | None = 
     right = _half_width(wavelengths_nm[top:], curve[top:], half)
     flanks = [flank for flank in (left, right) if flank is not None]
     if curve[top] <= floor or not flanks:
-        raise DecodeError("The spectrum does not come down to half its maximum, so that it has no width.")
+        raise DecodeError("The spectrum does not come down to half its maximum, so it has no width.")
     low, high = flanks[0], flanks[-1]
     centre = float(wavelengths_nm[top]) + (high - low) / 2
     return Peak(centre, float(curve[top]), floor, low + high, len(flanks) == 2)

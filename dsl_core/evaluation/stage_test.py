@@ -106,8 +106,8 @@ def _require_positions(positions_mm: Sequence[float], targets: Sequence[SeenTarg
         raise DecodeError("A position of the stage is not a number. Give each in mm, like 695.2.")
     if max(positions_mm) == min(positions_mm):
         raise DecodeError(
-            f"All positions of the stage are {positions_mm[0]:g} mm, so that no line can be drawn."
-            " Give the position that each result was taken at."
+            f"All positions of the stage are {positions_mm[0]:g} mm, so no line can be drawn. Give the"
+            " position at which each result was captured."
         )
     sizes = {target.shape for target in targets}
     if len(sizes) > 1:

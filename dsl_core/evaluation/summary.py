@@ -174,8 +174,8 @@ def _chosen(
     size = result["reflectance"].shape[1:]
     if material.shape != size:
         raise DecodeError(
-            f"The result has {size} pixels and the truth {material.shape};"
-            " render the truth for the camera that took the scan."
+            f"The result has {size} pixels and the truth {material.shape}; render the truth for the camera"
+            " that captured the scan."
         )
     chosen = interior(material) & (material >= 0)
     return chosen if lit is None else chosen & lit

@@ -46,7 +46,7 @@ def check_honesty(values: Floats, truth: Floats, std: Floats, decided: Mask | No
     counted = known if decided is None else known & decided
     if not counted.any():
         raise DecodeError(
-            "No value has a truth, a standard deviation and enough data, so that the uncertainties cannot be"
+            "No value has a truth, a standard deviation and enough data, so the uncertainties cannot be"
             " checked; look at data_share and the flags of the result."
         )
     deviation = np.broadcast_to(std, error.shape)[counted].astype(np.float64)

@@ -74,7 +74,8 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StoreError(
-            f"The folder {folder} cannot be made ({error.strerror}). Check its parent folder's permissions."
+            f"The folder {folder} cannot be created ({error.strerror}). Check its parent folder's"
+            " permissions."
         ) from error
 
 
@@ -88,7 +89,7 @@ def store_error(path: Path, error: OSError) -> StoreError:
     """The sentence for a failed write."""
     if error.errno in _DISK_FULL:
         return StoreError(
-            f"The disk is full: {path} could not be written. Nothing stored before is lost;"
+            f"The disk is full: {path} could not be written. Nothing saved before is lost;"
             " free some space and resume."
         )
     reason = error.strerror or str(error)

@@ -172,7 +172,7 @@ class CalibrationLibrary:
         if noted in stamps:
             return noted
         if not stamps:
-            raise StoreError(f"The calibration {name!r} in {self.home} has no version left. Store it again.")
+            raise StoreError(f"The calibration {name!r} in {self.home} has no version left. Save it again.")
         return stamps[-1]
 
     def _set_current(self, name: str, stamp: str) -> None:

@@ -52,7 +52,7 @@ class CampaignFolder:
         """A campaign that was begun before; raises `StoreError`."""
         if not (path / CAMPAIGN_NAME).is_file():
             raise StoreError(
-                f"{path} is not a campaign: it has no {CAMPAIGN_NAME}. Give a campaign's folder."
+                f"{path} is not a campaign: it has no {CAMPAIGN_NAME}. Give the folder of a campaign."
             )
         return cls(path, read_record(path / CAMPAIGN_NAME, CampaignInfo))
 

@@ -107,7 +107,7 @@ def _json(path: Path) -> Facts:
     if "camera_size_px" in keys or "spectral" in keys:
         return {"kind": "plan", **_plan_facts(load_plan(path))}
     if "film" not in keys and "response" not in keys:
-        raise StoreError(f"{path} holds neither a rig nor a plan. Give a file that dsl-scan wrote.")
+        raise StoreError(f"{path} contains neither a rig nor a plan. Give a file that dsl-scan wrote.")
     rig = load_rig(path)
     return {
         "kind": "rig",

@@ -49,11 +49,11 @@ def _check_version(text: str, path: Path) -> None:
             f"The calibration {path} is not JSON ({error}). The file may be cut off; restore it from a copy."
         ) from error
     if not isinstance(content, dict):
-        raise CalibrationError(f"The calibration {path} does not hold a rig: a JSON object is needed.")
+        raise CalibrationError(f"The calibration {path} does not contain a rig: a JSON object is needed.")
     version = content.get("schema_version", _SCHEMA_VERSION)
     if version != _SCHEMA_VERSION:
         raise CalibrationError(
-            f"The calibration {path} has schema version {version!r}; this program knows version"
+            f"The calibration {path} has schema version {version!r}; this program supports version"
             f" {_SCHEMA_VERSION}. Use the version of the program that wrote it."
         )
 

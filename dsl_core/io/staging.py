@@ -71,7 +71,7 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
         _require_form(target, kind)
     if taken and not overwrite:
         names = ", ".join(str(target) for target in taken)
-        raise StoreError(f"{names} exists already. Choose another name, or allow it to be replaced.")
+        raise StoreError(f"{names} already exists. Choose another name, or allow it to be replaced.")
     for target in taken:
         if kind is not None and (why := kind.refusal(target)):
             raise StoreError(
@@ -129,7 +129,7 @@ def _aside(target: Path, room: Path) -> Path:
 
 
 #: What is nowhere else, by the file that tells it.
-_IRREPLACEABLE = {MANIFEST_NAME: "holds a scan", CAMPAIGN_NAME: "holds the captures of a campaign"}
+_IRREPLACEABLE = {MANIFEST_NAME: "contains a scan", CAMPAIGN_NAME: "contains the captures of a campaign"}
 #: Files that systems put into folders that a person looks at.
 _OF_THE_SYSTEM = {".DS_Store", "Thumbs.db", "desktop.ini"}
 
@@ -151,4 +151,4 @@ class FolderKind:
         if entries and not self.is_one(folder):
             return f"is not {self.name}"
         foreign = sorted(entry.name for entry in entries if not self.owns(entry))
-        return f"holds {foreign[0]} next to {self.name}" if foreign else ""
+        return f"contains {foreign[0]} next to {self.name}" if foreign else ""

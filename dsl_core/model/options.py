@@ -32,7 +32,7 @@ SOLVERS: tuple[SpectralChoice, ...] = (
         "As published",
         "Adam on the published objective; many times slower, no uncertainties",
     ),
-    SpectralChoice("nearest-line", "Nearest line", "one frame a band; quick, noisy, no uncertainties"),
+    SpectralChoice("nearest-line", "Nearest line", "one frame per band; quick, noisy, no uncertainties"),
     SpectralChoice("colour-basis", "Colour alone", "from three colours; quickest, a guess, no uncertainties"),
 )
 

@@ -74,7 +74,9 @@ class ColumnResidual(Record):
         if len(self.coefficients_px) != len(self.orders) or any(
             len(row) != len(self.degrees) for row in self.coefficients_px
         ):
-            raise ValueError("a column residual needs one row of coefficients an order, one for each term")
+            raise ValueError(
+                "a column residual needs one row of coefficients per order, one coefficient per term"
+            )
         return self
 
 

@@ -188,7 +188,7 @@ class HybridModel(GratingModel):
         super().__init__(rig)
         if rig.residual is None:
             raise CalibrationError(
-                f"Rig {rig.name!r} holds no residual of the grating equation; run the depth-stage calibration"
+                f"Rig {rig.name!r} has no residual of the grating equation; run the depth-stage calibration"
                 " or use the analytic model."
             )
         self.residual = rig.residual
@@ -215,7 +215,7 @@ class GridModel:
     def __init__(self, rig: Rig) -> None:
         if rig.correspondence is None:
             raise CalibrationError(
-                f"Rig {rig.name!r} holds no data-driven correspondence; run the depth-stage calibration"
+                f"Rig {rig.name!r} has no data-driven correspondence; run the depth-stage calibration"
                 " or use the analytic model."
             )
         self.rig = rig
@@ -232,7 +232,7 @@ class GridModel:
             return GratingModel(self.rig).trace(pixels, depth_mm, order, wavelengths_nm)
         if order not in self.grid.orders:
             raise CalibrationError(
-                f"The data-driven correspondence knows orders {self.grid.orders}, not {order}."
+                f"The data-driven correspondence covers orders {self.grid.orders}, not {order}."
             )
         alpha, beta, gamma = self._coefficients(order, pixels, depth_mm)
         at_nodes = alpha * (depth_mm / self.grid.depth_unit_mm) ** beta + gamma

@@ -76,8 +76,8 @@ class MixedLines:
             if not left:
                 return run
         raise PlanError(
-            f"Lines of {self.width_px} columns in steps of {self.step_px} do not keep apart in"
-            f" {self.frames} frames. Ask for more frames or narrower lines."
+            f"Lines of {self.width_px} columns in steps of {self.step_px} cannot be kept apart in"
+            f" {self.frames} frames. Use more frames or narrower lines."
         )
 
     def levels(self, width_px: int) -> NDArray[np.uint8]:
@@ -126,7 +126,9 @@ def design(
     progress, judge = progress or NoProgress(), Judge(rig, plan, grid)
     kinds, combs = list(_kinds(rig, frames)), list(_combs(rig, frames))
     if not kinds:
-        raise PlanError(f"No lines of {frames} patterns fit the projector of rig {rig.name!r}. Ask for more.")
+        raise PlanError(
+            f"No lines of {frames} patterns fit the projector of rig {rig.name!r}. Use more patterns."
+        )
     total = len(combs) + len(kinds) + FINALISTS * (orders - 1)
     count = iter(range(1, total + 1))
 

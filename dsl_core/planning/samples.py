@@ -89,13 +89,13 @@ def scene_samples(rig: Rig, result: xr.Dataset, grid: tuple[int, int] = (12, 8))
     shape = (rig.camera.height_px, rig.camera.width_px)
     if "reflectance" not in result or result["depth_mm"].shape != shape:
         raise PlanError(
-            f"A quick look must hold spectra at {shape[1]} x {shape[0]} pixels, as the rig {rig.name!r} sees"
-            " them. Scan and reconstruct with this rig."
+            f"A quick look must have spectra at {shape[1]} x {shape[0]} pixels, the image size of the rig"
+            f" {rig.name!r}. Scan and reconstruct with this rig."
         )
     valid = (result["flags"].values & int(SPECTRUM_INVALID)) == 0
     valid &= np.isfinite(result["reflectance"].values).all(0) & np.isfinite(result["shading"].values)
     if not valid.any():
-        raise PlanError("The quick look has no pixel with a spectrum. Look again with more light.")
+        raise PlanError("The quick look has no pixel with a spectrum. Scan again with more light.")
     pixels = _spread(valid, grid)
     depth = result["depth_mm"].values.astype(np.float64)
     return SamplePixels(

@@ -64,7 +64,9 @@ class MergedFrame:
 def black_frame(frames: Sequence[NDArray[np.unsignedinteger]], sensor: Sensor) -> BlackFrame:
     """Mean of one or more black frames of a setting; its variance follows from the sensor's noise."""
     if not frames:
-        raise DecodeError("A setting has no black frame. Capture one: all else is measured from it.")
+        raise DecodeError(
+            "A setting has no black frame. Capture one: all other frames are measured relative to it."
+        )
     mean: Array = np.asarray(np.mean(np.stack(frames), axis=0, dtype=np.float32))
     variance = raw_variance(sensor, np.asarray(mean - sensor.black_level_dn)) / len(frames)
     return BlackFrame(mean, np.asarray(variance, np.float32))
@@ -94,7 +96,7 @@ class HdrMerger:
         several sigmas of shot noise.
         """
         if len(gains_ms) != len(blacks) or not blacks:
-            raise DecodeError(f"{len(gains_ms)} settings need as many black frames, given {len(blacks)}.")
+            raise DecodeError(f"{len(gains_ms)} settings need as many black frames, not {len(blacks)}.")
         if not np.all(np.asarray(gains_ms) > 0):
             raise DecodeError(
                 f"Exposure x pattern radiance must be positive, given {np.asarray(gains_ms).tolist()} ms."
@@ -130,7 +132,7 @@ class HdrMerger:
         for raw in raws:
             self._check_shape(raw)
             if not np.issubdtype(raw.dtype, np.unsignedinteger):
-                raise DecodeError(f"Raw frames hold unsigned whole numbers, given {raw.dtype}.")
+                raise DecodeError(f"Raw frames contain unsigned whole numbers, not {raw.dtype}.")
         if out is None:
             out = MergedFrame(
                 np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
@@ -209,6 +211,6 @@ class HdrMerger:
     def _check_shape(self, image: NDArray[np.generic]) -> None:
         if image.shape != self.shape:
             raise DecodeError(
-                f"A frame has shape {image.shape}, wanted {self.shape}."
-                " All frames of a bracket come from one camera and crop."
+                f"A frame has shape {image.shape}; {self.shape} is needed. All frames of a bracket come from"
+                " one camera and crop."
             )

@@ -73,7 +73,7 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
     plan = scan.plan
     if isinstance(plan.code, NoCode):
         raise DecodeError(
-            f"The scan {plan.name!r} holds no binary code, so that depth is unknown. Capture one with a code."
+            f"The scan {plan.name!r} contains no binary code, so depth is unknown. Capture one with a code."
         )
     decoder = decoder_of(plan.code, plan.projector_size_px)
 
@@ -134,7 +134,7 @@ def check_source(source: FrameSource, rig: Rig) -> CapturePlan:
     for device, (given, wanted) in sizes.items():
         if tuple(given) != wanted:
             raise DecodeError(
-                f"The scan was taken with a {device} of {given[0]} x {given[1]} pixels, the calibration"
+                f"The scan was captured with a {device} of {given[0]} x {given[1]} pixels, the calibration"
                 f" {rig.name!r} is for {wanted[0]} x {wanted[1]}. Use the calibration of this rig and crop."
             )
     return plan

@@ -68,8 +68,8 @@ class SimCamera(Camera):
         low, high = EXPOSURE_RANGE_MS
         if not low <= exposure_ms <= high:
             raise DeviceError(
-                f"The camera was asked for an exposure of {exposure_ms:g} ms; it can do {low:g} to {high:g}"
-                " ms. Change the plan's settings."
+                f"The camera was asked for an exposure of {exposure_ms:g} ms; it supports {low:g} to"
+                f" {high:g} ms. Change the plan's settings."
             )
         self._exposure_ms = exposure_ms
         return exposure_ms

@@ -47,7 +47,9 @@ def _size(value: object) -> tuple[int, int] | None:
     except ValueError:
         width = height = 0
     if not (16 <= width <= 4096 and 16 <= height <= 4096):
-        raise DeviceError(f"The twin's size must be like 890x580 (16 to 4096 pixels a side), not {value!r}.")
+        raise DeviceError(
+            f"The twin's size must be like 890x580 (16 to 4096 pixels per side), not {value!r}."
+        )
     return width, height
 
 
@@ -60,7 +62,7 @@ class TwinOptions(Record):
     """Options of the twin. All others are those of its scene, which ``dsl-scan scenes`` lists."""
 
     scene: str = Field(
-        default="color-checker", description="what stands before the camera; its options can follow"
+        default="color-checker", description="scene in front of the camera; its options can be added"
     )
     size: Annotated[tuple[int, int] | None, BeforeValidator(_size)] = Field(
         default=None,
@@ -69,21 +71,21 @@ class TwinOptions(Record):
     seed: Whole = Field(default=0, description="seed of the noise")
     noise: Switch = Field(default=True, description="noise of camera and spectroradiometer, on or off")
     sigma: Number = Field(
-        default=0.0, description="more Gaussian noise, of full scale; the calibration knows it"
+        default=0.0, description="additional Gaussian noise, of full scale; known to the calibration"
     )
-    film: Switch = Field(default=True, description="diffraction film before the projector, on or off")
+    film: Switch = Field(default=True, description="diffraction film in front of the projector, on or off")
     device: str = Field(default="cpu", description="where pictures are computed: cpu or cuda")
     realtime: Switch = Field(default=False, description="on: waits as long as real devices would")
     effects: str = Field(
         default="usual",
-        description="what light does: usual, all, none, names, or auto: what the scene calls for",
+        description="effects of light: usual, all, none, names, or auto: what the scene calls for",
     )
     tolerance: str = Field(
         default="1DN", description="the most that auto may change a picture, such as 0.5sigma"
     )
     truth: Whole | None = Field(
         default=None,
-        description="number of a rig drawn around the published one, whose calibration nobody knows",
+        description="number of a rig drawn around the published one, whose calibration is unknown",
     )
     led_cycle_hz: Number = Field(
         default=0.0, description="how often the LEDs flash in turn; 0: they shine steadily"
@@ -91,25 +93,27 @@ class TwinOptions(Record):
     ambient_dn_per_ms: Number = Field(default=AMBIENT_DN_PER_MS, description="light of the room")
     defocus_px: Number = Field(default=0.0, description="blur of a camera that is out of focus")
     brightness: Number = Field(
-        default=1.0, description="light of the projector, of that of the published rig"
+        default=1.0, description="light of the projector, relative to the published rig"
     )
 
     # What a person might do wrong, to try out how calibrations notice.
     wrong_filter_nm: Number | None = Field(
-        default=None, description="filter in the beam, whichever was asked for"
+        default=None, description="filter in the beam, whichever was requested"
     )
     filter_tilt_deg: Number = Field(default=0.0, description="tilt of the filters")
     bow_mm: Number = Field(default=0.0, description="how far diffusers bulge over 300 mm")
     stage_scale: Number = Field(
-        default=1.0, description="how far the stage moves from 700 mm, of what it says"
+        default=1.0, description="how far the stage moves from 700 mm, relative to what it reports"
     )
     chart_roll_deg: Number = Field(
-        default=0.0, description="how much further a chart is turned than asked for"
+        default=0.0, description="how much further a chart is turned than requested"
     )
     board_shift_mm: Number = Field(
         default=0.0, description="how far a board stands to the right of its place"
     )
-    print_scale: Number = Field(default=1.0, description="size of a printed board, of what it should be")
+    print_scale: Number = Field(
+        default=1.0, description="size of a printed board, relative to what it should be"
+    )
     target_missing: Switch = Field(default=False, description="on: a wall instead of a board or a chart")
 
     @classmethod

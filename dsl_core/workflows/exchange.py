@@ -126,7 +126,7 @@ def _refuse_other_scan(target: Path, fingerprint: str, calibration: Rig, root: P
         why = "that was imported with another calibration"
     else:
         return
-    raise StoreError(f"{target} holds a scan {why}. A scan is never replaced: choose another name.")
+    raise StoreError(f"{target} contains a scan {why}. A scan is never replaced: choose another name.")
 
 
 def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int] | None) -> Rig:

@@ -63,8 +63,8 @@ def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
         if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
             return folder
     raise StoreError(
-        f"The scan of {path.name} is not next to it, so that its frames cannot be read."
-        f" Move the scan of {captured or 'this result'} to {path.parent}."
+        f"The scan of {path.name} is not next to it, so its frames cannot be read. Move the scan of"
+        f" {captured or 'this result'} to {path.parent}."
     )
 
 
@@ -142,8 +142,8 @@ def _calibration(reader: ScanReader, result: ResultArrays) -> Rig:
         if line.entry is not None and calibration_digest(line.entry.rig) == digest:
             return line.entry.rig
     raise CalibrationError(
-        f"{result.path.name} was made with another calibration than its scan holds, and the library does not"
-        " have it, so that nothing can be expected of a pixel. Import that calibration into the library, or"
+        f"{result.path.name} was made with a calibration other than that of its scan, and the library does"
+        " not have it, so nothing can be predicted for a pixel. Import that calibration into the library, or"
         " reconstruct the scan with its own."
     )
 

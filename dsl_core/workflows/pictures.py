@@ -69,11 +69,13 @@ def calibrate_geometry(
 def pose_folders(folder: Path) -> list[Path]:
     """The folders of poses below a folder, by number; raises `CalibrationError` when there is none."""
     if not folder.is_dir():
-        raise CalibrationError(f"{folder} is not a folder. Give the folder that holds one folder a pose.")
+        raise CalibrationError(
+            f"{folder} is not a folder. Give the folder that contains one folder per pose."
+        )
     found = sorted((path for path in folder.iterdir() if path.is_dir() and _pictures(path)), key=_natural)
     if not found:
         raise CalibrationError(
-            f"{folder} holds no folders with pictures. One folder a pose is needed, like capture_0 with"
+            f"{folder} contains no folders with pictures. One folder per pose is needed, like capture_0 with"
             " graycode_00.png and so on."
         )
     return found
@@ -118,8 +120,8 @@ def _check_numbers(folder: Path, pictures: list[Path], wanted: int) -> None:
     absent = sorted(set(range(wanted)) - set(numbers))
     lacks = f" Number {', '.join(map(str, absent[:5]))} is missing." if absent and numbers else ""
     raise CalibrationError(
-        f"{folder} holds {len(pictures)} pictures, {wanted} are needed: pattern and inverse of every bit of"
-        f" the projector's columns and rows, white, black.{lacks} Correct the projector's size or add the"
+        f"{folder} contains {len(pictures)} pictures, {wanted} are needed: pattern and inverse of every bit"
+        f" of the projector's columns and rows, white, black.{lacks} Correct the projector's size or add the"
         " pictures."
     )
 

@@ -35,7 +35,7 @@ def reopen_rig(folder: Path) -> DeviceRig:
     origin = rig_of_notes(read_manifest(folder).notes)
     if origin is None:
         raise StoreError(
-            f"{folder} does not say with which rig it was taken. Name it with --rig and --option."
+            f"{folder} does not say with which rig it was captured. Name it with --rig and --option."
         )
     return open_rig(*origin)
 
@@ -110,7 +110,7 @@ def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:
     rig = given or getattr(source, "calibration", None)
     if rig is None:
         raise CalibrationError(
-            "The scan holds no calibration and none was given. Name one with --calibration FILE."
+            "The scan contains no calibration, and none was given. Name one with --calibration FILE."
         )
     return rig
 
@@ -164,7 +164,7 @@ def truth_of(
     origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
     if origin is None:
         raise DecodeError(
-            "The result does not say with which rig it was taken, so that there is no truth to compare with."
+            "The result does not say with which rig it was captured, so there is no truth to compare with."
             " Name a twin of the scene with --truth-rig twin and --option."
         )
     with open_rig(*origin) as rig:

@@ -69,7 +69,7 @@ def read_target(path: Path, region: Region | None = None) -> tuple[SeenTarget, f
 
     result = load_result(path)
     if "points_mm" not in result:
-        raise DecodeError(f"{path.name} holds no points in space. Reconstruct its scan again.")
+        raise DecodeError(f"{path.name} contains no points in space. Reconstruct its scan again.")
     flags = result["flags"].values if "flags" in result else None
     try:
         return find_target(result["points_mm"].values, flags, region), position_of(path, result.attrs)
@@ -97,7 +97,7 @@ def read_targets(
             known = positions_mm[i]
         if known is None:
             raise DecodeError(
-                f"{path.name} does not say where the stage stood. Give the positions of all results in mm,"
+                f"{path.name} does not say where the stage was. Give the positions of all results in mm,"
                 " or write them into their names, like 'stage 695.2 mm.zarr'."
             )
         targets.append(target)
@@ -186,7 +186,7 @@ def _seconds(path: Path, attributes: Mapping[str, Any]) -> float:
     seconds = seconds_of(attributes)
     if seconds is None:
         raise DecodeError(
-            f"{path.name} does not say what its capture took. Reconstruct its scan again, with its plan."
+            f"{path.name} does not say how long its capture took. Reconstruct its scan again, with its plan."
         )
     return seconds
 
@@ -199,6 +199,6 @@ def _require_same_scene(path: Path, known: Truth, truth: Truth) -> None:
     ):
         return
     raise DecodeError(
-        f"{path.name} shows another scene, or by another camera, than the results before it."
+        f"{path.name} shows another scene, or was captured with another camera, than the results before it."
         " A sweep compares scans of one scene."
     )

@@ -27,7 +27,7 @@ P99_MS, WORST_MS = 50.0, 150.0
 
 
 def main() -> None:
-    """Run the jobs that were asked for; print a table of each group, and one of answers."""
+    """Run the jobs that were requested; print a table of each group, and one of answers."""
     parser = options(__doc__)
     parser.add_argument("--only", action="append", default=[], metavar="NAME", help="groups of jobs")
     parser.add_argument("--trace", type=Path, metavar="FILE", help="what threads did in long gaps")

@@ -84,7 +84,7 @@ def test_saturated_white_gets_advice_for_a_shot_without_settings_to_lower(
 ) -> None:
     rig, scan = shot
     bright = tuple(np.full_like(frame, rig.sensor.full_scale_dn) for frame in scan.frames)
-    with pytest.raises(DecodeError, match="exposures of its own") as found:
+    with pytest.raises(DecodeError, match="its own exposures") as found:
         drift_figures(replace(scan, frames=bright), rig, spectralon=False, pixels=FEW)
     assert "plan's settings" not in str(found.value)
 

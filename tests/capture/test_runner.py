@@ -370,7 +370,7 @@ def test_a_runner_runs_once(rig: DeviceRig, plan: CapturePlan, pattern: Pattern)
 
 
 def test_a_frame_not_taken_is_named(plan: CapturePlan) -> None:
-    with pytest.raises(StoreError, match=r"Frame 0 .* has not been taken"):
+    with pytest.raises(StoreError, match=r"Frame 0 .* has not been captured"):
         MemorySink(plan).read(next(plan.shots()))
 
 

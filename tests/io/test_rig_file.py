@@ -23,7 +23,7 @@ def test_a_rig_comes_back_unchanged(tmp_path: Path) -> None:
 def test_a_rig_is_replaced_only_when_allowed(tmp_path: Path) -> None:
     path = save_rig(small_rig(), tmp_path / "rig.json")
     other = small_rig().model_copy(update={"name": "other"})
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         save_rig(other, path)
     assert load_rig(path).name == "small"
     save_rig(other, path, overwrite=True)

@@ -100,8 +100,8 @@ def test_a_scan_is_never_replaced(session: Path, write: Callable[[Path], None]) 
     [
         (_documents, _save, "is not a result"),
         (_documents, _export, "is not a published dataset"),
-        (_campaign, _save, "holds the captures of a campaign"),
-        (_campaign, _export, "holds the captures of a campaign"),
+        (_campaign, _save, "contains the captures of a campaign"),
+        (_campaign, _export, "contains the captures of a campaign"),
         (_save, _export, "is not a published dataset"),
         (_export, _save, "is not a result"),
         (_result_with_notes, _save, r"holds notes\.txt next to a result"),
@@ -159,7 +159,7 @@ def test_what_came_meanwhile_is_not_replaced(tmp_path: Path) -> None:
             draft.write_text("ours")
             path.write_text("somebody's")
 
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         write_slowly()
     assert path.read_text() == "somebody's"
     assert [each.name for each in tmp_path.iterdir()] == ["page.html"]

@@ -133,7 +133,7 @@ def test_the_commands_write_no_plan_that_the_rig_refuses(
         assert find_obstacles(devices, load_plan(path)) == []
     designed = ["design", str(tmp_path / "set.json"), "--plan", str(tmp_path / "designed.json")]
     assert main(designed) == 2
-    assert "the camera can do 0.1 to 150 ms" in capsys.readouterr().err
+    assert "the camera supports 0.1 to 150 ms" in capsys.readouterr().err
     assert not (tmp_path / "set.json").exists()
 
 

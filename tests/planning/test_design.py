@@ -43,7 +43,7 @@ def test_orders_follow_from_seeds_and_differ_from_each_other() -> None:
 
 
 def test_lines_that_cannot_keep_apart_are_refused() -> None:
-    with pytest.raises(PlanError, match="do not keep apart"):
+    with pytest.raises(PlanError, match="cannot be kept apart"):
         MixedLines(frames=8, width_px=20, step_px=2, seed=1).order(64)
     for frames in (4, 200):
         with pytest.raises(PlanError, match="8 to 160"):

@@ -35,8 +35,8 @@ def test_texts_are_read_and_those_of_the_scene_are_left() -> None:
 @pytest.mark.parametrize(
     ("name", "text", "sentence"),
     [
-        ("size", "890", "size must be like 890x580 (16 to 4096 pixels a side), not '890'"),
-        ("size", "8x8", "size must be like 890x580 (16 to 4096 pixels a side), not '8x8'"),
+        ("size", "890", "size must be like 890x580 (16 to 4096 pixels per side), not '890'"),
+        ("size", "8x8", "size must be like 890x580 (16 to 4096 pixels per side), not '8x8'"),
         ("seed", "-1", "option seed must be a number of at least 0, not '-1'"),
         ("sigma", "much", "option sigma must be a number of at least 0, not 'much'"),
         ("brightness", "inf", "option brightness must be a number of at least 0, not 'inf'"),

@@ -152,7 +152,7 @@ CASES = (
         "fewer than unknowns",
         _fitted(_grid(lambda z: 40 / z, DEPTHS[:2]), DEPTHS[:2]),
         "refused",
-        "three or more depths",
+        "three or more different depths",
     ),
     Case(
         "depths alike",
@@ -184,6 +184,6 @@ CASES = (
     Case("one filter", "a curve from a point", _efficiency((0.1,)), "refused", "filters"),
     Case("plane of one line", "pixels of one image row", _plane, "refused", "line"),
     Case("lost zero orders", "two thirds of the pixels dark", _zero_order(1e-9), "right"),
-    Case("no zero order", "all pixels dark", _zero_order(0.0), "refused", "pixels see the lines"),
+    Case("no zero order", "all pixels dark", _zero_order(0.0), "refused", "lines are resolved in only"),
     Case("tiles of nothing", "one known pixel of infinite deviation", _tiles, "flagged", "0 tiles"),
 )

@@ -97,10 +97,10 @@ def test_damaged_frames(give: Give, scan_copy: Path, damage: Damage, sentence: s
     ("damage", "says"),
     [
         (_missing, "lacks 1 frames."),
-        (_swapped, "lacks 0 frames; damaged, and taken again: 2."),
-        (_truncated, "lacks 0 frames; damaged, and taken again: 1."),
-        (_wrong_size, "lacks 0 frames; damaged, and taken again: 1."),
-        (_wrong_type, "lacks 0 frames; damaged, and taken again: 1."),
+        (_swapped, "lacks 0 frames; damaged, and captured again: 2."),
+        (_truncated, "lacks 0 frames; damaged, and captured again: 1."),
+        (_wrong_size, "lacks 0 frames; damaged, and captured again: 1."),
+        (_wrong_type, "lacks 0 frames; damaged, and captured again: 1."),
     ],
 )
 def test_resume_mends_damaged_frames_to_the_bit(
@@ -181,7 +181,7 @@ def test_frames_that_show_nothing(
             writer.write(shot, Frame(picture(rng), shot.exposure_ms, shot.index + 1.0, shot.index + 1))
     rig = tmp_path / "rig.json"
     rig.write_text(json.dumps(_calibration(finished / "scan.dsl")))
-    assert "holds no calibration" in give("reconstruct", scan).sentence
+    assert "contains no calibration" in give("reconstruct", scan).sentence
     ending = give("reconstruct", scan, "--calibration", rig)
     assert ending.code == 2
     assert sentence in ending.sentence
@@ -209,7 +209,7 @@ def test_frames_that_show_nothing(
         ("scan a.dsl -o size=112x72 --setting 100", "--setting must be EXPOSURE_MS@LEVEL"),
         ("scan a.dsl -o size=112x72 --setting 100@2", "settings.0.level"),
         ("scan a.dsl -o size=112x72 --setting nan@0.5", "settings.0.exposure_ms"),
-        ("scan a.dsl -o size=112x72 --setting 99999@0.5", "the camera can do"),
+        ("scan a.dsl -o size=112x72 --setting 99999@0.5", "the camera supports"),
         ("scan a.dsl --plan absent.json", "absent.json cannot be read"),
         ("scan a.dsl --plan empty.json", "empty.json is not valid"),
         ("scan a.dsl --plan empty.json --code full", "leave out --code"),
@@ -222,7 +222,7 @@ def test_frames_that_show_nothing(
         ("reconstruct absent.dsl --model magic", "--model must be one of auto, grating, hybrid, grid"),
         ("reconstruct absent.dsl --solver magic", "--solver must be one of best, published, nearest-line"),
         ("reconstruct absent.dsl --device tpu", "--device must be one of"),
-        ("reconstruct absent.dsl -o folder", "exists already"),
+        ("reconstruct absent.dsl -o folder", "already exists"),
         ("reconstruct absent.dsl --calibration absent.json", "There is no file absent.json"),
         ("evaluate absent.zarr", "is not a result"),
         ("export absent.zarr ply a.ply", "is not a result"),
@@ -275,7 +275,7 @@ def test_a_bug_is_called_one(give: Give, monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_a_result_is_not_replaced_unasked(give: Give, finished: Path) -> None:
     before = (finished / "scan.zarr" / "zarr.json").stat().st_mtime_ns
-    assert "exists already" in give("reconstruct", finished / "scan.dsl").sentence
+    assert "already exists" in give("reconstruct", finished / "scan.dsl").sentence
     assert "already contains a scan" in give("scan", finished / "scan.dsl", *SMALL_RIG).sentence
     assert (finished / "scan.zarr" / "zarr.json").stat().st_mtime_ns == before
 

@@ -115,7 +115,7 @@ def _covered(folder: Path) -> None:
         (_smaller, "graycode_05.png is 120 x 90 px, the first picture of its pose 240 x 180"),
         (_smaller_pose, "pictures of capture_1 are 120 x 90 px, those of capture_0 240 x 180"),
         (_covered, "not found in the white picture of capture_1"),
-        (_emptied, "holds no folders with pictures"),
+        (_emptied, "contains no folders with pictures"),
         (lambda f: shutil.rmtree(f / "capture_2"), "2 usable poses of the board are too few"),
         (_nothing, "All poses of the board are nearly parallel"),
     ],

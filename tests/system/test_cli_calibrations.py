@@ -68,7 +68,7 @@ def test_versions_are_listed_shown_and_brought_back(
 def test_a_calibration_travels(give: Give, tmp_path: Path, library: CalibrationLibrary) -> None:
     entry = library.store("lab", calibrated())
     assert give("calibrations", "export", "lab", tmp_path / "lab.json").code == 0
-    assert "exists already" in give("calibrations", "export", "lab", tmp_path / "lab.json").sentence
+    assert "already exists" in give("calibrations", "export", "lab", tmp_path / "lab.json").sentence
     assert give("calibrations", "export", "lab", tmp_path / "rig.json", "--form", "rig").code == 0
     assert load_rig(tmp_path / "rig.json") == entry.rig
     published = give("calibrations", "export", "lab", tmp_path / "out", "--form", "published", "--json")

@@ -169,7 +169,7 @@ def test_export_of_a_result(
     assert all(Path(file).stat().st_size > 0 for file in said["files"])
     again = give("export", finished / "scan.zarr", form, tmp_path / name, *more)
     assert again.code == 2
-    assert "exists already" in again.sentence
+    assert "already exists" in again.sentence
     assert give("export", finished / "scan.zarr", form, tmp_path / name, *more, "--force").code == 0
 
 
@@ -188,7 +188,7 @@ def test_what_the_calibration_lacks_is_said_before_a_frame_is_read(
     monkeypatch.delattr(ScanReader, "read")
     ending = give("reconstruct", finished / "scan.dsl", "--model", "grid", "-o", tmp_path / "a.zarr")
     assert ending.code == 2
-    assert "holds no data-driven correspondence" in ending.sentence
+    assert "has no data-driven correspondence" in ending.sentence
 
 
 def test_a_scan_goes_out_and_comes_back_in_the_published_layout(

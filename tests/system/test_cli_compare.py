@@ -65,7 +65,7 @@ def test_given_positions_count_and_the_report_says_all(give: Give, stage: list[P
     assert "http" not in page.replace("http-equiv", "")
     again = give("depth-test", *stage, "--report", report)
     assert again.code == 2
-    assert "exists already" in again.sentence
+    assert "already exists" in again.sentence
 
 
 def test_what_is_missing_is_said(give: Give, stage: list[Path], tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ class NewCampaignDialog(QDialog):
         self._text = label("", "warn", wraps=True)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
-        self.begin.setToolTip("Make the folder and begin the campaign")
+        self.begin.setToolTip("Create the folder and start the campaign")
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         row = QHBoxLayout()
@@ -101,7 +101,7 @@ class CampaignBox(QFrame):
         self._state, self._rig, self._commands, self._home = state, rig, commands, home
         self._name, self._where = label("", "title"), label("", "muted", wraps=True)
         self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.new = push_button("&New campaign…", "Begin a campaign of the chosen rig in a new folder")
+        self.new = push_button("&New campaign…", "Start a campaign for the chosen rig in a new folder")
         self.open = push_button("&Open campaign…", "Continue an existing campaign")
         self.everything = push_button(
             "Calibrate &everything",
@@ -109,7 +109,7 @@ class CampaignBox(QFrame):
         )
         self.cancel = push_button("&Stop", "Stop at the next safe point; everything captured is kept")
         self.keep = push_button(
-            "&Keep in library", "Assemble the rig as far as it is calibrated and keep it in the library"
+            "&Keep in library", "Assemble the rig as far as it is calibrated and save it in the library"
         )
         self._progress = label("", "muted")
         self._progress.setAccessibleName("Progress of calibrating everything")

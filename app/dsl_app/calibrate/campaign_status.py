@@ -68,7 +68,7 @@ def _read(
         captured = count_captured(campaign, name)
     except DslError as error:
         return Row(name, about, RowState.DAMAGED, str(error)), ""
-    waiting = "A fit is waiting to be judged." if waits else ""
+    waiting = "A fit has not been judged yet." if waits else ""
     if accepted is None:
         begun = captured > 0 or waits
         reason = waiting or (f"{captured} captured" if captured else "")
@@ -98,7 +98,7 @@ def judge(
     if accepted.based_on != dict(before):
         newer = [name for name in before if accepted.based_on.get(name) != before[name]]
         names = " and ".join(_title(name) for name in newer) or "what it was fitted on"
-        return RowState.SUPERSEDED, f"{names} changed since. Fit again; its captures are kept."
+        return RowState.SUPERSEDED, f"Changed since: {names}. Fit again; its captures are kept."
     failed = failures(accepted.figures)
     if failed:
         return RowState.OUTSIDE, failed[0].advice

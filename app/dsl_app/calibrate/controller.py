@@ -76,7 +76,7 @@ class CalibrateController:
             self._take(lambda: CampaignFolder.open(folder))
 
     def begin_campaign(self, folder: Path) -> None:
-        """Begin a campaign of the chosen rig in a new folder."""
+        """Start a campaign for the chosen rig in a new folder."""
         choice = self._rig.state.choice.value
         if not self._is_busy():
             self._take(lambda: CampaignFolder.begin(folder, choice.name, dict(choice.options)))
@@ -125,7 +125,7 @@ class CalibrateController:
     # One calibration -------------------------------------------------------------------------------
 
     def run(self, name: str) -> None:
-        """Open the wizard of a calibration, which continues where it was left."""
+        """Open the wizard of a calibration, which continues where you left it."""
         facts = self._ready()
         if facts is None or not self._take_lock(facts.path):
             return
@@ -192,7 +192,7 @@ class CalibrateController:
         self.refresh()
         self.library.load()
         if error is not None:
-            text = f"The calibration of everything stopped: {sentence_of(error)}"
+            text = f"Calibrating everything stopped: {sentence_of(error)}"
             self.state.note.set(text)
             self._notifier.tell("error", text)
 
@@ -248,7 +248,7 @@ class CalibrateController:
         """Whether a calibration runs; then the person is told which."""
         running = "" if self._wizard is None else self._wizard.state.title
         if self._everything.is_running:
-            running = "The calibration of everything"
+            running = "Calibrating everything"
         if running:
             self._notifier.tell("warning", f"{running} is still running. Finish or leave it first.")
         return bool(running)
@@ -256,7 +256,9 @@ class CalibrateController:
     def _take_lock(self, path: Path) -> bool:
         user = next((job for job in self._runner.active if job.exclusive == RIG), None)
         if user is not None and not self._rig.state.live.value:
-            self._notifier.tell("warning", f"{user.title} uses the rig. Wait for it, or cancel it.")
+            self._notifier.tell(
+                "warning", f"{user.title} is using the rig. Wait until it ends, or cancel it."
+            )
             return False
         try:
             self._lock.take(path)

@@ -61,9 +61,12 @@ class LibraryPanel(QGroupBox):
         self._note = label("", "muted", wraps=True)
         self.use = push_button("&Use for scans", "Scan with this calibration from now on")
         self.report = push_button("Show &report", "Open its report in the browser")
-        self.restore = push_button("Ma&ke current", "Make this older version the current one; none is lost")
+        self.restore = push_button(
+            "Ma&ke current", "Make this older version the current one; no version is lost"
+        )
         self.check = push_button(
-            "Check for &drift…", "Check by one quick shot of a flat target whether the rig is as calibrated"
+            "Check for &drift…",
+            "Check with one quick capture of a flat target whether the rig still matches its calibration",
         )
         self.export = push_button("E&xport…", "Export it for another computer or program")
         self.import_ = push_button("&Import…", "Import a calibration's file into the library")
@@ -168,7 +171,7 @@ class LibraryPanel(QGroupBox):
         )
         spectralon = box.addButton("The &Spectralon", QMessageBox.ButtonRole.AcceptRole)
         other = box.addButton("&Another target", QMessageBox.ButtonRole.AcceptRole)
-        other.setToolTip("The light is not judged then, because the brightness of the target is not known")
+        other.setToolTip("Brightness is then not judged, because the brightness of the target is not known")
         box.addButton(QMessageBox.StandardButton.Cancel)
         box.exec()
         chosen = box.clickedButton()
@@ -235,7 +238,7 @@ class DriftWindow(QDialog):
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         buttons.rejected.connect(self.reject)
         self.again = push_button(
-            "Check &again", "Take the quick shot again; the target must still be in place"
+            "Check &again", "Repeat the quick capture; the target must still be in place"
         )
         self.use = push_button("&Use anyway", "Scan with this calibration from now on, despite the drift")
         for button, requested in ((self.again, self.again_requested), (self.use, self.use_requested)):

@@ -96,7 +96,7 @@ def row_display(row: Row, is_busy: bool = False) -> RowDisplay:
     title, figure = row.about.title, row.figure
     begun = row.state is RowState.BEGUN or row.has_candidate
     word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
-    tip = f"Open the wizard of {title}, which continues where it was left"
+    tip = f"Open the wizard of {title}, which continues where you left it"
     return RowDisplay(
         state=f"● {row.state.value}",
         state_role=_ROLES.get(row.state, "warn"),

@@ -47,7 +47,7 @@ class CalibrationInUse:
         if key.partition("@")[0] in CalibrationLibrary().names():
             scans.plans.choose_calibration(CalibrationChoice(key, key))
         else:
-            _log.warning("The library has no calibration %r any more; scans use the rig's own.", key)
+            _log.warning("The library no longer has a calibration %r; scans use the rig's own.", key)
 
     def _chosen(self, key: str) -> None:
         """Remember what was chosen on the Scan page."""

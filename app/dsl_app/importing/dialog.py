@@ -71,7 +71,7 @@ class ImportDialog(JobDialog):
         self.base = ChoiceBox(
             "Film, sensor and scales of",
             "The folder does not contain the film's pose, the sensor's response and the scale of white.\n"
-            "A scan needs the calibration of the rig that took it.",
+            "A scan needs the calibration of the rig that captured it.",
         )
         self.base.addItem("The published rig", PUBLISHED)
         for name in self._state.library.value:

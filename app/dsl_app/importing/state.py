@@ -138,7 +138,7 @@ def trouble_of(found: Found, request: ImportRequest) -> str:
     if not request.target.stem.strip() or request.target.name.startswith("."):
         return "Enter a name."
     if request.target.exists():
-        return f"{request.target.name} exists already. Choose another name or folder."
+        return f"{request.target.name} already exists. Choose another name or folder."
     return ""
 
 

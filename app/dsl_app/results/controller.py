@@ -169,7 +169,7 @@ class ResultsController:
         result = self.state.result.value
         if result is not None and not result.has_spectra and view in (ResultView.COLOUR, ResultView.BAND):
             self._notifier.tell(
-                "info", "This result holds depth only. Reconstruct the scan with spectra to see colours."
+                "info", "This result has depth only. Reconstruct the scan with spectra to see colours."
             )
             return
         self.state.view.set(view)
@@ -248,7 +248,7 @@ class ResultsController:
     # Inspect ---------------------------------------------------------------------------------------
 
     def inspect(self) -> None:
-        """Show what the pixel under the cursor saw in each frame; needs the scan next to the result."""
+        """Show what the pixel under the cursor received in each frame; needs the scan next to the result."""
         result, pixel, block = self.state.result.value, self.state.cursor.value, self._block
         if result is None or pixel is None:
             self._notifier.tell("info", "Point at a pixel to see its intensity graph.")

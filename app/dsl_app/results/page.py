@@ -80,7 +80,8 @@ class ResultsPage(PageWidget):
             "Make another result from the same frames, with other bands, solver or calibration (Ctrl+R)",
         )
         self._inspect = push_button(
-            "Intensity graph", "Show what the pixel under the cursor saw in each frame, and the model (I)"
+            "Intensity graph",
+            "Show what the pixel under the cursor received in each frame, and the model (I)",
         )
         self._open = push_button("Open…", "Open a result or a finished scan (Ctrl+O opens any file)")
         self._export = push_button("Export…", "Write the result in formats of other programs (Ctrl+E)")

@@ -84,7 +84,8 @@ class ViewBar(QWidget):
             self.light.addItem(text, key)
         self.adapted = QCheckBox("Adapted eyes")
         self.adapted.setToolTip(
-            "White stays white under any light; if not ticked, colours look as next to daylight"
+            "White stays white under any light; if not ticked, colours look as they do to eyes adapted to"
+            " daylight"
         )
         self.quality = ChoiceBox("Quality", "What the quality view shows")
         for each in QualityMap:

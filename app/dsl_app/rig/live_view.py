@@ -54,7 +54,7 @@ class LiveView(QWidget):
         self.rectangle.sigRegionChangeFinished.connect(self._repaint)
         self.view.scene().sigMouseMoved.connect(self._hover)
         self.saturation = QCheckBox("Saturation")
-        self.saturation.setToolTip("Paint cells red that contain a raw pixel at full scale")
+        self.saturation.setToolTip("Mark in red the cells that contain a raw pixel at full scale")
         self.saturation.setChecked(True)
         self.saturation.toggled.connect(self._repaint)
         self.region_box = QCheckBox("Region")

@@ -65,7 +65,7 @@ class RigPage(PageWidget):
         self._trouble.setWordWrap(True)
         self._camera_text, self._projector_text = label("–"), label("–")
         self._live_button = QPushButton("Start live view")
-        self._live_button.setToolTip("Show what the camera sees until something else needs it")
+        self._live_button.setToolTip("Show the camera's picture until something else needs the camera")
         self.selftest = QPushButton("Self-&test…")
         self.selftest.setToolTip("Test camera, projector, timing, focus and room, with advice (F4)")
         self.selftest.clicked.connect(self.selftest_requested)

@@ -105,7 +105,9 @@ class ScanPlanController:
     def open_plan(self, path: Path) -> None:
         """Open a plan or a pattern set from a file; undo restores the previous plan."""
         if self._is_locked():
-            self._notifier.tell("info", f"The current scan keeps its plan. Open {path.name} after it.")
+            self._notifier.tell(
+                "info", f"The current scan keeps its plan. Open {path.name} when it has finished."
+            )
             return
         now = self.state.plan.value
 

@@ -12,7 +12,7 @@ from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLine
 from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of, whole_cycles
 
 OWN = "Custom plan"
-OWN_PURPOSE = "Not a preset; the table shows what to expect of it."
+OWN_PURPOSE = "Not a preset; the table shows what to expect."
 LINES, COMB, COLOURS, FILE = "lines", "comb", "colours", "file"
 WIDEST_PX = 4096
 MOST_SETTINGS = 4

@@ -64,7 +64,7 @@ class Reconnector:
             self._rig.reconnect(self._choice, self._answered, self._failed)
 
     def _tell_progress(self, rescue: Reconnection) -> None:
-        then = " The scan resumes automatically when it answers." if rescue is Reconnection.RESUMING else ""
+        then = " The scan resumes automatically when it responds." if rescue is Reconnection.RESUMING else ""
         self._tell(rescue, f"Reconnecting the rig, attempt {self._attempt} of {ATTEMPTS}.{then}")
 
     def _answered(self) -> None:

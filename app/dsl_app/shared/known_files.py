@@ -15,7 +15,7 @@ REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".sli", ".hdr")
 _MARKS = ".marks.json"
 _OPENS = (
     "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
-    " campaigns and rigs of calibrations, and reference spectra (.csv, .txt, ENVI libraries .sli)."
+    " campaigns, calibrated rigs, and reference spectra (.csv, .txt, ENVI libraries .sli)."
     " Use File, Import for folders of images."
 )
 
@@ -91,14 +91,14 @@ def refusal(path: Path) -> str:
     """Why nothing opened a path, and what to do."""
     match kind_of(path):
         case Kind.MISSING:
-            return f"{path} does not exist any more. Choose another file, or connect its drive."
+            return f"{path} no longer exists. Choose another file, or connect its drive."
         case Kind.REFERENCE:
             return (
                 f"{path.name} may contain a reference spectrum, to compare with a result. Open a result"
                 " first, then this file again."
             )
         case Kind.PLAN | Kind.PATTERNS:
-            return f"{path.name} says what to scan. Use 'Open plan' on the Scan page to open it."
+            return f"{path.name} is a plan or pattern set. Use 'Open plan' on the Scan page to open it."
         case Kind.CALIBRATION:
             return (
                 f"{path.name} is a calibration. Add it to the library on the Calibrate page or by"

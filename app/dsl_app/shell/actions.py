@@ -94,7 +94,7 @@ ACTIONS: tuple[Action, ...] = (
         "Ctrl+Shift+V",
         "Show the camera's frames",
     ),
-    Action("rig_expose", "&Auto exposure", "Rig", "", "Find the exposure that suits what the camera sees"),
+    Action("rig_expose", "&Auto exposure", "Rig", "", "Find the exposure that suits the scene"),
     Action("calibrate_new", "&New campaign…", "Calibrate", "", "Create a campaign for the current rig"),
     Action("calibrate_open", "&Open campaign…", "Calibrate", "", "Continue an existing campaign"),
     *(

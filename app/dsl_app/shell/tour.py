@@ -40,7 +40,7 @@ STEPS: tuple[Step, ...] = (
     Step(
         "rig",
         "live-view",
-        "What the camera sees",
+        "Camera picture",
         "Start the live view to see raw frames with their histogram. Red cells are saturated; the focus score"
         " rises as edges get sharper. The display never changes what is saved.",
     ),

@@ -84,7 +84,7 @@ class WindowActions:
         if figure is None:
             self._toasts.tell(
                 "info",
-                "There is no figure on this page. You can save the spectra of a result, and the curve of"
+                "There is no plot on this page. You can save the spectra of a result, and the curve of"
                 " accuracy against time on the Scan page.",
             )
             return

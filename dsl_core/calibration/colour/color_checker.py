@@ -84,8 +84,8 @@ def measure_patches(
         count = min(int(light.count[p].min()) for light in seen)
         if count < MIN_PIXELS:
             raise CalibrationError(
-                f"The patch {name!r} of the Color Checker shows {count} pixels of a colour. Move the chart"
-                " closer."
+                f"The patch {name!r} of the Color Checker has only {count} pixels of one colour. Move the"
+                " chart closer."
             )
     return seen
 

@@ -106,7 +106,7 @@ def orient_chart(
         )
     if _signed_area(corners) < 0:
         raise CalibrationError(
-            f"The Color Checker in {name} is mirrored. Switch the mirroring of the camera's picture off."
+            f"The Color Checker in {name} is mirrored. Switch off the mirroring of the camera's picture."
         )
     along = corners[1] - corners[0]
     turns = round(float(np.degrees(np.arctan2(along[1], along[0]))) / 90) % 4

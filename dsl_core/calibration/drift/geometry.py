@@ -77,7 +77,7 @@ def smooth_part(residual: Floats, known: NDArray[np.bool_]) -> SmoothPart:
     if used.sum() < _MIN_TILES:
         raise CalibrationError(
             f"The target fills only {int(used.sum())} tiles of the image; {_MIN_TILES} are needed to tell"
-            " drift from noise. Let a flat target fill the middle of the picture."
+            " drift from noise. Fill the middle of the picture with a flat target."
         )
     rows, columns = np.nonzero(known)
     x, y, value = (

@@ -60,7 +60,7 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figur
         if mine.sum() < _MIN_SIGNALS // 4:
             raise CalibrationError(
                 f"Only {int(mine.sum())} {name} pixels of the target are lit and not saturated."
-                " Let the target fill the middle of the picture."
+                " Fill the middle of the picture with the target."
             )
         ratio = white.radiance[0, mine] / expected[mine]
         spread = 1.4826 * float(np.median(np.abs(ratio - np.median(ratio))))
@@ -73,7 +73,7 @@ def light_drift(rig: Rig, white: PlaneSignals, reflectance: float) -> list[Figur
                 low=1 - LIGHT_LIMIT,
                 high=1 + LIGHT_LIMIT,
                 advice="Light or exposure has changed, or the target is not the Spectralon: let the projector"
-                " warm up and clean the target, else repeat the spectralon calibration.",
+                " warm up and clean the target; otherwise repeat the spectralon calibration.",
             )
         )
     return figures
@@ -97,8 +97,8 @@ def film_drift(rig: Rig, lines: PlaneSignals, reflectance: float) -> list[Figure
         mine = every & (here > 0.02 * here.max()) & (other < 0.02 * here)
         if mine.sum() < _MIN_SIGNALS:
             raise CalibrationError(
-                f"The first order {order:+d} lights only {int(mine.sum())} of the chosen pixels. Let a flat"
-                " target fill the middle of the picture, film on."
+                f"The first order {order:+d} lights only {int(mine.sum())} of the chosen pixels. Fill the"
+                " middle of the picture with a flat target, film on."
             )
         data = (lines.radiance - other * brightness)[mine] / brightness
         shift, gain, shift_std, gain_std = _shift(data, here[mine], slope[mine], lines.std[mine] / brightness)
@@ -126,7 +126,7 @@ def _film_figures(
             unit="1",
             low=1 - EFFICIENCY_LIMIT,
             high=1 + EFFICIENCY_LIMIT,
-            advice="The film is dirty or another one: clean it, else repeat the bandpass calibration.",
+            advice="The film is dirty or has been replaced: clean it, or repeat the bandpass calibration.",
         ),
     )
 
@@ -135,8 +135,8 @@ def _scale(lines: PlaneSignals, expected: Floats, usable: NDArray[np.bool_]) -> 
     """Median of measured over expected signals."""
     if usable.sum() < _MIN_SIGNALS:
         raise CalibrationError(
-            f"The lines light only {int(usable.sum())} of the chosen pixels directly. Let a flat target fill"
-            " the middle of the picture."
+            f"The lines light only {int(usable.sum())} of the chosen pixels directly. Fill the middle of the"
+            " picture with a flat target."
         )
     return float(np.median(lines.radiance[usable] / expected[usable]))
 

@@ -131,12 +131,12 @@ def _check(samples: GridSamples) -> None:
         or np.ptp(samples.depths_mm) < 0.05 * samples.depths_mm.mean()
     ):
         raise CalibrationError(
-            f"The correspondence needs samples at three or more depths that differ; given are"
+            "The correspondence needs samples at three or more different depths, not"
             f" {', '.join(f'{z:g}' for z in samples.depths_mm)} mm. Move the stage further between scans."
         )
     if len(samples.wavelengths_nm) < 2 or (np.diff(samples.wavelengths_nm) <= 0).any():
         raise CalibrationError(
-            "The correspondence needs two or more wavelengths in rising order, given are"
+            "The correspondence needs two or more wavelengths in rising order, not"
             f" {', '.join(f'{nm:g}' for nm in samples.wavelengths_nm)} nm. Add bandpass filters or sort them."
         )
     if min(len(samples.rows_px), len(samples.columns_at_px)) < 2:

@@ -242,7 +242,7 @@ def _warnings(data: StageData, seen: Sequence[FilterSeen]) -> list[str]:
     """Filters whose light is slightly off."""
     return [
         f"Through the filter of {each.filter_nm:g} nm first orders are {shift:+.2f} px off at"
-        f" {position:g} mm; it may be tilted or its transmission not the one given"
+        f" {position:g} mm; it may be tilted, or its transmission may differ from the one given"
         for each in seen
         for position, shift in zip(data.positions_mm, each.shift_px, strict=True)
         if abs(shift) > DOUBT_PX

@@ -211,8 +211,9 @@ def filter_passband(
     total = spectrum.sum()
     if not total > 0:
         raise CalibrationError(
-            f"No light of order {order:+d} passes the filter from {transmission.wavelengths_nm[0]:g} to"
-            f" {transmission.wavelengths_nm[-1]:g} nm by the calibration so far. Check the filter's curve."
+            f"According to the calibration so far, no light of order {order:+d} passes the filter from"
+            f" {transmission.wavelengths_nm[0]:g} to {transmission.wavelengths_nm[-1]:g} nm. Check the"
+            " filter's curve."
         )
     centroid = float((spectrum.sum(0) * nm).sum() / total)
     lit = nm[spectrum.sum(0) > EXTENT_SHARE * spectrum.sum(0).max()]

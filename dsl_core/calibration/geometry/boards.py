@@ -53,7 +53,7 @@ def find_corners(grey: NDArray[np.float32], board: Board, name: str) -> Corners:
     Raises `CalibrationError` that calls the picture ``name`` when the board is not found.
     """
     if not np.isfinite(grey).all():
-        raise CalibrationError(f"{name} holds values that are not finite. Take the picture again.")
+        raise CalibrationError(f"{name} contains values that are not finite. Capture the picture again.")
     eight_bit = _eight_bit(grey)
     found = _charuco(eight_bit, board) if isinstance(board, Charuco) else _checkerboard(eight_bit, board)
     columns, rows = board.corner_grid
@@ -87,7 +87,7 @@ def _charuco(grey: NDArray[np.uint8], board: Charuco) -> Corners | None:
 
     if not hasattr(cv2.aruco, board.dictionary):
         raise CalibrationError(
-            f"OpenCV knows no markers {board.dictionary!r}. Use a name like DICT_5X5_100 or DICT_4X4_50."
+            f"OpenCV has no markers {board.dictionary!r}. Use a name like DICT_5X5_100 or DICT_4X4_50."
         )
     dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
     size = (board.columns, board.rows)

@@ -201,7 +201,7 @@ def _solve(problem: Problem, start: Floats, sigmas: tuple[Floats, Floats], weigh
 
     fit = least_squares(residuals, start, jac=jacobian, method="lm", x_scale="jac", max_nfev=200)
     if not np.isfinite(fit.x).all():
-        raise CalibrationError("The joint fit of camera and projector did not converge. Take more poses.")
+        raise CalibrationError("The joint fit of camera and projector did not converge. Capture more poses.")
     return np.asarray(fit.x, np.float64)
 
 

@@ -80,7 +80,7 @@ def _blurred(seen: list[PoseObservation]) -> list[str]:
     typical = float(np.median([pose.blur_px for pose in seen])) if seen else 0.0
     return [
         f"{pose.name} is blurred: its edges are {pose.blur_px:.1f} px wide, those of the other poses"
-        f" {typical:.1f} px. Focus, hold the board still, and take the pose again."
+        f" {typical:.1f} px. Focus, hold the board still, and capture the pose again."
         for pose in seen
         if pose.blur_px > max(BLURRED * typical, LEAST_BLUR_PX)
     ]
@@ -110,8 +110,8 @@ def _bent(gammas: NDArray[np.float64]) -> list[str]:
     if not len(known) or abs(np.median(known) - 1) <= GAMMA_TOLERANCE:
         return []
     return [
-        f"The pictures are not linear: half the light reads as a gamma of {np.median(known):.2f}. Switch"
-        " off the camera's gamma and the projector's dynamic contrast, which shift corners and bits."
+        f"The pictures are not linear: half the light corresponds to a gamma of {np.median(known):.2f}."
+        " Switch off the camera's gamma and the projector's dynamic contrast, which shift corners and bits."
     ]
 
 
@@ -123,7 +123,7 @@ def exposure_warning(frames: PoseFrames, seen: PoseObservation) -> str | None:
         return None
     return (
         f"{frames.name} is over-exposed: {share:.0%} of the white picture's pixels on the board are saturated"
-        ", which shifts its corners. Expose less and take the pose again."
+        ", which shifts its corners. Expose less and capture the pose again."
     )
 
 
@@ -136,12 +136,12 @@ def check_poses(poses: Sequence[PoseObservation], camera_size_px: Size) -> None:
         )
     for pose in poses:
         if not all(np.isfinite(v).all() for v in (pose.board_mm, pose.camera_px, pose.projector_px)):
-            raise CalibrationError(f"{pose.name} has corners that are not finite. Take the pose again.")
+            raise CalibrationError(f"{pose.name} has corners that are not finite. Capture the pose again.")
     _check_axes(poses)
     tilt = largest_tilt_deg(poses, camera_size_px)
     if tilt < MIN_TILT_DEG:
         raise CalibrationError(
-            f"All poses of the board are nearly parallel (at most {tilt:.1f} degrees apart), so that focal"
+            f"All poses of the board are nearly parallel (at most {tilt:.1f} degrees apart), so focal"
             f" lengths and distances cannot be told apart. Tilt the board by {GOOD_TILT_DEG:.0f} to 45"
             " degrees in different directions."
         )
@@ -162,7 +162,7 @@ def _check_axes(poses: Sequence[PoseObservation]) -> None:
     else:
         axis = "left to right" if slopes[mirrored][:, 0, 0].mean() < 0 else "top to bottom"
         cause = f"the projector's picture is mirrored {axis}. Switch off its mirroring (rear or ceiling mode)"
-    raise CalibrationError(f"In {names} camera and projector see mirror images of the board: {cause}.")
+    raise CalibrationError(f"In {names} the images of camera and projector mirror each other: {cause}.")
 
 
 def largest_tilt_deg(poses: Sequence[PoseObservation], camera_size_px: Size) -> float:
@@ -214,8 +214,8 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
     """What a calibration that succeeded may still suffer from; ``baseline_mm`` is measured by hand."""
     sentences = [
         f"{pose.name} does not fit the other poses (camera {pose.camera_rms_px:.2f}, projector"
-        f" {pose.projector_rms_px:.2f} px) and was left out: the board or rig moved while it was taken, or"
-        " its pictures are blurred or over-exposed. Take it again."
+        f" {pose.projector_rms_px:.2f} px) and was left out: the board or rig moved during the capture, or"
+        " its pictures are blurred or over-exposed. Capture it again."
         for pose in found.poses
         if not pose.used
     ]
@@ -232,7 +232,7 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
     for what, lens, deviation in lenses:
         if deviation.fx_px > GOOD_FOCAL_SHARE * lens.fx_px:
             sentences.append(
-                f"The focal length of the {what} is known to {deviation.fx_px / lens.fx_px:.1%} only."
+                f"The focal length of the {what} is known only to {deviation.fx_px / lens.fx_px:.1%}."
                 " Add poses with more tilt."
             )
         corner_px = _corner_px(found, lens, 0 if what == "camera" else LENS)
@@ -283,6 +283,6 @@ def _size_doubt(found: GeometryCalibration, baseline_mm: float | None) -> list[s
         return []
     size = found.board.square_mm * baseline_mm / distance
     return [
-        f"Camera and projector come out {distance:.0f} mm apart, measured were {baseline_mm:.0f} mm: the"
-        f" printed squares are probably {size:.1f} mm, not {found.board.square_mm:g} mm. Measure them."
+        f"The fit puts camera and projector {distance:.0f} mm apart, but {baseline_mm:.0f} mm were measured:"
+        f" the printed squares are probably {size:.1f} mm, not {found.board.square_mm:g} mm. Measure them."
     ]

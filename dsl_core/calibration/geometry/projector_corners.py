@@ -83,8 +83,8 @@ def observe_pose(frames: PoseFrames, board: Board, projector_size_px: tuple[int,
     known = np.isfinite(projector_px[:, 0])
     if known.sum() < max(6, MIN_READ * len(known)):
         raise CalibrationError(
-            f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be read"
-            f" around {known.sum()} of them only. {explain(frames, corners, projector_size_px)}"
+            f"{frames.name}: the board was found ({len(known)} corners), but the projector's code can be"
+            f" read around only {known.sum()} of them. {explain(frames, corners, projector_size_px)}"
         )
     check_projector_size(code, frames.name, projector_size_px)
     seen = PoseObservation(
@@ -127,7 +127,7 @@ def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None
         width, height = projector_size_px
         raise CalibrationError(
             f"{frames.name} has {len(frames.pairs)} pattern pictures; a projector of {width} x {height} px"
-            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or take the"
+            f" needs {wanted} (pattern and inverse of every bit). Correct the projector's size or capture the"
             " pose again."
         )
     shapes = {np.shape(picture) for picture in (*frames.pairs, frames.white, frames.black)}
@@ -137,10 +137,12 @@ def check_frames(frames: PoseFrames, projector_size_px: tuple[int, int]) -> None
             " Take all pictures with one setting of the camera."
         )
     if not all(np.isfinite(np.asarray(p)).all() for p in (*frames.pairs, frames.white, frames.black)):
-        raise CalibrationError(f"Pictures of {frames.name} hold values that are not finite. Take them again.")
+        raise CalibrationError(
+            f"Pictures of {frames.name} contain values that are not finite. Capture them again."
+        )
     if np.mean(frames.white) <= np.mean(frames.black):
         raise CalibrationError(
-            f"{frames.name}: the white picture is not brighter than the black one. They are exchanged, or the"
+            f"{frames.name}: the white picture is not brighter than the black one. They are swapped, or the"
             " projector was off; correct the order of the pictures."
         )
 
@@ -169,7 +171,7 @@ def check_projector_size(code: DecodedCode, name: str, projector_size_px: tuple[
         width, height = projector_size_px
         raise CalibrationError(
             f"{name}: {outside:.0%} of the readable pixels decode to places outside a projector of"
-            f" {width} x {height} px. Correct its size; width and height may be exchanged."
+            f" {width} x {height} px. Correct its size; width and height may be swapped."
         )
 
 

@@ -152,7 +152,7 @@ def require_tiles(positions_mm: Sequence[float], samples: Sequence[ColumnSamples
     """Raise `CalibrationError` unless there are two positions with enough tiles each."""
     if len(samples) < 2:
         raise CalibrationError(
-            f"The depth stage needs a plane at two or more positions, given {len(samples)}. Add positions."
+            f"The depth stage needs a plane at two or more positions, not {len(samples)}. Add positions."
         )
     for position, part in zip(positions_mm, samples, strict=True):
         if len(part) < MIN_TILES:
@@ -178,7 +178,7 @@ def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> float:
         raise CalibrationError(
             f"The plane at the stage's position {positions[worst]:g} mm is {off[worst]:+.2f} mm from"
             " where the other positions put it. Check that the stage reached it and that nothing else"
-            " moved, that all was captured with this rig, and take this position again."
+            " moved, that all was captured with this rig, and capture this position again."
         )
     if abs(rise - 1) > MAX_SCALE_ERROR:
         raise CalibrationError(
@@ -218,7 +218,7 @@ def require_agreement(pull: float, bow_mm: float, bow_std_mm: float, rise: float
         raise CalibrationError(
             f"The planes contradict the geometry calibration: it would have to move by {pull:.1f} of"
             f" its own standard deviations, {MAX_PULL:g} are allowed. Check that the target is flat: it seems"
-            f" to bulge towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm. Measured by the"
-            f" printed board, the stage's steps are {rise:.3f} times as long as reported: check both."
-            " Calibrate the geometry again if camera or projector were touched since."
+            f" to bulge towards the camera by {bow_mm:.2f} ± {bow_std_mm:.2f} mm over 300 mm. Compared with"
+            f" the printed board, the stage's steps are {rise:.3f} times as long as reported: check both."
+            " Calibrate the geometry again if the camera or projector has been touched since."
         )

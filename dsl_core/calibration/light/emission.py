@@ -123,7 +123,7 @@ def _check_leds(nm: Floats, leds: Floats) -> None:
         if not value > 1e-3 * power.max():
             raise CalibrationError(
                 f"Under {colour} the Spectralon is hardly brighter than under black. Check that the projector"
-                " shows the picture, that the instrument looks at the Spectralon, and its unit."
+                " shows the picture, that the instrument is aimed at the Spectralon, and its unit."
             )
     centre = (leds * nm * np.gradient(nm)).sum(1) / power
     if not centre[0] > centre[1] > centre[2]:

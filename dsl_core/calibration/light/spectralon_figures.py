@@ -30,7 +30,7 @@ def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
         value=100 * spread,
         unit="%",
         high=LOOK_UNEVEN_PERCENT,
-        advice="Let the Spectralon alone fill the middle half of the picture; keep shadows off.",
+        advice="Fill the middle half of the picture with the Spectralon alone; keep shadows off.",
     )
 
 
@@ -118,7 +118,7 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             value=100 * float(spread.max()),
             unit="%",
             high=0.5,
-            advice="Let the Spectralon fill more of the picture and expose longer.",
+            advice="Fill more of the picture with the Spectralon and expose longer.",
         ),
         Figure(name="range of the flat field", value=100 * float(np.ptp(gain)), unit="%"),
     ]

@@ -119,7 +119,7 @@ def _require_peaks(use: NDArray[np.bool_]) -> None:
     """Raise `CalibrationError` where too few pixels are used."""
     if use.sum() < MIN_PIXELS:
         raise CalibrationError(
-            f"Only {int(use.sum())} of {len(use)} pixels see the lines as lines. Check that a flat white"
+            f"The lines are resolved in only {int(use.sum())} of {len(use)} pixels. Check that a flat white"
             " target fills the picture, in focus and not saturated, and capture the step again."
         )
 

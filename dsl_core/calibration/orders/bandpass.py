@@ -215,8 +215,8 @@ def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Flo
         cells = np.array([float(np.median(relative[mask])) for mask in masks])
         if len(cells) < 2:
             raise CalibrationError(
-                "The scan without a filter shows too little of the target. Let a flat white target fill the"
-                " picture and capture the step again."
+                "The scan without a filter shows too little of the target. Fill the picture with a flat"
+                " white target and capture the step again."
             )
         value[colour], std[colour] = cells.mean(), cells.std() / np.sqrt(len(cells) - 1)
     return value, std

@@ -118,7 +118,8 @@ def verdict(
         why = "it may be tilted in the beam" if shift < 0 else "its curve is not the one assumed"
         return (
             False,
-            f"{name}: it passes {abs(shift):.1f} nm {'less' if shift < 0 else 'more'} than it should; {why}",
+            f"{name}: it passes light {abs(shift):.1f} nm {'less' if shift < 0 else 'more'} than it should;"
+            f" {why}",
         )
     return False, ""
 

@@ -79,8 +79,8 @@ def fit_transfer(pairs: Readings, black_dn: float, sizes: RegionSizes) -> Transf
         model = np.maximum(design @ found, ROUNDING_DN2)
     if found[1] <= 3 * np.sqrt(covariance[1, 1]):
         raise CalibrationError(
-            "The noise of the camera does not grow with light, so it delivers no raw photon counts. Switch"
-            " off its denoising, compression and gamma, or choose a brighter target."
+            "The noise of the camera does not grow with light, so its values are not raw photon counts."
+            " Switch off its denoising, compression and gamma, or choose a brighter target."
         )
     gain = Measured(value=float(1 / found[1]), std=float(np.sqrt(covariance[1, 1]) / found[1] ** 2))
     read = float(np.sqrt(max(found[0] - ROUNDING_DN2, 0.0)))

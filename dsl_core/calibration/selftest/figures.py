@@ -81,7 +81,7 @@ def _camera(camera: CameraCheck) -> Iterator[Figure]:
         camera.saturation_dn,
         "DN",
         low=SATURATION * (2**camera.bit_depth - 1),
-        advice="The sensor saturates before the scale ends, or nothing was bright enough to clip: lower the"
+        advice="The sensor saturates below full scale, or nothing was bright enough to clip: lower the"
         " gain's offset, open the aperture, or set the camera's full bit depth.",
     )
     yield _figure(
@@ -157,7 +157,7 @@ def _latency(latency: LatencyCheck) -> Iterator[Figure]:
         value=latency.stale_frames,
         unit="",
         high=0,
-        advice="The camera delivers pictures exposed before they were asked for: have its driver trigger each"
+        advice="The camera delivers pictures exposed before they were requested: have its driver trigger each"
         " exposure, or empty its buffer first.",
     )
 
@@ -179,7 +179,7 @@ def _cycle(cycle: CycleCheck) -> Iterator[Figure]:
             worst,
             "%",
             high=None if published else BEAT_PERCENT + 3 * beat.floor_percent,
-            advice=f"Use {safe} ms, which hold whole cycles."
+            advice=f"Use {safe} ms, which contain whole cycles."
             if published
             else "The light is not steady over whole cycles: switch off lamps, let the projector warm up, and"
             " repeat.",

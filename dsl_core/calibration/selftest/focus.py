@@ -116,6 +116,6 @@ def _blur(edges: _Edges, chosen: NDArray[np.bool_]) -> Measured:
 
 
 _NO_EDGES = (
-    "The camera sees no clear edges of the projected bars: the picture is far out of focus, or the target is"
-    " too rough or small. Focus projector and camera on the target and let it fill the view."
+    "No clear edges of the projected bars are visible: the picture is far out of focus, or the target is"
+    " too rough or small. Focus projector and camera on the target and make it fill the view."
 )

@@ -23,8 +23,8 @@ def is_right(readings: Readings) -> NDArray[np.bool_]:
     black, white = light[sure & ~lit].mean(), light[sure & lit].mean()
     if white - black < 5.0:
         raise DeviceError(
-            "The camera sees no difference between black and white after a second, so the projector does not"
-            " follow. Check its cable, its input and that nothing covers it."
+            "After a second, black and white still look the same to the camera, so the projector does not"
+            " respond. Check its cable, its input and that nothing covers it."
         )
     shown = (light - black) / (white - black)
     return np.asarray(np.abs(shown - lit) < TOLERANCE)
@@ -43,7 +43,7 @@ def check_latency(readings: Readings, claimed_ms: float, has_times: bool, show_s
     longest = asked.max()
     if len(failed) and failed.max() >= longest:
         raise DeviceError(
-            f"The camera does not always see a new picture {longest:g} ms after it was shown. Raise the"
+            f"A new picture is not always visible {longest:g} ms after it was shown. Raise the"
             " latency in the projector's driver, and check that nothing else draws on its screen."
         )
     worst = float(failed.max()) if len(failed) else 0.0

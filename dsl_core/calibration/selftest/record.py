@@ -112,7 +112,7 @@ def cycle_of(cycle: Readings, spread: Readings | None, black_dn: float) -> tuple
     if found.period_ms is None and not found.is_steady:
         raise CalibrationError(
             f"The light varies by {found.modulation.value:.0%} without a cycle between 20 and 300 Hz, so no"
-            " exposure is safe. Switch off lamps and daylight, warm the projector up, and switch off its"
+            " exposure is safe. Switch off lamps and daylight, warm up the projector, and switch off its"
             " dynamic contrast."
         )
     return found, "spread"

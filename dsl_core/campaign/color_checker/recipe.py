@@ -64,7 +64,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         """One step: code and uniform pictures of the chart."""
         if self.chart not in chart_names():
             raise CalibrationError(
-                f"There are no reflectances of a chart {self.chart!r}; choose {', '.join(chart_names())}."
+                f"There are no reflectances for a chart {self.chart!r}; choose {', '.join(chart_names())}."
             )
         return (
             Step(

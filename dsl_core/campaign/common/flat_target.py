@@ -147,8 +147,8 @@ def diffuser_lines(
     share = flat.on_plane.sum() / max(known.valid.sum(), 1)
     if share < FLAT_SHARE:
         raise CalibrationError(
-            f"Only {share:.0%} of the lit pixels are on one plane. Let the flat white target fill the"
-            " picture, and capture the step again."
+            f"Only {share:.0%} of the lit pixels are on one plane. Fill the picture with the flat white"
+            " target, and capture the step again."
         )
     depth_mm, shading = flat.plane.depth_mm(rig), plane_shading(rig, flat.plane) * relative_gain(rig)
     valid = np.flatnonzero(flat.on_plane)

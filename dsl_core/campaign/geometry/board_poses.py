@@ -104,13 +104,15 @@ def default_poses(board: Board, rig: Rig, count: int) -> tuple[BoardPose, ...]:
     ``rig`` may be nominal. Raises `CalibrationError` when the board is too large to be seen as a whole.
     """
     if not 3 <= count <= MOST_POSES:
-        raise CalibrationError(f"The geometry takes 3 to {MOST_POSES} poses of the board, not {count}.")
+        raise CalibrationError(
+            f"The geometry calibration needs 3 to {MOST_POSES} poses of the board, not {count}."
+        )
     poses = tuple(_fitted(board, rig, wish) for wish in _WISHES[:count])
     if None in poses:
         width, height = ((n + 1) * board.square_mm for n in board.corner_grid)
         raise CalibrationError(
-            f"A board of {width:.0f} x {height:.0f} mm is too large: camera and projector do not see all of"
-            f" it at {DEPTHS_MM[0]:.0f} to {DEPTHS_MM[1]:.0f} mm. Print smaller squares."
+            f"A board of {width:.0f} x {height:.0f} mm is too large: it does not fit into the view of"
+            f" camera and projector at {DEPTHS_MM[0]:.0f} to {DEPTHS_MM[1]:.0f} mm. Print smaller squares."
         )
     return tuple(pose for pose in poses if pose is not None)
 

@@ -59,7 +59,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
                 value=seen.lit_share,
                 unit="1",
                 low=_LIT_SHARE,
-                advice="Let a white target fill the view of the camera, and light all of it.",
+                advice="Fill the camera's view with a white target, and light all of it.",
             ),
             Figure(
                 name="ambient light, of white",

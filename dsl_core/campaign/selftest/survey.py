@@ -102,8 +102,8 @@ def _expose(recorder: Recorder, black_dn: float, rng: np.random.Generator) -> fl
         if exposure == shortest and bright > 0.9 * recorder.full_scale_dn:
             raise CalibrationError(
                 f"White is saturated at the shortest exposure ({shortest:g} ms). Close the camera's aperture,"
-                " use a grey filter or lower the gain; if the camera keeps an exposure of its own, switch its"
-                " automatic exposure off."
+                " use a grey filter or lower the gain; if the camera chooses its own exposure, switch off"
+                " its automatic exposure."
             )
         if bright - black_dn > _AIM * recorder.full_scale_dn or 2 * exposure > min(longest, _LONGEST_MS):
             return exposure
@@ -121,7 +121,7 @@ def _require_obedience(
     if bright > _NO_LIGHT_DN and bright < 1.5 * faint:
         raise DeviceError(
             f"The camera gives {faint:.0f} DN at {pairs[0]:.3g} ms and {bright:.0f} DN at {pairs[1]:.3g} ms"
-            " above black, so it ignores the exposure requested. Switch off its automatic exposure and gain."
+            " above black, so it ignores the requested exposure. Switch off its automatic exposure and gain."
         )
 
 
@@ -143,8 +143,8 @@ def _require_fresh_frames(recorder: Recorder, white_ms: float) -> None:
         if first - second < 0.2 * (bright - second) or bright - second < 0.1 * _NO_LIGHT_DN:
             return
     raise DeviceError(
-        "The camera delivers stale frames: after a new picture its first frame shows the one before, the next"
-        " one does not. Have its driver expose on request, or empty its buffer before each frame."
+        "The camera delivers stale frames: after a new picture its first frame shows the previous one, the"
+        " next one does not. Have its driver expose on request, or empty its buffer before each frame."
     )
 
 
@@ -169,11 +169,12 @@ def _mean(recorder: Recorder, exposure_ms: float, rng: np.random.Generator) -> N
 def _no_light(ambient_dn: float, exposure_ms: float) -> CalibrationError | DeviceError:
     if ambient_dn > _NO_LIGHT_DN:
         return DeviceError(
-            f"The camera sees light ({ambient_dn:.0f} DN at {exposure_ms:.3g} ms), but white and black of the"
-            " projector look the same. Check that the projector is on, connected, and shines on the target."
+            f"The camera receives light ({ambient_dn:.0f} DN at {exposure_ms:.3g} ms), but white and black of"
+            " the projector look the same. Check that the projector is on, connected, and shines on the"
+            " target."
         )
     return CalibrationError(
-        f"The camera sees nothing, not even at {exposure_ms:.3g} ms with the projector white. Take off the"
+        f"The camera's picture is dark, even at {exposure_ms:.3g} ms with the projector white. Take off the"
         " lens cap, open the aperture, switch the projector on and put a white target in view."
     )
 

@@ -154,7 +154,7 @@ def _film(rig: Rig) -> dict[str, str]:
     x, y, z = rig.pose.projector_centre_mm
     return {
         "Projector's centre": f"{x:.2f}, {y:.2f}, {z:.2f} mm from the camera's",
-        "Film": f"{film.lines_per_mm:.2f} lines/mm, {film.distance_mm:.2f} mm before the projector",
+        "Film": f"{film.lines_per_mm:.2f} lines/mm, {film.distance_mm:.2f} mm in front of the projector",
         "Tilt, roll": f"{film.tilt_x_deg:.3f}°, {film.tilt_y_deg:.3f}°, {film.roll_deg:.3f}°",
         "Bend": f"{film.bend_per_mm:.5f} per mm",
         "Column uncertainty": f"{rig.column_std_px:.3f} px",
@@ -181,7 +181,7 @@ def _conditions(known: CaptureConditions | None) -> dict[str, str]:
         "Read out": f"gain {camera.gain_db:g} dB, {camera.bayer}, {camera.bit_depth} bits",
         "Projector": f"{projector.model}, serial number {projector.serial}",
         "Projected": (
-            f"{projector.size_px[0]} × {projector.size_px[1]} px, {projector.frame_period_ms:.3f} ms a frame"
+            f"{projector.size_px[0]} × {projector.size_px[1]} px, {projector.frame_period_ms:.3f} ms/frame"
             + (f", mode {projector.mode}" if projector.mode else "")
         ),
     }

@@ -74,14 +74,14 @@ def share_curve(bands: Floats, share: Floats) -> Curve:
     x = (bands - bands[0]) / (bands[-1] - bands[0]) * WIDTH
     ticks = (Tick(HEIGHT, "0"), Tick(0.0, "1"))
     note = "mean over pixels: 1 is decided by data alone, 0 by the prior alone"
-    return Curve("Share of data", note, points(x, share, 1.0), x_ticks=wavelength_ticks(bands), y_ticks=ticks)
+    return Curve("Data share", note, points(x, share, 1.0), x_ticks=wavelength_ticks(bands), y_ticks=ticks)
 
 
 def calibration_curve(title: str, found: HonestyCheck) -> Curve:
     """Observed over promised coverage; the dashed diagonal is honesty."""
     promised, observed = np.array([(0.0, 0.0), *found.curve, (1.0, 1.0)]).T
     ticks = (Tick(0.0, "0 %"), Tick(WIDTH, "100 % promised"))
-    note = f"95 % band holds {found.coverage_95:.1%} of the truth; error / std = {found.spread:.2f}"
+    note = f"95 % band contains {found.coverage_95:.1%} of the truth; error / std = {found.spread:.2f}"
     return Curve(
         title,
         note,

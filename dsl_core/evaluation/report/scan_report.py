@@ -132,7 +132,7 @@ def _pictures(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list
         caption = "standard deviation as stated, mean over bands"
         found.append(value_picture(spread, "Uncertainty of reflectance", caption, "", "magma"))
     if "flags" in result:
-        caption = "the gravest flag of each pixel; shares count every flag"
+        caption = "the most serious flag of each pixel; shares count every flag"
         found.append(flag_picture(result["flags"].values.astype(np.int64), "Flags", caption))
     return found
 

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 _SIZE_IN = (8.0, 4.2)
 _COLOURS = {"free": "#4477aa", "fixed": "#cc3311", "best": "#cc3311"}
 _STAGE_NOTE = (
-    "A flat target at known positions of a stage. Positions are what the stage says; error bars hold 95 % and"
-    " do not include errors that all pixels share. A free slope hides an error of scale; a slope of 1 is"
-    " right only for a stage that moves along the camera's axis."
+    "A flat target at known positions of a stage. Positions are as stated by the stage; error bars cover 95"
+    " % and do not include errors that all pixels share. A free slope hides an error of scale; a slope of 1"
+    " is right only for a stage that moves along the camera's axis."
 )
-_SWEEP_NOTE = "Scans of one scene over the seconds of their captures, compared with {}."
+_SWEEP_NOTE = "Scans of one scene: error against capture time, compared with {}."
 
 
 @dataclass(frozen=True)

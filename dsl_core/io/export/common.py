@@ -22,7 +22,7 @@ def require(result: xr.Dataset, format_name: str, *names: str) -> None:
     if missing:
         has = ", ".join(str(name) for name in result.data_vars) or "nothing"
         raise StoreError(
-            f"{format_name} needs {' and '.join(missing)}, but the result holds only {has}."
+            f"{format_name} needs {' and '.join(missing)}, but the result contains only {has}."
             " Reconstruct the scan completely, or choose another format."
         )
 

@@ -189,7 +189,7 @@ def save_tables(
     lacking = [order for order in ORDERS if order not in efficiency]
     if lacking:
         raise CalibrationError(
-            f"The rig {rig.name!r} has no efficiency of order {lacking[0]:+d}, which DG.npy holds."
+            f"The rig {rig.name!r} has no efficiency of order {lacking[0]:+d}, which DG.npy contains."
         )
     centres = (grid or WavelengthGrid()).centres_nm
     tables = {
@@ -222,7 +222,7 @@ def _load(folder: Path, name: str, wavelengths_nm: ArrayLike | None) -> list[Spe
         raise CalibrationError(f"{path} has shape {table.shape}; {wanted} is needed.")
     if not np.isfinite(rows).all() or (rows < 0).any():
         raise CalibrationError(
-            f"{path} holds negative or non-finite values; a {name} cannot. Measure it again."
+            f"{path} contains negative or non-finite values; a {name} cannot. Measure it again."
         )
     centres = _centres(rows.shape[1], wavelengths_nm, path)
     return [SpectralCurve.of(centres, row) for row in rows]
@@ -248,5 +248,5 @@ def _open(path: Path) -> NDArray[np.generic]:
     except (OSError, ValueError, EOFError) as error:
         raise CalibrationError(f"{path} is not an array that NumPy can read ({error}).") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "iuf":
-        raise CalibrationError(f"{path} does not hold one array of numbers.")
+        raise CalibrationError(f"{path} does not contain a single array of numbers.")
     return table

@@ -141,9 +141,7 @@ def open_dataset(
     `StoreError` when the folder holds no such image.
     """
     if not root.is_dir():
-        raise StoreError(
-            f"{root} is not a folder. Give the folder that holds ldr_exposure1 and its neighbours."
-        )
+        raise StoreError(f"{root} is not a folder. Give the folder that contains ldr_exposure1.")
     plan = plan or _stored_plan(root) or _published_plan(root)
     return PublishedScan(root, plan, bayer, bit_depth, survey(root, plan))
 
@@ -232,5 +230,5 @@ def _published_plan(root: Path) -> CapturePlan:
                 )
     raise StoreError(
         f"{root} is not a published dataset: no image was found in ldr_exposure1 or ldr_exposure2."
-        " Give the folder that holds them."
+        " Give the folder that contains them."
     )

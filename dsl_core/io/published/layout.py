@@ -235,7 +235,7 @@ def _loss(role: Role) -> str:
         "white": "capture it, or give depth and shading from elsewhere",
         "black": "black cannot be subtracted: capture it with the projector black",
         "spectral": "capture it again: bands that this line lights are lost",
-        "code": "depth is decoded from it: capture it, for depth.npy alone cannot be imported",
+        "code": "depth is decoded from it: capture it, because depth.npy alone cannot be imported",
     }
     return losses[role]
 

@@ -192,7 +192,7 @@ def _shaped(nodes: dict[str, Any], node: str, part: str, path: Path) -> NDArray[
     if shape is not None and values.shape != shape:
         raise CalibrationError(f"{path}: {node} has shape {values.shape}, {shape} is needed for the {part}.")
     if not np.isfinite(values).all():
-        raise CalibrationError(f"{path}: {node} holds numbers that are not finite. Calibrate again.")
+        raise CalibrationError(f"{path}: {node} contains numbers that are not finite. Calibrate again.")
     if shape is None:
         return _five_coefficients(values.ravel(), node, path)
     return values
@@ -225,20 +225,19 @@ def _camera_size(nodes: dict[str, Any], given: Size | None, path: Path) -> Size:
     if stored is None:
         if given is None:
             raise CalibrationError(
-                f"{path} does not hold the camera's image size. Give it (width and height)."
+                f"{path} does not contain the camera's image size. Give it (width and height)."
             )
         return given
     shape = np.asarray(stored, float).ravel()
     if len(shape) < 2:
         raise CalibrationError(
-            f"{path}: img_shape holds {len(shape)} number(s), rows and columns are needed."
+            f"{path}: img_shape contains {len(shape)} number(s), rows and columns are needed."
         )
     size = (int(shape[1]), int(shape[0]))
     if given is not None and given != size:
         raise CalibrationError(
-            f"{path} was made with camera images of {size[0]} x {size[1]} px,"
-            f" needed are {given[0]} x {given[1]}."
-            " Use the calibration made with the scan's binning and crop."
+            f"{path} was made with camera images of {size[0]} x {size[1]} px, but {given[0]} x {given[1]} px"
+            " are needed. Use the calibration made with the scan's binning and crop."
         )
     return size
 

@@ -132,7 +132,7 @@ def _check_version(version: object, path: Path) -> None:
     if version is None:
         raise StoreError(f"{path}: a dataset without schema_version is not a result of this program.")
     raise StoreError(
-        f"{path} is a result of schema version {version}; this program knows version {SCHEMA_VERSION}."
+        f"{path} is a result of schema version {version}; this program supports version {SCHEMA_VERSION}."
         " Use the version of the program that wrote it, or reconstruct the scan again."
     )
 

@@ -52,7 +52,7 @@ def read_log(path: Path) -> tuple[list[LogEntry], int]:
                 break
             raise StoreError(
                 f"Line {number} of {path} is damaged. Restore the file from a copy, or delete that line"
-                " and resume: its frame is then taken again."
+                " and resume: its frame is then captured again."
             ) from error
         good += len(line) + 1
     return entries, good

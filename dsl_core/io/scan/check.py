@@ -35,7 +35,7 @@ def _missing(reader: ScanReader) -> Iterator[str]:
     if shots:
         yield (
             f"{reader.folder} lacks {len(shots)} of {reader.plan.shot_count} frames, the first is"
-            f" {describe_shot(shots[0])}. Resume the scan to take them."
+            f" {describe_shot(shots[0])}. Resume the scan to capture them."
         )
 
 
@@ -44,9 +44,8 @@ def _extra(reader: ScanReader) -> Iterator[str]:
     extra = sorted(i for i in reader.store.stored() | set(reader.entries) if i >= count)
     if extra:
         yield (
-            f"{reader.folder} holds {len(extra)} frames more than the {count} of its plan,"
-            f" the first is number {extra[0]}. They belong to another scan;"
-            f" move {reader.store.path(extra[0])} away."
+            f"{reader.folder} contains {len(extra)} more frames than the {count} of its plan, the first is"
+            f" number {extra[0]}. They belong to another scan; move {reader.store.path(extra[0])} away."
         )
 
 
@@ -100,4 +99,4 @@ def _name(reader: ScanReader, shot: Shot) -> str:
 
 
 def _remedy(reader: ScanReader, shot: Shot) -> str:
-    return f"Delete {reader.store.path(shot.index)} and resume the scan to take it again."
+    return f"Delete {reader.store.path(shot.index)} and resume the scan to capture it again."

@@ -165,12 +165,12 @@ class ScanReader:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]
         path = self.store.path(shot.index)
         if twins:
-            return f"its file {path} holds the picture of frame {twins[0]} (swapped or copied)"
+            return f"its file {path} contains the picture of frame {twins[0]} (swapped or copied)"
         return f"the pixels in {path} do not match their checksum (damaged)"
 
     def _sentence(self, shot: Shot, what: str) -> str:
         name = describe_shot(shot).capitalize()
-        return f"{name} of {self.folder} cannot be used: {what}. Resume the scan to take it again."
+        return f"{name} of {self.folder} cannot be used: {what}. Resume the scan to capture it again."
 
 
 class ScanWriter:
@@ -202,7 +202,7 @@ class ScanWriter:
         """Start a scan in a new folder; raises `StoreError` if there is one or the disk is too small."""
         folder = Path(folder)
         if (folder / MANIFEST_NAME).exists():
-            raise StoreError(f"{folder} already holds a scan. Resume it, or choose a new name.")
+            raise StoreError(f"{folder} already contains a scan. Resume it, or choose a new name.")
         if folder.exists() and not _is_unborn(folder):
             raise StoreError(f"{folder} exists and is not a scan. Choose a new name.")
         check_space(folder, plan, plan.shot_count)

@@ -82,8 +82,8 @@ class FrameStore:
         """Store a mosaic, shape (height, width), so that it survives a power cut; raises `StoreError`."""
         if pixels.shape != (self.height_px, self.width_px) or pixels.dtype != np.uint16:
             raise StoreError(
-                f"Frame {index} is {pixels.dtype} of shape {pixels.shape}, but the scan takes uint16"
-                f" of shape {(self.height_px, self.width_px)}. Make a plan for this camera's size."
+                f"Frame {index} is {pixels.dtype} of shape {pixels.shape}, but the scan needs uint16 of"
+                f" shape {(self.height_px, self.width_px)}. Make a plan for this camera's size."
             )
         from numcodecs import blosc  # type: ignore[import-untyped]
 
@@ -120,7 +120,7 @@ class FrameStore:
         wanted = self.height_px * self.width_px * _PIXEL.itemsize
         if typesize != _PIXEL.itemsize or raw_bytes != wanted:
             raise ChunkError(
-                f"its file {path} holds {raw_bytes} bytes of {8 * typesize} bit values"
+                f"its file {path} contains {raw_bytes} bytes of {8 * typesize} bit values"
                 f" instead of {wanted} bytes of 16 bit values"
             )
 

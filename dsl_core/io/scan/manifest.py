@@ -63,7 +63,7 @@ def read_manifest(folder: Path) -> Manifest:
         return Manifest.model_validate_json(path.read_bytes())
     except FileNotFoundError as error:
         raise StoreError(
-            f"{folder} is not a scan: it has no {MANIFEST_NAME}. Give the folder that a scan made (NAME.dsl)."
+            f"{folder} is not a scan: it has no {MANIFEST_NAME}. Give the folder of a scan (NAME.dsl)."
         ) from error
     except OSError as error:
         raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error

@@ -68,7 +68,7 @@ def _pair(path: Path) -> tuple[Path, Path]:
         if header.is_file():
             return header, path
     raise CalibrationError(
-        f"{path.name} has no header, which says what it holds. Put {headers[0].name} next to it."
+        f"{path.name} has no header to describe its contents. Put {headers[0].name} next to it."
     )
 
 
@@ -101,8 +101,8 @@ def _read_data(path: Path, data: Path, header: Mapping[str, str]) -> Floats:
         there = (data.stat().st_size - offset) // dtype.itemsize
         if there < wanted:
             raise CalibrationError(
-                f"{data.name} is cut off: {spectra} spectra of {bands} bands are {wanted} values, and it"
-                f" holds {max(there, 0)}. Copy it again."
+                f"{data.name} is cut off: {spectra} spectra of {bands} bands are {wanted} values, but it"
+                f" contains {max(there, 0)}. Copy it again."
             )
         values = np.fromfile(data, dtype, wanted, offset=offset)
     except OSError as error:
@@ -161,7 +161,7 @@ def _reflectance(path: Path, header: Mapping[str, str], values: Floats) -> Float
     most = np.nanmax(values, initial=0.0)
     if most > 100 * MOST:
         raise CalibrationError(
-            f"{path.name} holds values up to {most:g}; reflectance from 0 to 1 is needed. Add the factor that"
-            " they were multiplied by to the header, as 'reflectance scale factor'."
+            f"{path.name} contains values up to {most:g}; reflectance from 0 to 1 is needed. Add the factor"
+            " that they were multiplied by to the header, as 'reflectance scale factor'."
         )
     return values * (0.01 if most > MOST else 1.0)

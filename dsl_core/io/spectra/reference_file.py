@@ -58,7 +58,7 @@ def read_reference(path: Path, name: str = "") -> SpectralCurve:
     for reference in found:
         if name in (reference.name, "") and (name or len(found) == 1):
             return reference.curve
-    raise CalibrationError(f"{path.name} holds no spectrum {name!r}. Add the reference again.")
+    raise CalibrationError(f"{path.name} contains no spectrum {name!r}. Add the reference again.")
 
 
 def _is_table(path: Path) -> bool:
@@ -115,5 +115,5 @@ def _gathered(path: Path, names: list[str], spectra: list[tuple[Floats, Floats]]
             own = name if name not in found else f"{name} ({place})"
             found[own] = SpectralCurve.of(nm[known], values[known])
     if not found:
-        raise CalibrationError(f"No spectrum of {path.name} holds values. Choose another file.")
+        raise CalibrationError(f"No spectrum of {path.name} contains values. Choose another file.")
     return ReferenceFile(tuple(Reference(name, curve) for name, curve in found.items()), tuple(empty))

@@ -43,7 +43,7 @@ def read_spectrum(
     header, rows, numbers = _split(text)
     if len(rows) < MIN_ROWS:
         raise CalibrationError(
-            f"{path.name} holds no table of wavelengths and values. Export the spectrum as text in"
+            f"{path.name} contains no table of wavelengths and values. Export the spectrum as text in"
             " two columns."
         )
     nm, values = np.array(rows).T
@@ -88,7 +88,7 @@ def _check_values(path: Path, nm: np.ndarray, values: np.ndarray, numbers: list[
     if bad.any():
         raise CalibrationError(
             f"{path.name}, line {numbers[int(bad.argmax())]}: a value is not a finite number."
-            " Measure this spectrum again, or leave the range out that the instrument does not cover."
+            " Measure this spectrum again, or leave out the range that the instrument does not cover."
         )
 
 
@@ -102,7 +102,7 @@ def _check_wavelengths(path: Path, header: str, nm: np.ndarray, covers_nm: tuple
         at = int(np.argmax(np.diff(nm) <= 0))
         raise CalibrationError(
             f"{path.name}: the wavelengths do not rise: {nm[at + 1]:g} comes after {nm[at]:g} nm. Export one"
-            " spectrum a file, in rising order."
+            " spectrum per file, in rising order."
         )
     low, high = covers_nm
     if nm[0] > low or nm[-1] < high:
@@ -119,7 +119,7 @@ def _factor(path: Path, header: str) -> tuple[float, str]:
         for name, pattern in _OTHER.items():
             if pattern.search(header):
                 raise CalibrationError(
-                    f"{path.name} holds {name}, not a spectral radiance. Export radiance in W/(sr m2 nm)."
+                    f"{path.name} contains {name}, not a spectral radiance. Export radiance in W/(sr m2 nm)."
                 )
         return 1.0, RADIANCE_UNIT
     per_micrometre = 1e-3 if _PER_MICROMETRE.search(header) else 1.0

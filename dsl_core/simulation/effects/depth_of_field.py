@@ -73,7 +73,7 @@ class DepthOfField(ExtraEffect):
         share += 1 - _CameraStep.of(blurs.camera_px).kept()
         widest = float(blurs.camera_px.max()) / _DISC
         reason = (
-            f"circles of confusion reach {widest:.2g} px" if share else "all that is in view is at one depth"
+            f"circles of confusion reach {widest:.2g} px" if share else "everything in view is at one depth"
         )
         return limits.of_share(SLACK * share, reason)
 

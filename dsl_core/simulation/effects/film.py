@@ -107,7 +107,7 @@ class FilmShape(Effect):
         """Moved columns change all dispersed light, however little they move; never the zero order."""
         film = limits.path.rig.film
         if not limits.path.film or all(getattr(film, field) == value for field, value in self.ideal.items()):
-            return limits.of_dn(0.0, "the film is ideal in this, or there is none")
+            return limits.of_dn(0.0, "the film is ideal in this respect, or there is none")
         reflectance = limits.path.truth.materials.at(NM)
         dispersed = limits.white(reflectance, (*FIRST, *SECOND))
         share = dispersed / limits.from_orders(reflectance, limits.path.orders)

@@ -33,7 +33,7 @@ class Interreflection(ExtraEffect):
     """
 
     name = "interreflection"
-    summary = "light that surfaces send each other"
+    summary = "light between surfaces"
     ns_per_pixel, ms_per_frame = 25.0, 10.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:
@@ -49,7 +49,7 @@ class Interreflection(ExtraEffect):
         if most == 0:
             return limits.of_dn(0.0, "no surface in view faces another")
         share = 100 * most / max(float(limits.direct.max()), 1e-30)
-        reason = f"surfaces send each other up to {share:.2g} % of the brightest direct light"
+        reason = f"surfaces light each other with up to {share:.2g} % of the brightest direct light"
         return limits.of_light(SLACK * (1 + limits.glare) * most, reason)
 
     def most_light(self, limits: Limits) -> Floats:

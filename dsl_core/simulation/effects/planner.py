@@ -146,7 +146,7 @@ def _forced(only: Collection[str], bounds: dict[str, EffectBound]) -> dict[str, 
     return {
         name: (
             name in only,
-            _sentence(f"asked for; {bound.reason}" if name in only else f"not asked for; {bound.reason}"),
+            _sentence(f"requested; {bound.reason}" if name in only else f"not requested; {bound.reason}"),
         )
         for name, bound in bounds.items()
     }

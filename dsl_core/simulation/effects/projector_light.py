@@ -126,7 +126,7 @@ class LedCycle(Effect):
             s.exposure_ms * float(response.radiance(s.level)) * largest_deviation(s.exposure_ms / period_ms)
             for s in limits.settings
         )
-        reason = "exposures last no whole number of cycles" if worst_ms else "exposures last whole cycles"
+        reason = "exposures are not whole numbers of cycles" if worst_ms else "exposures are whole cycles"
         return limits.of_dn(worst_ms * limits.ceiling, reason)
 
     def leave_out(self, path: LightPath) -> LightPath:

@@ -40,7 +40,7 @@ class Defocus(Effect):
     """A camera lens set wrongly: the same blur everywhere."""
 
     name = "defocus"
-    summary = "wrongly focused camera"
+    summary = "camera out of focus"
 
     def parameters(self, path: LightPath) -> dict[str, str]:
         """See `Effect`."""

@@ -44,7 +44,7 @@ class Specular(ExtraEffect):
         glossy = glossy_materials(path.truth.materials)
         names = path.truth.materials.names
         return {names[i]: f"gloss {f.gloss:g}, roughness {f.roughness:g}" for i, f in glossy.items()} or {
-            "materials": "all matte"
+            "materials": "all matt"
         }
 
     def bound(self, limits: Limits) -> EffectBound:

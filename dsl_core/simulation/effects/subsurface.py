@@ -28,7 +28,7 @@ class Subsurface(ExtraEffect):
     """
 
     name = "subsurface"
-    summary = "light that wanders in translucent materials"
+    summary = "light that spreads inside translucent materials"
     ns_per_pixel = 110.0
 
     def parameters(self, path: LightPath) -> dict[str, str]:

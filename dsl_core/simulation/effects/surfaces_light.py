@@ -50,7 +50,7 @@ class Shadow(Effect):
         """The light on the brightest point that is hidden."""
         hidden = self._hidden(limits.path)
         if not hidden.any():
-            return limits.of_dn(0.0, "the projector sees all that the camera sees")
+            return limits.of_dn(0.0, "the projector lights everything that the camera images")
         path = self.leave_out(limits.path)
         # Not less than without shading, so that the two may be left out together.
         shading = np.maximum(

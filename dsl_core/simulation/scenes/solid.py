@@ -61,7 +61,7 @@ def sphere(
         {"yellow": spectra.pigment(0.08, 0.75, 520.0), "diffuser": spectra.flat(spectra.SPECTRALON)},
         finishes={"yellow": Finish(gloss=gloss, roughness=roughness)},
     )
-    description = f"ball of radius {radius_mm:g} mm before a white wall"
+    description = f"ball of radius {radius_mm:g} mm in front of a white wall"
     return Scene("sphere", description, (ball, _wall(depth_mm + radius_mm + 10.0, 1)), palette)
 
 

@@ -30,7 +30,7 @@ def test_the_library_restores_exports_imports_and_is_used(bench: CalibrateBench,
     assert bench.library.find("campaign").stamp == first
     library.export(f"campaign@{first}", tmp_path / "out.json", "entry", False)
     library.export(f"campaign@{first}", tmp_path / "out.json", "entry", False)
-    assert "exists already" in bench.told
+    assert "already exists" in bench.told
     other = CalibrationLibrary(tmp_path / "elsewhere")
     assert other.names() == ()
     assert bench.control.open(tmp_path / "out.json")

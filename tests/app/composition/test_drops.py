@@ -115,7 +115,7 @@ def test_the_menu_lists_what_was_opened_and_marks_what_is_gone(window: MainWindo
     assert "gone.zarr" in entry.text()
     assert "(missing)" in entry.text()
     entry.trigger()
-    assert "does not exist any more" in window.toasts.shown[-1].text
+    assert "no longer exists" in window.toasts.shown[-1].text
     window.recent_menu.fill()
     assert not window.recent_menu.actions()[0].isEnabled()
     window.close()

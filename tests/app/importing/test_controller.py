@@ -183,7 +183,7 @@ def test_nothing_is_replaced_and_names_are_free(bench: Bench, made: Folders) -> 
     assert request is not None
     assert request.target == bench.home / "rig-2.json"
     bench.control.rename("rig", bench.home)
-    assert "rig.json exists already" in bench.trouble
+    assert "rig.json already exists" in bench.trouble
     bench.control.rename(" ", bench.home)
     assert "Enter a name" in bench.trouble
     bench.control.rename("room/12.json", bench.home)

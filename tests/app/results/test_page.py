@@ -42,7 +42,7 @@ def test_recent_files_are_offered_and_vanished_ones_marked(qtbot: QtBot, tmp_pat
     files.setFocus()
     files.setCurrentRow(1)
     QTest.keyClick(files, Qt.Key.Key_Return)
-    assert "gone.zarr does not exist any more" in bench.window.toasts.shown[-1].text
+    assert "gone.zarr no longer exists" in bench.window.toasts.shown[-1].text
     assert files.count() == 1
     files.setCurrentRow(0)
     QTest.keyClick(files, Qt.Key.Key_Return)

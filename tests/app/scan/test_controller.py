@@ -484,7 +484,7 @@ def test_who_wishes_so_finds_the_scan_gone_on(outage: Outage) -> None:
     bench.scans.resume()
     assert outage.reconnection is Reconnection.RESUMING
     assert "attempt 2 of" in outage.told
-    assert outage.told.endswith("The scan resumes automatically when it answers.")
+    assert outage.told.endswith("The scan resumes automatically when it responds.")
     outage.is_gone = False
     outage.wait(RETRY_S)
     assert phase(bench) is Phase.DONE

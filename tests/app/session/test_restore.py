@@ -92,5 +92,5 @@ def test_a_series_comes_back_where_it_is_seen(qtbot: QtBot, tmp_path: Path) -> N
 def test_a_result_that_is_gone_is_told(qtbot: QtBot, tmp_path: Path) -> None:
     bench = Bench(qtbot, tmp_path)
     bench.session.restore(LEAF)
-    assert "leaf.zarr does not exist any more" in bench.window.toasts.shown[-1].text
+    assert "leaf.zarr no longer exists" in bench.window.toasts.shown[-1].text
     bench.window.close()

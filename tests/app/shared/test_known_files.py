@@ -46,7 +46,7 @@ def test_every_refusal_says_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "cat.jpeg").write_bytes(b"\xff\xd8")
     assert "Open a result first" in refusal(tmp_path / "spectrum.csv")
     assert "dsl-scan opens scans" in refusal(tmp_path / "cat.jpeg")
-    assert "does not exist any more" in refusal(tmp_path / "gone.zarr")
+    assert "no longer exists" in refusal(tmp_path / "gone.zarr")
 
 
 def test_marks_mean_the_result_beside_them(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_residuals_say_which_samples_were_used(samples: GridSamples) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"depths_mm": np.array([500.0, 500.0, 500.0, 500.0, 501.0])}, "three or more depths"),
+        ({"depths_mm": np.array([500.0, 500.0, 500.0, 500.0, 501.0])}, "three or more different depths"),
         ({"wavelengths_nm": np.array(SPREAD_NM)[::-1]}, "rising order"),
         ({"rows_px": np.array([0.0])}, "2 x 2"),
         ({"columns_px": np.full((2, 7, 5, 48, 85), np.nan)}, r"Order \+1 at 430 nm"),
@@ -135,7 +135,7 @@ def test_missing_grid_order_and_unknown_model_are_told(samples: GridSamples) -> 
     assert rig.correspondence is not None
     half = rig.model_copy(update={"correspondence": rig.correspondence.model_copy(update={"orders": (1,)})})
     pixels, depth = torch.tensor([0]), torch.tensor([700.0])
-    with pytest.raises(CalibrationError, match="knows orders"):
+    with pytest.raises(CalibrationError, match="covers orders"):
         GridModel(half).trace(pixels, depth, -1, BANDS_NM)
     with pytest.raises(CalibrationError, match="no data-driven correspondence"):
         correspondence(published_rig(), "grid")

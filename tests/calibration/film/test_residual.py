@@ -64,5 +64,5 @@ def test_hybrid_model_adds_the_correction() -> None:
 
 
 def test_hybrid_model_needs_a_residual() -> None:
-    with pytest.raises(CalibrationError, match="holds no residual"):
+    with pytest.raises(CalibrationError, match="has no residual"):
         correspondence(small_rig(), "hybrid")

@@ -54,5 +54,5 @@ def test_no_halo_is_found_as_none() -> None:
 def test_noise_without_lines_is_refused() -> None:
     rng = np.random.default_rng(0)
     noise = 0.1 * rng.standard_normal((318, 200))
-    with pytest.raises(CalibrationError, match="see the lines as lines"):
+    with pytest.raises(CalibrationError, match="lines are resolved in only"):
         fit_zero_order(LINES, np.full(200, 300.0), noise, np.full(noise.shape, 0.1), START, REACH_PX)

@@ -118,5 +118,5 @@ def test_frames_that_are_no_pairs_or_clip_do_not_count() -> None:
 
 def test_noise_that_does_not_grow_with_light_is_refused() -> None:
     readings = replace(pairs(10.0, 2.0), pair_variance_dn2=np.full((12, 3), 4.0))
-    with pytest.raises(CalibrationError, match="no raw photon counts"):
+    with pytest.raises(CalibrationError, match="not raw photon counts"):
         fit_transfer(readings, BLACK_DN, SIZES)

@@ -42,7 +42,7 @@ def test_the_blur_of_edges_is_measured_without_bias(blur_px: float, pitch_px: fl
 
 def test_a_picture_without_edges_is_refused() -> None:
     flat = np.full((100, 200), 1000, np.uint16)
-    with pytest.raises(CalibrationError, match="no clear edges"):
+    with pytest.raises(CalibrationError, match="No clear edges"):
         check_focus(BarFrames((flat, flat), (flat, flat)), BLACK_DN)
     with pytest.raises(CalibrationError, match="Focus"):
         check_focus(bar_frames(25.0, 30.0), BLACK_DN)

@@ -140,7 +140,7 @@ def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str])
 @pytest.mark.parametrize(
     ("world", "kind", "message"),
     [
-        (LightWorld(brightness=0.0), CalibrationError, "sees nothing"),
+        (LightWorld(brightness=0.0), CalibrationError, "picture is dark"),
         (
             LightWorld(connected=False, ambient=20.0),
             DeviceError,
@@ -153,7 +153,7 @@ def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str])
         ),
         (LightWorld(ambient=1e6), CalibrationError, "although the projector shows black"),
         (LightWorld(ambient=400.0), CalibrationError, "ambient light"),
-        (LightWorld(ignores_exposure=True, brightness=0.1), DeviceError, "ignores the exposure"),
+        (LightWorld(ignores_exposure=True, brightness=0.1), DeviceError, "ignores the requested exposure"),
         (LightWorld(stale=True), DeviceError, "stale frames"),
         (LightWorld(late_ms=600.0), DeviceError, "does not always see a new picture 400 ms"),
     ],

@@ -312,7 +312,7 @@ def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: st
     assert all(f.stat().st_size > 0 for f in files)
     assert sorted(f.name for f in path.parent.iterdir()) == sorted(f.name for f in files)
     files[-1].write_bytes(b"mine")
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         exporter(small_result(), path)
     assert files[-1].read_bytes() == b"mine"
     exporter(small_result(), path, overwrite=True)

@@ -60,7 +60,7 @@ def test_a_spectrum_is_read_again_as_a_reference(tmp_path: Path) -> None:
 
 def test_nothing_is_replaced_unasked_and_nothing_written_of_nothing(tmp_path: Path) -> None:
     path = export_spectra([REGION], tmp_path / "spectra.csv", {})
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         export_spectra([REFERENCE], path, {})
     export_spectra([REFERENCE], path, {}, overwrite=True)
     with pytest.raises(StoreError, match="at least one"):

@@ -110,7 +110,7 @@ def _tables(folder: Path, **changes: NDArray[np.generic]) -> None:
         ("PEF", np.ones((31, 3)), r"31 bands; published tables have 24, 25, 29, 47\. Give the wavelengths"),
         ("CRF", np.full((47, 3), np.nan), "negative or non-finite"),
         ("DG", np.full((3, 47), -1.0), "negative or non-finite"),
-        ("CRF", np.full((47, 3), "x"), "one array of numbers"),
+        ("CRF", np.full((47, 3), "x"), "a single array of numbers"),
     ],
 )
 def test_wrong_tables_are_refused(tmp_path: Path, name: str, table: NDArray[np.generic], says: str) -> None:
@@ -142,7 +142,7 @@ def test_a_rig_without_first_orders_cannot_be_exported(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match=r"no efficiency of order -1"):
         export_calibration(rig, tmp_path)
     export_calibration(small_rig(), tmp_path)
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         export_calibration(small_rig(), tmp_path)
 
 

@@ -273,5 +273,5 @@ def test_a_cancelled_export_leaves_nothing_and_replaces_nothing(tmp_path: Path, 
     with pytest.raises(Cancelled):
         export_dataset(Memory(), tmp_path / "new", progress=progress)
     assert [path.name for path in tmp_path.iterdir()] == ["scene"]
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         export_dataset(Memory(), folder)

@@ -163,7 +163,7 @@ def test_sizes_are_checked_and_asked_for(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match=r"890 x 580 px, needed are 445 x 290"):
         load_stereo(path, (640, 360), (445, 290))
     path = save_stereo(_stereo("moreno-taubin"), tmp_path / "b.yml")
-    with pytest.raises(CalibrationError, match="does not hold the camera's image size"):
+    with pytest.raises(CalibrationError, match="does not contain the camera's image size"):
         load_stereo(path, (640, 360))
     with pytest.raises(CalibrationError, match="does not exist"):
         load_stereo(tmp_path / "c.xml", (640, 360))
@@ -171,7 +171,7 @@ def test_sizes_are_checked_and_asked_for(tmp_path: Path) -> None:
 
 def test_writing_is_careful(tmp_path: Path) -> None:
     path = save_stereo(_stereo(), tmp_path / "a.xml")
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         save_stereo(_stereo("procam"), path)
     assert load_stereo(path, (640, 360)).dialect == "dsl"
     with pytest.raises(StoreError, match=r"\.xml or \.yml"):

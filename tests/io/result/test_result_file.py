@@ -83,7 +83,7 @@ def test_a_depth_only_result(tmp_path: Path) -> None:
 
 def test_an_existing_result_is_replaced_only_when_allowed(tmp_path: Path) -> None:
     path = save_result(small_result(), tmp_path / "r.zarr")
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         save_result(small_result(), path)
     changed = small_result()
     changed["depth_mm"][0, 0] = 123.0

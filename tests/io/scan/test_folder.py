@@ -128,7 +128,7 @@ def test_another_plan_is_refused_and_the_field_named(session: Path, plan: Captur
 
 
 def test_create_never_overwrites(session: Path, plan: CapturePlan, tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="already holds a scan"):
+    with pytest.raises(StoreError, match="already contains a scan"):
         ScanWriter.create(session, plan)
     (tmp_path / "thesis").mkdir()
     (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
@@ -157,7 +157,7 @@ def test_frames_of_another_size_or_type_are_refused(
     shot = next(plan.shots())
     with (
         ScanWriter.create(tmp_path / "scan.dsl", plan) as writer,
-        pytest.raises(StoreError, match="but the scan takes uint16"),
+        pytest.raises(StoreError, match="but the scan needs uint16"),
     ):
         writer.write(shot, Frame(pixels, 10.0))  # type: ignore[arg-type]
 

@@ -22,9 +22,9 @@ from dsl_core.model.spectral import SpectralCurve
 
 HEADS = (
     ("Requested, nm", "Nominal centre of the requested filter"),
-    ("Passes, nm", "Effective wavelength of what its curve passes"),
-    ("Found, nm", "Wavelength by the positions of its first orders, with one standard deviation"),
-    ("Off, nm", "Found minus passes"),
+    ("Passes, nm", "Effective wavelength of the light that it passes"),
+    ("Found, nm", "Wavelength from the positions of its first orders, with one standard deviation"),
+    ("Off, nm", "Found minus passed wavelength"),
     ("Orders", "Orders of the film that stand out from the noise"),
     ("Curve", "Whether its transmission was measured, or assumed to be nominal"),
     ("Verdict", "What is wrong with the filter"),

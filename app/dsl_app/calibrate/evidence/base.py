@@ -86,7 +86,7 @@ class PlainEvidence(Evidence[Record]):
     def show_fit(self, fit: Fit) -> None:
         """Say that the figures are all there is."""
         self.words.setText(
-            f"{fit.fitted.title} has nothing to draw. Its figures, with their limits, say how good it is."
+            f"{fit.fitted.title} has no plots. Its figures, with their limits, show how good it is."
         )
 
 

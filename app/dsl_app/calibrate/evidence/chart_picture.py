@@ -175,7 +175,7 @@ class Swatches(QWidget):
         self._held_out, self._names = list(held_out), list(names)
         worst = int(np.argmax(held_out))
         self.setAccessibleDescription(
-            f"Farthest from what is expected is {names[worst]}, by {100 * held_out[worst]:.1f} % of white."
+            f"{names[worst]} differs most from what is expected, by {100 * held_out[worst]:.1f} % of white."
         )
         self.update()
 

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 
 #: What a person does where no chart was found.
 HELP = (
-    "This picture gave no fit. Drag the four corners to the outer corners of the 24 patches, beginning at any"
-    " of them, until all outlines are inside patches; then fit."
+    "This picture could not be fitted. Drag the four corners to the outer corners of the 24 patches,"
+    " beginning at any of them, until all outlines are inside patches; then fit."
 )
 NO_FIT = "There is no fit yet."
 HEADS = (
@@ -49,7 +49,7 @@ HEADS = (
         (f"{name.capitalize()}, %", "Measured under white, relative to a perfect white, with its deviation")
         for name in CHANNELS
     ),
-    ("Expected, %", "What the refined curves expect: red, green, blue"),
+    ("Expected, %", "Expected from the refined curves: red, green, blue"),
     ("In fit", "Rms of measured minus modelled signals, % of the patch's white"),
     ("Held out", "The same with curves fitted without the patch"),
 )
@@ -69,7 +69,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         self.again = push_button(
             "Fit with these corners", "Measure the patches again at the current corners, and refine again"
         )
-        self.back = push_button("Reset corners", "Move the corners back to where the fit shown here has them")
+        self.back = push_button("Reset corners", "Move the corners back to those of the fit shown here")
         self.table = NumberTable("Patches", HEADS)
         self.residuals = ChartBox(
             "Residuals of the patches",

@@ -55,8 +55,8 @@ class SelfTestEvidence(Evidence[SelfTest]):
         )
         self.beat = ChartBox(
             "Beat of the colour cycle",
-            "Spread of the colour ratios over repeats at one exposure, with 95 % bars. Exposures that hold"
-            " whole cycles have none; the advised ones are marked.",
+            "Spread of the colour ratios over repeats at one exposure, with 95 % bars. Exposures of whole"
+            " cycles have none; the advised ones are marked.",
             "Spread of ratios (%)",
             "Exposure (ms)",
         )

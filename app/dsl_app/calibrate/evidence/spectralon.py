@@ -28,7 +28,7 @@ HEADS = (
     ),
     (
         "White / sum",
-        "Signal under white over the sum of those under red, green and blue: 1 if light adds up",
+        "Signal under white over the sum of those under red, green and blue: 1 if the light is additive",
     ),
 )
 

@@ -227,7 +227,7 @@ class WizardController:
         )
 
     def stop(self) -> None:
-        """Stop a capture or fit at its next safe point; frames taken so far are kept."""
+        """Stop a capture or fit at its next safe point; frames captured so far are kept."""
         self._jobs.stop()
 
     # Fit and judge ---------------------------------------------------------------------------------

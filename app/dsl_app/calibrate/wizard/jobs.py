@@ -126,4 +126,4 @@ class WizardJobs:
 
     def _stopped(self) -> None:
         self._give_up()
-        self.state.note.set("Stopped. Frames taken so far are kept; capture again to continue.")
+        self.state.note.set("Stopped. Frames captured so far are kept; capture again to continue.")

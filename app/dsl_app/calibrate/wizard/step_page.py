@@ -81,7 +81,7 @@ class LivePicture(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.view = pg.GraphicsLayoutWidget()
-        self.view.setAccessibleName("What the camera sees")
+        self.view.setAccessibleName("Camera picture")
         self.view.setToolTip("The camera's last bright frame; saturated pixels are red")
         self.view.setMinimumSize(220, 150)
         self._box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)

@@ -131,7 +131,8 @@ class CalibrationWizard(QDialog):
         answer = QMessageBox.question(
             self,
             f"{self._state.title} is {self._state.doing.value.value}",
-            "Stop it and leave? Frames taken so far are kept, and the wizard continues from here next time.",
+            "Stop it and leave? Frames captured so far are kept, and the wizard continues from here next"
+            " time.",
         )
         return answer == QMessageBox.StandardButton.Yes
 
@@ -207,7 +208,7 @@ class WizardButtons(QWidget):
         self.check.setCheckable(True)
         self.all = _button("Capture a&ll", "Place, look at and capture every step that is left, then fit")
         self.capture = _button("&Capture", "")
-        self.stop = _button("&Stop", "Stop at the next safe point; frames taken so far are kept")
+        self.stop = _button("&Stop", "Stop at the next safe point; frames captured so far are kept")
         self.next = _button("&Next", "Show the next page")
         self.discard = _button("&Discard fit", "Discard this fit; captures and what was accepted are kept")
         self.fit = _button("&Fit", "Calibrate from the captures of all steps")

@@ -109,7 +109,7 @@ class SeriesPlot(QWidget):
         self.plot.addItem(pg.PlotCurveItem([x for x, _ in best], [y for _, y in best], pen=pen))
         ends = [self._draw_point(points[i], at, at in best) for i, at in seen.items()]
         self._set_ranges([x for x, _ in seen.values()], [y for pair in ends for y in pair])
-        self.legend.setText(f"{_key('━', theme.accent)} no faster one is better")
+        self.legend.setText(f"{_key('━', theme.accent)} no faster scan is better")
 
     def _draw_point(self, point: SweepPoint, at: tuple[float, float], is_best: bool) -> tuple[float, float]:
         """Draw a point with its name and bar; returns the ends of the bar."""

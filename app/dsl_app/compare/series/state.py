@@ -22,13 +22,14 @@ class SeriesKind(Enum):
 #: What an empty series says.
 NOTHING = {
     SeriesKind.STAGE: (
-        "Add results of one flat target at three or more stage positions: choose a folder that holds them, or"
-        " drop them here. Positions are read from names such as “stage 695.2 mm.zarr”, or typed into the"
-        " table."
+        "Add results of one flat target at three or more stage positions: choose a folder that contains"
+        " them, or drop them here. Positions are read from names such as “stage 695.2 mm.zarr”, or typed"
+        " into the table."
     ),
     SeriesKind.SWEEP: (
-        "Add results of one scene scanned with different plans: choose a folder that holds them, or drop them"
-        " here. They are compared with the ground truth of the simulated rig, or with one of the results."
+        "Add results of one scene scanned with different plans: choose a folder that contains them, or drop"
+        " them here. They are compared with the ground truth of the simulated rig, or with one of the"
+        " results."
     ),
 }
 

@@ -27,7 +27,7 @@ TIPS = {
     "Depth (mm)": "RMS error of depth, over single pixels",
     "Reflectance": "RMS error of reflectance, over single pixels and bands",
     "Angle (rad)": "Mean angle between spectra",
-    "Remark": "Why a result does not count, or whether no faster one beats it",
+    "Remark": "Why a result does not count, or whether no faster scan beats it",
 }
 POSITION = 1
 
@@ -126,7 +126,7 @@ def row_texts(state: SeriesState) -> list[RowTexts]:
     found = []
     for row, texts in zip(state.rows.value, numbers, strict=True):
         trouble = row.trouble(kind)
-        good = "No faster one is better" if row.point is not None and row.point.name in best else ""
+        good = "No faster scan is better" if row.point is not None and row.point.name in best else ""
         remark = trouble or (good if row.is_read(kind) else "Not read yet")
         found.append(RowTexts(row.name, texts, remark, bool(trouble)))
     return found

@@ -109,7 +109,7 @@ class CloudPanel(QWidget):
         if self.view is None or not self.isVisible():
             return
         if result is None or "points_mm" not in result.arrays:
-            self._hint.setText("This result holds no points.")
+            self._hint.setText("This result has no points.")
             return
         if self._layers is None:
             self._layers = Layers(result)

@@ -49,7 +49,7 @@ class ExportController:
         if form.needs_pins and not has_pins:
             return "Pin a pixel first"
         if form.needs_spectra and not (result is not None and result.has_spectra):
-            return "This result holds depth only"
+            return "This result has depth only"
         return ""
 
     def trouble(self, folder: str, name: str, targets: dict[str, Path], replace: bool) -> str:

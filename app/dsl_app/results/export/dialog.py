@@ -49,7 +49,7 @@ class ExportDialog(QDialog):
             box.setToolTip(refusal or form.about)
             box.toggled.connect(lambda _: self._check())
         self.replace = QCheckBox("Replace existing files")
-        self.replace.setToolTip("If not selected, existing files are never touched")
+        self.replace.setToolTip("If not ticked, existing files are never replaced")
         self.replace.toggled.connect(lambda _: self._check())
         self.text = QLabel()
         self.text.setWordWrap(True)

@@ -89,7 +89,7 @@ class MarksController:
     def _add_region(self, draft: Mark) -> None:
         result = self.state.result.value
         if result is None or not result.has_spectra:
-            self._notifier.tell("info", "This result holds depth only; a region needs spectra.")
+            self._notifier.tell("info", "This result has depth only; a region needs spectra.")
             return
 
         def done(region: Mark) -> None:

@@ -123,7 +123,7 @@ class MarkStorage:
         names = ", ".join(mark.name for mark in bad[:4]) + (" and more" if len(bad) > 4 else "")
         self._notifier.tell(
             "warning",
-            f"No spectrum for {names}. These marks stay in the list, where each says why. Open the result"
+            f"No spectrum for {names}. These marks stay in the list with the reason. Open the result"
             " again once their files are back.",
             "\n".join(f"{mark.name}: {mark.trouble}" for mark in bad),
         )
@@ -144,7 +144,7 @@ class MarkStorage:
         assert self.state.result.value is not None
         path = annotations_path(self.state.result.value.path)
         self._notifier.offer(
-            f"The marks in {path} could not be read: {self._reason.rstrip('.')}. The file stays as it is, and"
+            f"The marks in {path} could not be read: {self._reason.rstrip('.')}. The file is not changed, and"
             " no mark is added until you read it again or start with no marks.",
             {
                 "Read again": partial(self._decide, path, self._read),

@@ -55,7 +55,7 @@ class ReconstructionDialog(JobDialog):
 
     def _make_parameters(self, request: ReconstructionRequest) -> None:
         self.spectra = QCheckBox("Spectra")
-        self.spectra.setToolTip("If not selected, the result holds depth only, in a fraction of the time")
+        self.spectra.setToolTip("If not ticked, the result has depth only, in a fraction of the time")
         self.first = _nanometres("First band", request.start_nm, "Centre of the first band, nm")
         self.last = _nanometres(
             "Last band",
@@ -64,13 +64,13 @@ class ReconstructionDialog(JobDialog):
         )
         self.step = NumberBox(
             "Band step", 0.5, 50, request.step_nm, "nm", 1,
-            "Spacing of the bands, nm; half the step doubles the size and about doubles the time",
+            "Spacing of the bands, nm; half the step doubles the size and roughly doubles the time",
         )  # fmt: skip
         self.model = _choices("Correspondence", "Where each wavelength falls", MODELS)
         self.solver = _choices("Solver", "How spectra are computed from the frames", SOLVERS)
         self.refine = QCheckBox("Subpixel columns")
         self.refine.setToolTip(
-            "Refine depth with the lines; if not selected, depth is faster but from whole columns only"
+            "Refine depth with the lines; if not ticked, depth is quicker, but in whole columns"
         )
         self.calibration = ChoiceBox("Calibration", "The scan's own, one from the library, or a file")
         own = self._source.calibration
@@ -93,7 +93,7 @@ class ReconstructionDialog(JobDialog):
         self.name.setAccessibleName("Name of the result")
         self.name.setToolTip("The result is saved as NAME.zarr next to the scan, whose frames it refers to")
         self.replace = QCheckBox("Replace an existing result")
-        self.replace.setToolTip("If not selected, existing results are never touched")
+        self.replace.setToolTip("If not ticked, existing results are never replaced")
         self.name_buttons(
             "Reconstruct",
             "Compute a new result; the scan and other results stay as they are",

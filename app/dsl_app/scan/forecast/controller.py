@@ -183,7 +183,7 @@ class ForecastController:
 
         points = self.state.points.value
         if not points:
-            self.state.answer.set("No plan is predicted yet. Wait a moment, then try again.")
+            self.state.answer.set("No plan has been predicted yet. Wait a moment, then try again.")
             return
         done, total = self.state.progress.value
         so_far = f" {done} of {total} plans predicted so far." if done < total else ""

@@ -67,7 +67,7 @@ class ForecastStore:
             for path in old[:-MOST_RIGS]:
                 path.unlink(missing_ok=True)
         except (OSError, StoreError) as error:
-            _log.warning("The predictions could not be kept (%s).", error)
+            _log.warning("The predictions could not be saved (%s).", error)
         self._is_changed = False
 
 

@@ -52,7 +52,7 @@ class QtRunner(QObject):
         for other in self._active:
             if job.exclusive and other.exclusive == job.exclusive:
                 raise DeviceError(
-                    f"{job.title} needs {job.exclusive}, which {other.title} uses. Wait until it ends, or"
+                    f"{job.title} needs {job.exclusive}, which {other.title} is using. Wait until it ends, or"
                     " cancel it."
                 )
         self._active.append(job)

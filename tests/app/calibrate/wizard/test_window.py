@@ -104,7 +104,7 @@ def test_closing_during_a_capture_asks_and_keeps_what_is_there(
     answer(QMessageBox.StandardButton.No)
     wizard.close()
     assert wizard.isVisible()
-    assert "Frames taken so far are kept" in asked[-1]
+    assert "Frames captured so far are kept" in asked[-1]
     answer(QMessageBox.StandardButton.Yes)
     wizard.close()
     assert not wizard.isVisible()

@@ -117,7 +117,7 @@ def test_accuracy_over_time_and_its_report(
         panel.table.item(i, 0).text(): panel.table.item(i, 5).text()  # type: ignore[union-attr]
         for i in range(panel.table.rowCount())
     }
-    assert remarks["good"] == "No faster one is better"
+    assert remarks["good"] == "No faster scan is better"
     assert remarks["slow"] == ""
     assert remarks["reference"] == "This is the reference."
     assert not panel.figures.isVisible()

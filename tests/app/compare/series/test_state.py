@@ -87,6 +87,6 @@ def test_of_scans_the_ones_that_no_faster_one_beats_are_named() -> None:
     state.rows.set(tuple(SeriesRow(path, point=point) for path, point in zip((A, B), points, strict=True)))
     texts = row_texts(state)
     assert [(row.numbers[0], row.remark) for row in texts] == [
-        ("10.0", "No faster one is better"),
+        ("10.0", "No faster scan is better"),
         ("30.0", ""),
     ]

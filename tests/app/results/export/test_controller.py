@@ -28,7 +28,7 @@ def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tm
     assert "Wrote 9 files" in bench.told
     assert len(bench.control.export.taken(targets)) == 9
     bench.control.export.write(targets, overwrite=False)
-    assert "exists already" in bench.told
+    assert "already exists" in bench.told
     bench.control.export.write(targets, overwrite=True)
     assert "Wrote 9 files" in bench.told
 

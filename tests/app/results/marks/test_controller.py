@@ -100,7 +100,7 @@ def test_spectra_are_copied_and_exported_and_read_again_as_references(bench: Ben
     marks.export_spectra(path, overwrite=False)
     assert f"Wrote 1 spectrum to {path}" in bench.told
     marks.export_spectra(path, overwrite=False)
-    assert "exists already" in bench.told
+    assert "already exists" in bench.told
     assert bench.control.open(path)
     reference = bench.state.marks.value[-1]
     assert reference.kind == "reference"

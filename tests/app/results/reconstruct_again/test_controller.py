@@ -165,7 +165,7 @@ def test_calibrations_of_the_library_and_of_files_are_used(bench: Bench) -> None
 def test_what_the_calibration_lacks_is_told_and_nothing_is_left(bench: Bench) -> None:
     bench.control.change(model="hybrid")
     assert bench.control.start()
-    assert "holds no residual" in bench.notifier.told[-1][1]
+    assert "has no residual" in bench.notifier.told[-1][1]
     assert bench.done == []
     assert len(list(bench.folder.iterdir())) == 2
 

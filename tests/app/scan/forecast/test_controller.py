@@ -111,7 +111,7 @@ def test_wishes_choose_a_plan_or_say_what_could_be_had(
 ) -> None:
     control = forecast(bench, tmp_path, automatic=False)
     control.answer(budget_s=60)
-    assert "No plan is predicted yet" in control.state.answer.value
+    assert "No plan has been predicted yet" in control.state.answer.value
     control.begin()
     control.answer(budget_s=20)
     assert bench.state.preset is PRESETS[0]

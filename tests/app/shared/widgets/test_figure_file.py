@@ -89,5 +89,5 @@ def test_the_window_saves_the_figure_of_the_page(
     target.unlink()
     bench.state.result.set(None)
     bench.window.do("save_figure")
-    assert "no figure on this page" in bench.window.toasts.shown[-1].text
+    assert "no plot on this page" in bench.window.toasts.shown[-1].text
     assert not target.exists()
