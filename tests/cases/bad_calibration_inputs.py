@@ -181,7 +181,7 @@ CASES = (
         "spectra in counts",
         "reading the spectra",
         _redo("spectralon", "emission"),
-        r"red\.csv holds counts, not a spectral radiance",
+        r"red\.csv contains counts, not a spectral radiance",
         prepare=_spectra("nm;counts"),
     ),
     BadInput(

@@ -189,5 +189,5 @@ def test_failures_while_opening_name_the_package_unless_they_speak_for_themselve
 def test_two_packages_with_one_name_are_told_apart(install: Install) -> None:
     install("mean_rig", mean="mean_rig:open_rig")
     install("other_rig", mean="other_rig:open_rig")
-    with pytest.raises(DeviceError, match="packages mean_rig and other_rig both bring a rig 'mean'"):
+    with pytest.raises(DeviceError, match="packages mean_rig and other_rig both provide a rig 'mean'"):
         open_rig("mean")

@@ -91,7 +91,7 @@ def test_a_region_is_all_that_counts() -> None:
         target(700.0, region=(30, 0, 24, 20))
     points = flat_arrays(700.0)["points_mm"]
     points[:, 8:], points[:, :, 12:] = np.nan, np.nan
-    with pytest.raises(DecodeError, match="seen in 2 of 48 patches"):
+    with pytest.raises(DecodeError, match="visible in 2 of 48 patches"):
         find_target(points)
 
 

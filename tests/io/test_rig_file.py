@@ -50,7 +50,7 @@ def _edited(tmp_path: Path, *steps: str | int, value: object) -> Path:
         (("pose", "rotation"), [[1, 0, 0], [0, 1, 0], [0, 0, 2]], "pose: .*orthonormal"),
         (("white_scale",), float("nan"), r"white_scale: .*finite"),
         (("colour",), "red", "colour: .*not permitted"),
-        (("schema_version",), 2, "schema version 2; this program knows version 1"),
+        (("schema_version",), 2, "schema version 2; this program supports version 1"),
     ],
 )
 def test_errors_name_the_field(

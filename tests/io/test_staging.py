@@ -85,7 +85,7 @@ def _dataset_with_notes(path: Path) -> None:
 @pytest.mark.parametrize("write", [_save, _export])
 def test_a_scan_is_never_replaced(session: Path, write: Callable[[Path], None]) -> None:
     before = _tree(session)
-    with pytest.raises(StoreError, match=r"scan\.dsl holds a scan and is not replaced.*another name"):
+    with pytest.raises(StoreError, match=r"scan\.dsl contains a scan and is not replaced.*another name"):
         write(session)
     with pytest.raises(StoreError, match="is not replaced"):
         write(session / "frames")
@@ -104,10 +104,10 @@ def test_a_scan_is_never_replaced(session: Path, write: Callable[[Path], None]) 
         (_campaign, _export, "contains the captures of a campaign"),
         (_save, _export, "is not a published dataset"),
         (_export, _save, "is not a result"),
-        (_result_with_notes, _save, r"holds notes\.txt next to a result"),
-        (_result_around_a_scan, _save, r"holds scan\.dsl next to a result"),
-        (_results_together, _save, r"holds second\.zarr next to a result"),
-        (_dataset_with_notes, _export, r"holds notes\.txt next to a published dataset"),
+        (_result_with_notes, _save, r"contains notes\.txt next to a result"),
+        (_result_around_a_scan, _save, r"contains scan\.dsl next to a result"),
+        (_results_together, _save, r"contains second\.zarr next to a result"),
+        (_dataset_with_notes, _export, r"contains notes\.txt next to a published dataset"),
     ],
 )
 def test_a_folder_of_something_else_stays(

@@ -117,7 +117,7 @@ def test_only_plans_that_the_rig_can_capture_are_weighed() -> None:
 def test_that_no_plan_is_possible_is_told() -> None:
     with _limited(1) as devices:
         assert devices.calibration is not None
-        with pytest.raises(PlanError, match=r"None of \d+ plans .* camera can do 0\.1 to 1 ms"):
+        with pytest.raises(PlanError, match=r"None of \d+ plans .* camera supports 0\.1 to 1 ms"):
             possible_plans(devices, devices.calibration)
         with pytest.raises(PlanError, match=r"'twin': the plan is for a camera of .* 112 x 72"):
             possible_plans(devices, published_rig())

@@ -25,7 +25,7 @@ def log(stage: Stage) -> None:
     stage.connect()
     for level, text in (
         (logging.INFO, "Connected the twin of GS3-U3-32S4C."),
-        (logging.WARNING, "Frame 17 arrived late and was taken again."),
+        (logging.WARNING, "Frame 17 arrived late and was captured again."),
         (logging.ERROR, "The camera does not answer. Check its cable and power."),
     ):
         logging.getLogger("dsl_core.capture").log(level, text)

@@ -75,12 +75,12 @@ def _lost_metadata(scan: Path) -> None:
     ("damage", "sentence"),
     [
         (_missing, "lacks 1 of 150 frames, the first is frame 7 (code pattern 7, setting 0). Resume"),
-        (_extra, "holds 1 frames more than the 150 of its plan, the first is number 999"),
+        (_extra, "contains 1 more frames than the 150 of its plan, the first is number 999"),
         (_swapped, "(swapped or copied)"),
         (_truncated, "has 100 of"),
         (_repeated, "Frame 8 (code pattern 8, setting 0)"),
-        (_wrong_size, "holds 4032 bytes of 16 bit values instead of 16128"),
-        (_wrong_type, "holds 8064 bytes of 8 bit values instead of 16128"),
+        (_wrong_size, "contains 4032 bytes of 16 bit values instead of 16128"),
+        (_wrong_type, "contains 8064 bytes of 8 bit values instead of 16128"),
         (_half_a_manifest, "manifest.json is damaged"),
         (_lost_metadata, "zarr.json is missing or damaged"),
     ],
@@ -109,7 +109,7 @@ def test_resume_mends_damaged_frames_to_the_bit(
     damage(scan_copy)
     ending = give("resume", scan_copy)
     assert (ending.code, says in ending.out) == (0, True)
-    assert "All 150 frames are stored" in ending.out
+    assert "All 150 frames are saved" in ending.out
     sound, mended = ScanReader(finished / "scan.dsl"), ScanReader(scan_copy)
     for shot in sound.plan.shots():
         np.testing.assert_array_equal(mended.read(shot), sound.read(shot))
@@ -287,7 +287,7 @@ def test_force_replaces_no_scan_and_nobodys_folder(
         "dsl_core.workflows.scans.reconstruct_scan", lambda *_: 1 / 0
     )  # told before long work
     onto_itself = give("reconstruct", scan_copy, "-o", scan_copy, "--force")
-    assert (onto_itself.code, "holds a scan and is not replaced" in onto_itself.sentence) == (2, True)
+    assert (onto_itself.code, "contains a scan and is not replaced" in onto_itself.sentence) == (2, True)
     assert ScanReader(scan_copy).missing() == []
     documents = tmp_path / "docs"
     documents.mkdir()

@@ -76,7 +76,7 @@ def test_what_is_missing_is_said(give: Give, stage: list[Path], tmp_path: Path) 
     unnamed = stage[0].rename(tmp_path / "unnamed.zarr")
     ending = give("depth-test", unnamed, *stage[1:])
     assert ending.code == 2
-    assert "unnamed.zarr does not say where the stage stood" in ending.sentence
+    assert "unnamed.zarr does not say where the stage was" in ending.sentence
     outside = give("depth-test", *stage[1:], "--region", "0,0,99,9")
     assert "stage 725 mm.zarr: The region 99 x 9 px" in outside.sentence
 

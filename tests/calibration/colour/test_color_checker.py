@@ -141,5 +141,5 @@ def test_patches_are_measured_at_unit_shading_and_saturated_or_small_ones_named(
     with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker is saturated"):
         measure_patches(replace(taken, saturated=full), rig, samples, CHART)
     few = replace(samples, pixels=(samples.pixels[0][:12], *samples.pixels[1:]))
-    with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker shows [0-7] pixels"):
+    with pytest.raises(CalibrationError, match=f"patch '{name}' of the Color Checker has only [0-7] pixels"):
         measure_patches(taken, rig, few, CHART)

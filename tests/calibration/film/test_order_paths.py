@@ -52,7 +52,7 @@ def test_a_filter_beyond_all_light_is_refused() -> None:
     blind = RIG.model_copy(
         update={"emission": tuple(SpectralCurve.of([400.0, 700.0, 701.0], [1.0, 1.0, 0.0]) for _ in range(3))}
     )
-    with pytest.raises(CalibrationError, match=r"No light of order \+1 passes the filter from 1200"):
+    with pytest.raises(CalibrationError, match=r"no light of order \+1 passes the filter from 1200"):
         filter_passband(blind, dark, 1, 0.5)
 
 

@@ -74,7 +74,7 @@ def test_poses_that_suffice_pass_and_doubts_name_what_is_poor(found: GeometryCal
     for words in (
         "pose_0 does not fit",
         "Corners cover 20% of the camera's",
-        "focal length of the camera is known to 5.0% only",
+        "focal length of the camera is known only to 5.0%",
         "The projector seems to have oblong pixels",
         "reprojection error of 0.80 px is large",
         "tilted by 10 degrees at most",

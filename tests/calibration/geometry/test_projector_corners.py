@@ -104,7 +104,10 @@ def test_patterns_before_inverses_are_told(frames: PoseFrames) -> None:
         (lambda f: replace(f, pairs=f.pairs[:-2]), "pose_0 has 26 pattern pictures; .* needs 28"),
         (lambda f: replace(f, white=f.black, black=f.white), "pose_0: the white picture is not brighter"),
         (lambda f: replace(f, black=f.black[:-1]), "pictures of pose_0 differ in size"),
-        (lambda f: replace(f, white=np.where(f.white > 100, np.nan, f.white)), "pose_0 hold .* not finite"),
+        (
+            lambda f: replace(f, white=np.where(f.white > 100, np.nan, f.white)),
+            "pose_0 contain .* not finite",
+        ),
     ],
 )
 def test_bad_pictures_name_the_pose(

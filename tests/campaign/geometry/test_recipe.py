@@ -169,7 +169,7 @@ def test_pictures_with_a_gamma_are_told(poses: list[PoseFrames]) -> None:
 
     assert picture_gamma(poses[0], (640, 360)) == pytest.approx(1.0, abs=0.03)
     series = observe_series([encoded(frames) for frames in poses[:3]], BOARD, (640, 360))
-    assert any("not linear: half the light reads as a gamma of 0.4" in w for w in series.warnings)
+    assert any("not linear: half the light corresponds to a gamma of 0.4" in w for w in series.warnings)
 
 
 def test_a_wrong_printed_size_is_told_by_the_nominal_baseline(bench: Bench) -> None:

@@ -155,7 +155,7 @@ def test_what_is_wrong_fails_its_own_figure(world: LightWorld, names: list[str])
         (LightWorld(ambient=400.0), CalibrationError, "ambient light"),
         (LightWorld(ignores_exposure=True, brightness=0.1), DeviceError, "ignores the requested exposure"),
         (LightWorld(stale=True), DeviceError, "stale frames"),
-        (LightWorld(late_ms=600.0), DeviceError, "does not always see a new picture 400 ms"),
+        (LightWorld(late_ms=600.0), DeviceError, "A new picture is not always visible 400 ms"),
     ],
     ids=["dark", "unplugged", "bright", "black saturated", "ambient", "exposure", "stale", "slow"],
 )

@@ -331,7 +331,7 @@ def test_every_format_refuses_wrong_endings_and_places(tmp_path: Path, name: str
 
 @pytest.mark.parametrize("name", ["csv", "envi", "exr", "npy", "ply", "tiff"])
 def test_every_format_says_what_the_result_lacks(tmp_path: Path, name: str) -> None:
-    with pytest.raises(StoreError, match="holds only shading"):
+    with pytest.raises(StoreError, match="contains only shading"):
         export(small_result()[["shading"]], tmp_path / f"x{SUFFIX[name]}", name)
 
 

@@ -114,7 +114,7 @@ def test_files_that_are_no_calibration(tmp_path: Path, content: str) -> None:
 @pytest.mark.parametrize(
     ("node", "value", "says"),
     [
-        ("T", np.array([1.0, np.nan, 2.0]), "T holds numbers that are not finite"),
+        ("T", np.array([1.0, np.nan, 2.0]), "T contains numbers that are not finite"),
         ("T", np.zeros(2), r"T has shape \(2,\), \(3,\) is needed for the translation"),
         ("R", 2 * np.eye(3), "pose.*orthonormal"),
         ("R", np.diag([1.0, 1.0, -1.0]), "pose.*right-handed"),
@@ -160,7 +160,7 @@ def _write(path: Path, changes: dict[str, NDArray[np.float64]]) -> None:
 
 def test_sizes_are_checked_and_asked_for(tmp_path: Path) -> None:
     path = save_stereo(_stereo(), tmp_path / "a.xml")
-    with pytest.raises(CalibrationError, match=r"890 x 580 px, needed are 445 x 290"):
+    with pytest.raises(CalibrationError, match=r"890 x 580 px, but 445 x 290 px are needed"):
         load_stereo(path, (640, 360), (445, 290))
     path = save_stereo(_stereo("moreno-taubin"), tmp_path / "b.yml")
     with pytest.raises(CalibrationError, match="does not contain the camera's image size"):

@@ -52,7 +52,7 @@ def test_missing(session: Path) -> None:
 
 def test_extra(session: Path) -> None:
     shutil.copy(session / "frames" / "c.3.0.0", session / "frames" / "c.99.0.0")
-    assert "1 frames more than" in _only_problem(session)
+    assert "1 more frames than" in _only_problem(session)
 
 
 @pytest.mark.parametrize("keep", [0, 9, 40, -1])
@@ -82,14 +82,14 @@ def test_swapped(session: Path) -> None:
     spare.rename(b)
     found = find_problems(ScanReader(session), verify=True)
     assert len(found) == 2
-    assert "holds the picture of frame 7 (swapped or copied)" in found[0]
-    assert "holds the picture of frame 2 (swapped or copied)" in found[1]
+    assert "contains the picture of frame 7 (swapped or copied)" in found[0]
+    assert "contains the picture of frame 2 (swapped or copied)" in found[1]
 
 
 @pytest.mark.parametrize("pixels", [np.zeros((16, 25), np.uint16), np.zeros((16, 12), np.uint16)])
 def test_another_size(session: Path, pixels: np.ndarray[tuple[int, int], np.dtype[np.uint16]]) -> None:
     FrameStore(session / "frames", 1, *pixels.shape).write(5, pixels)
-    assert f"holds {pixels.nbytes} bytes of 16 bit values instead of 768 bytes" in _only_problem(session)
+    assert f"contains {pixels.nbytes} bytes of 16 bit values instead of 768 bytes" in _only_problem(session)
 
 
 def test_another_type(session: Path) -> None:

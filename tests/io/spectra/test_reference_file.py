@@ -96,10 +96,10 @@ def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
         ({"wavelength units": "Wavenumber"}, "wavenumber; nanometres or micrometres are needed"),
         ({"wavelength": "{" + ",".join(["500"] * NM.size) + "}"}, "wavelengths occur twice"),
         ({"samples": None}, "'samples'; the header says 'nothing'"),
-        ({"lines": 3}, "cut off: 3 spectra of 31 bands are 93 values, and it holds 62"),
+        ({"lines": 3}, "cut off: 3 spectra of 31 bands are 93 values, but it contains 62"),
         ({"data type": 6}, "data type = 6"),
         ({"bands": 4}, "bands = 4"),
-        ({"reflectance scale factor": "0.001"}, "holds values up to 600; reflectance from 0 to 1"),
+        ({"reflectance scale factor": "0.001"}, "contains values up to 600; reflectance from 0 to 1"),
         ({"data ignore value": "none"}, "ignore value is not a number"),
     ],
 )

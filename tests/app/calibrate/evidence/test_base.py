@@ -54,7 +54,7 @@ def test_a_calibration_without_evidence_says_so(qtbot: QtBot) -> None:
     widget = make_evidence("of another package")
     qtbot.addWidget(widget)
     widget.show_fit(Fit(AcceptedCalibration(name="other", title="Other"), Record(), session_of({})))
-    assert "Other has nothing to draw" in widget.findChildren(QLabel)[0].text()
+    assert "Other has no plots" in widget.findChildren(QLabel)[0].text()
 
 
 def test_only_the_latest_of_what_is_read_is_shown(qtbot: QtBot) -> None:

@@ -250,6 +250,6 @@ def test_a_look_of_another_size_says_so(bench: ScanBench, tmp_path: Path, counte
     control = forecast(bench, tmp_path)
     control.look(write_small_result(tmp_path))
     assert control.state.points.value == ()
-    assert "A quick look must hold spectra at 64 x 48 pixels" in control.state.trouble.value
+    assert "A quick look must have spectra at 64 x 48 pixels" in control.state.trouble.value
     control.look(None)
     assert [control.state.trouble.value] == [""]
