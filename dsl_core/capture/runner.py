@@ -132,7 +132,7 @@ class Runner:
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(
                 State.CANCELLED,
-                str(error) or "Interrupted; saved frames are kept. Resume it.",
+                str(error) or "Interrupted; saved frames are kept. Resume the scan.",
             )
             raise
         except DslError as error:
@@ -170,7 +170,7 @@ class Runner:
         if self._token.is_cancelled:
             self._set(State.CANCELLING, shot=shot, done=done)
             raise Cancelled(
-                f"Cancelled after {done} of {self._plan.shot_count} frames; they are saved. Resume it."
+                f"Cancelled after {done} of {self._plan.shot_count} frames; they are saved. Resume the scan."
             )
 
     def _must_wait(self) -> bool:

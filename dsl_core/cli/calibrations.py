@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from dsl_core.io.calibration_library import LibraryLine
     from dsl_core.model.rig import Rig
 
-calibrations = typer.Typer(help="The calibrated rigs of this computer.", no_args_is_help=True)
+calibrations = typer.Typer(help="The calibrated rigs on this computer.", no_args_is_help=True)
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="A calibration's name, or NAME@DATE.")]
 

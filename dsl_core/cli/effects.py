@@ -54,7 +54,7 @@ def effects(
         world = rig.camera.world
         made = world.effect_plan(replace(world.request, settings=captured.settings))
     output.table(
-        ("effect", "what it is", "changes at most", "costs a frame", "", "why"),
+        ("effect", "what it is", "changes at most", "cost per frame", "", "why"),
         [_row(decision) for decision in made.decisions],
     )
     output.say(_left_out(made))

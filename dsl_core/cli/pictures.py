@@ -127,7 +127,7 @@ def print_geometry(output: Output, found: GeometryCalibration) -> None:
     )
     output.table(headings, [_row(pose) for pose in found.poses])
     output.say(
-        f"Reprojection {found.rms_px:.3f} px rms (camera {found.camera_rms_px:.3f}, projector"
+        f"Reprojection {found.rms_px:.3f} px RMS (camera {found.camera_rms_px:.3f}, projector"
         f" {found.projector_rms_px:.3f}; {found.rms_with_outliers_px:.3f} with outliers);"
         f" {found.full_resolution_rms_px:.3f} px with unbinned camera pixels."
     )

@@ -95,7 +95,7 @@ def peak_width(wavelengths_nm: Floats, values: Floats, baseline: float | None = 
     right = _half_width(wavelengths_nm[top:], curve[top:], half)
     flanks = [flank for flank in (left, right) if flank is not None]
     if curve[top] <= floor or not flanks:
-        raise DecodeError("The spectrum does not come down to half its maximum, so it has no width.")
+        raise DecodeError("The spectrum does not fall to half its maximum, so it has no width.")
     low, high = flanks[0], flanks[-1]
     centre = float(wavelengths_nm[top]) + (high - low) / 2
     return Peak(centre, float(curve[top]), floor, low + high, len(flanks) == 2)

@@ -31,10 +31,12 @@ MIN_SHARE = 0.001
 #: The gravest reason first: too much light also confuses the code.
 _ADVICE = {
     Flag.SATURATED: "Lower the exposure or the drive level of the plan's settings, or dim the room.",
-    Flag.NO_LIGHT: "Check that the projector is on, the lens open, the scene in the beam; or expose longer.",
+    Flag.NO_LIGHT: (
+        "Check that the projector is on, the lens cap is off and the scene is in the beam; or expose longer."
+    ),
     Flag.OUT_OF_RANGE: "Check that the calibration belongs to this rig, and the distance of the scene.",
-    Flag.CODE_UNSURE: "Check that projector and camera run in step and nothing moved; expose longer.",
-    Flag.CODES_DISAGREE: "Check focus and that nothing moved; part surfaces that light each other.",
+    Flag.CODE_UNSURE: "Check that projector and camera are synchronised and nothing moved; expose longer.",
+    Flag.CODES_DISAGREE: "Check focus and that nothing moved; separate surfaces that light each other.",
     Flag.NON_FINITE: "Check the calibration for values that are not numbers.",
 }
 
@@ -171,6 +173,6 @@ def require_light(
     share = float(np.mean(saturated | ~np.isfinite(white)))
     if share > 1 - MIN_SHARE:
         raise DecodeError(
-            f"The white frame is saturated in {share:.0%} of its pixels at every setting, so that nothing"
-            f" can be measured. {advice}"
+            f"The white frame is saturated in {share:.0%} of its pixels at every setting, so nothing can be"
+            f" measured. {advice}"
         )

@@ -68,8 +68,8 @@ class SimCamera(Camera):
         low, high = EXPOSURE_RANGE_MS
         if not low <= exposure_ms <= high:
             raise DeviceError(
-                f"The camera was asked for an exposure of {exposure_ms:g} ms; it supports {low:g} to"
-                f" {high:g} ms. Change the plan's settings."
+                f"An exposure of {exposure_ms:g} ms was requested; the camera supports {low:g} to {high:g}"
+                " ms. Change the plan's settings."
             )
         self._exposure_ms = exposure_ms
         return exposure_ms
@@ -133,7 +133,8 @@ class SimStage(Stage):
         low, high = STAGE_RANGE_MM
         if not low <= position_mm <= high:
             raise DeviceError(
-                f"The stage was asked for {position_mm:g} mm; it travels from {low:g} to {high:g} mm."
+                f"A position of {position_mm:g} mm was requested; the stage travels from {low:g} to"
+                f" {high:g} mm."
             )
         self.world.move_to(float(position_mm))
         return self.world.position_mm

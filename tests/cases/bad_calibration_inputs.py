@@ -250,7 +250,7 @@ CASES = (
         "plane not flat at one position",
         "fit of the depth stage",
         _redo("depth-stage", "position-740"),
-        r"stage's position 740 mm are \d\.\d+ mm rms off a plane",
+        r"stage's position 740 mm are \d\.\d+ mm RMS off a plane",
         {"bow_mm": "5"},
         touched=_depth_stage("position-740"),
     ),

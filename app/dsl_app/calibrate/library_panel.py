@@ -251,7 +251,7 @@ class DriftWindow(QDialog):
 
 def _table() -> ReadTable:
     table = ReadTable(
-        "Calibrations of this computer", "Every version of every calibration, the newest first", _COLUMNS
+        "Calibrations on this computer", "Every version of every calibration, the newest first", _COLUMNS
     )
     table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
     table.horizontalHeader().setStretchLastSection(True)

@@ -19,7 +19,7 @@ CAMPAIGN_HINT = (
     " Begin a new one, or open an existing one."
 )
 NO_VERSION = (
-    "<p>The library is empty. It keeps every calibrated rig of this computer, dated and never overwritten:"
+    "<p>The library is empty. It keeps every calibrated rig on this computer, dated and never overwritten:"
     " calibrate everything of a campaign, keep one in the library, or import a file.</p>"
 )
 _ROLES = {

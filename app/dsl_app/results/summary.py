@@ -40,7 +40,7 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Sum
     content = Content.WELCOME if result is None else Content.RESULT
     message = ""
     if busy:
-        content, message = Content.OFFER, f"{busy} …"
+        content, message = Content.OFFER, f"{busy}…"
     elif offer is not None:
         content, message = Content.OFFER, f"{offer.name} has no result yet. Reconstruct it now?"
     can_reconstruct = offer is not None and not busy

@@ -52,13 +52,13 @@ ACTIONS: tuple[Action, ...] = (
     Action("open", "&Open…", "File", "Ctrl+O", "Open a scan, a result, a reference or a calibration"),
     Action("open_last", "Open &last file", "File", "Ctrl+Shift+O", "Open the most recent file again"),
     Action("export", "&Export…", "File", "Ctrl+E", "Export the result in formats of other programs"),
-    Action("save_figure", "Save &figure…", "File", "", "Save the plot of this page as SVG or PNG"),
+    Action("save_figure", "Save &plot…", "File", "", "Save the plot of this page as SVG or PNG"),
     Action(
         "import",
         "&Import…",
         "File",
         "Ctrl+I",
-        "Import a folder of images or a calibration of another program; lists missing and misnamed files",
+        "Import a folder of images or a calibration from another program; lists missing and misnamed files",
     ),
     Action(
         "show_command",

@@ -89,7 +89,7 @@ class WindowActions:
             )
             return
         draft = str(Path(self._parts.settings.output_folder) / f"{figure.name}.svg")
-        name, _ = QFileDialog.getSaveFileName(self._window, "Save figure", draft, FORMATS)
+        name, _ = QFileDialog.getSaveFileName(self._window, "Save plot", draft, FORMATS)
         if not name:
             return
         try:

@@ -254,7 +254,7 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             value=100 * record.held_out,
             unit="% of white",
             high=RESIDUAL_PERCENT,
-            advice="Clean the chart, keep reflections off, and check that its reflectances are those of this"
+            advice="Clean the chart, avoid reflections, and check that its reflectances are those of this"
             " edition.",
         ),
         Figure(
@@ -267,7 +267,7 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             value=100 * worst.held_out,
             unit="% of white",
             high=WORST_PERCENT,
-            advice=f"Look at the patch {worst.name!r}: dust, scratches, gloss or shadow.",
+            advice=f"Check the patch {worst.name!r} for dust, scratches, gloss or shadow.",
         ),
         Figure(
             name="deviation of the response, of its peak", value=100 * deviation, unit="%", high=3.0,
@@ -279,7 +279,7 @@ def color_checker_figures(record: ColorCheckerCalibration) -> tuple[Figure, ...]
             unit="%",
             low=-LEVEL_PERCENT,
             high=LEVEL_PERCENT,
-            advice="Keep other light and shadows off, and check the Spectralon's certified reflectance.",
+            advice="Avoid other light and shadows, and check the Spectralon's certified reflectance.",
         ),
         Figure(
             name="tilt of the chart", value=record.tilt_deg, unit="degrees", high=MAX_TILT_DEG,

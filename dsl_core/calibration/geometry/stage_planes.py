@@ -202,9 +202,9 @@ def require_flat(positions_mm: Sequence[float], rms_mm: Floats, limit_mm: float 
     worst = int(rms_mm.argmax())
     if rms_mm[worst] > limit_mm:
         raise CalibrationError(
-            f"The points at the stage's position {positions_mm[worst]:g} mm are"
-            f" {rms_mm[worst]:.2f} mm rms off a plane; {limit_mm:.2g} mm are allowed. Use a"
-            " flat target that fills the view, and check that all positions were captured with this rig."
+            f"The points at the stage's position {positions_mm[worst]:g} mm are {rms_mm[worst]:.2f} mm RMS"
+            f" off a plane; {limit_mm:.2g} mm are allowed. Use a flat target that fills the view, and check"
+            " that all positions were captured with this rig."
         )
 
 

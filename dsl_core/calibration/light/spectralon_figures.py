@@ -30,7 +30,7 @@ def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:
         value=100 * spread,
         unit="%",
         high=LOOK_UNEVEN_PERCENT,
-        advice="Fill the middle half of the picture with the Spectralon alone; keep shadows off.",
+        advice="Fill the middle half of the picture with the Spectralon alone; avoid shadows.",
     )
 
 
@@ -66,7 +66,7 @@ def _emission_figures(record: SpectralonCalibration) -> list[Figure]:
             value=100 * emission.end_share,
             unit="%",
             high=2.0,
-            advice="The instrument's range cuts off the LEDs; the emission beyond it is taken as constant.",
+            advice="The instrument's range cuts off the LEDs; emission beyond it is assumed constant.",
         ),
     ]
 
@@ -104,7 +104,7 @@ def _picture_figures(record: SpectralonCalibration) -> list[Figure]:
             value=100 * record.unevenness,
             unit="%",
             high=UNEVEN_PERCENT,
-            advice="Clean the Spectralon and keep shadows and reflections off.",
+            advice="Clean the Spectralon and avoid shadows and reflections.",
         ),
         Figure(
             name="white over red + green + blue in the pictures, largest difference",

@@ -118,8 +118,8 @@ def verdict(
         why = "it may be tilted in the beam" if shift < 0 else "its curve is not the one assumed"
         return (
             False,
-            f"{name}: it passes light {abs(shift):.1f} nm {'less' if shift < 0 else 'more'} than it should;"
-            f" {why}",
+            f"{name}: it passes wavelengths {abs(shift):.1f} nm {'shorter' if shift < 0 else 'longer'} than"
+            f" it should; {why}",
         )
     return False, ""
 

@@ -170,7 +170,7 @@ def exposure_line(
     if len(np.unique(exposure)) < _MIN_EXPOSURES:
         raise CalibrationError(
             f"The {('red', 'green', 'blue')[channel]} channel clips at all but {len(np.unique(exposure))}"
-            " exposures, too few for a line. Close the aperture of the camera or dim the light."
+            " exposures, too few to fit a line. Close the aperture of the camera or dim the light."
         )
     signal = value - dark.level_dn.value
     std = np.hypot(transfer.mean_std(signal, sizes.pixels[channel]), STEADINESS * signal)

@@ -39,7 +39,7 @@ def selftest_figures(found: SelfTest) -> tuple[Figure, ...]:
             found.ambient.share_of_white,
             "1",
             high=AMBIENT,
-            advice="Switch lamps off and keep daylight out; what remains is the projector's own black.",
+            advice="Switch off lamps and keep daylight out; what remains is the projector's own black.",
         ),
     )
 
@@ -134,7 +134,7 @@ def _projector(projector: ProjectorCheck) -> Iterator[Figure]:
         projector.black_fraction,
         "1",
         high=BLACK,
-        advice="Switch lamps off; otherwise lower the projector's brightness offset.",
+        advice="Switch off lamps; otherwise lower the projector's brightness offset.",
     )
 
 
@@ -179,7 +179,7 @@ def _cycle(cycle: CycleCheck) -> Iterator[Figure]:
             worst,
             "%",
             high=None if published else BEAT_PERCENT + 3 * beat.floor_percent,
-            advice=f"Use {safe} ms, which contain whole cycles."
+            advice=f"Use {safe} ms, which are whole cycles."
             if published
             else "The light is not steady over whole cycles: switch off lamps, let the projector warm up, and"
             " repeat.",

@@ -71,7 +71,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
                 "chart",
                 "Color Checker",
                 f"Film off. Place the chart about {self.depth_mm / 10:g} cm from the camera, facing it, all"
-                " 24 patches in view. Keep the room dark and reflections off.",
+                " 24 patches in view. Keep the room dark and avoid reflections.",
                 Placement(target="color-checker", film=False, options={"depth_mm": self.depth_mm}),
             ),
         )

@@ -82,7 +82,7 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
         if len(steps) < MIN_POSES:
             raise CalibrationError(f"{len(steps)} poses are too few; {MIN_POSES} are needed, 10 are good.")
         unwanted = [
-            LeftOut(name=step.title, reason="A person left it out.", by_hand=True)
+            LeftOut(name=step.title, reason="Left out by hand.", by_hand=True)
             for step in every
             if step.key in self.left_out
         ]

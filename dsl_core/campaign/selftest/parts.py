@@ -130,7 +130,7 @@ def find_level(
     if clips:
         raise CalibrationError(
             f"The picture clips at {exposure_ms:.3g} ms even when the projector is nearly black: ambient"
-            " light or the projector's black is too bright. Switch lamps off, then close the aperture."
+            " light or the projector's black is too bright. Switch off lamps, then close the aperture."
         )
     return drive
 
@@ -154,8 +154,8 @@ def capture_dark(recorder: Recorder, unit_ms: float) -> tuple[Readings, Frames]:
     while _brightest(recorder, recorder.snap(units * unit_ms)) > 0.9 * recorder.full_scale_dn:
         if units == 1:
             raise CalibrationError(
-                f"Ambient light alone fills the scale within {unit_ms:.3g} ms, one colour cycle. Switch lamps"
-                " off and keep daylight out."
+                f"Ambient light alone saturates the picture within {unit_ms:.3g} ms, one colour cycle. Switch"
+                " off lamps and keep daylight out."
             )
         units = units // 2
     frames = [_pair(recorder, units * unit_ms) for _ in range(_LONG_DARK_PAIRS)]

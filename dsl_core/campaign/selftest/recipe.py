@@ -67,7 +67,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
                 std=seen.ambient_std,
                 unit="1",
                 high=AMBIENT + 3 * seen.ambient_std,
-                advice="Switch lamps off and keep daylight out.",
+                advice="Switch off lamps and keep daylight out.",
             ),
         )
 

@@ -200,8 +200,8 @@ def _find_region(
         beside.append(np.flatnonzero(own & dark))
     if min(len(each) for each in lit) < _FEWEST_PIXELS:
         raise CalibrationError(
-            "Too few pixels see the projected picture brightly in red, green and blue. Put a white target in"
-            " view that fills the picture, and check that all three LEDs of the projector light."
+            "The projected picture is bright enough in red, green and blue on too few pixels. Put a white"
+            " target in view that fills the picture, and check that all three LEDs of the projector light."
         )
     if min(len(each) for each in beside) < _FEWEST_BESIDE:
         beside = [np.empty(0, np.int64)] * 3

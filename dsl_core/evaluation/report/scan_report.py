@@ -163,7 +163,7 @@ def _spectra(content: ReportContent, pixels: Sequence[tuple[int, int]]) -> list[
 def _patch_note(patch: PatchScore) -> str:
     if patch.peak is not None:
         return f"FWHM {patch.peak.fwhm_nm:.1f} nm"
-    return f"RMSE {patch.rmse:.3f} · ΔE₀₀ {patch.delta_e:.1f}"
+    return f"RMSE {patch.rmse:.3f} · ΔE00 {patch.delta_e:.1f}"
 
 
 def _true_spectrum(

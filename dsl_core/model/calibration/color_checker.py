@@ -60,17 +60,17 @@ class ColorCheckerCalibration(Record):
 
     @property
     def residual(self) -> float:
-        """Rms of the patches' residuals."""
+        """RMS of the patches' residuals."""
         return _rms([patch.residual for patch in self.patches])
 
     @property
     def held_out(self) -> float:
-        """Rms of the patches' held-out residuals."""
+        """RMS of the patches' held-out residuals."""
         return _rms([patch.held_out for patch in self.patches])
 
     @property
     def start(self) -> float:
-        """Rms of the patches' residuals before the refinement."""
+        """RMS of the patches' residuals before the refinement."""
         return _rms([patch.start for patch in self.patches])
 
 

@@ -52,7 +52,9 @@ class Halo(Effect):
         if limits.halo == 0:
             return limits.of_dn(0.0, "there is no film, or it does not scatter")
         share = limits.halo / (1 + limits.halo)
-        return limits.of_share(share, f"it holds {100 * limits.halo:.2g} % of the light of a white pattern")
+        return limits.of_share(
+            share, f"it contains {100 * limits.halo:.2g} % of the light of a white pattern"
+        )
 
     def leave_out(self, path: LightPath) -> LightPath:
         """See `Effect`."""

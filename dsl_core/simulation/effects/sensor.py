@@ -140,7 +140,7 @@ class Quantisation(Effect):
 
     def bound(self, limits: Limits) -> EffectBound:
         """Half a count."""
-        return limits.of_dn(0.5, "frames hold whole numbers")
+        return limits.of_dn(0.5, "frames contain whole numbers")
 
     def leave_out(self, path: LightPath) -> LightPath:
         """A frame cannot hold anything else."""

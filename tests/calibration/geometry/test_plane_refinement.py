@@ -135,7 +135,7 @@ def _samples(truth: Rig) -> list[ColumnSamples]:
 def test_a_bowed_plane_is_named() -> None:
     truth, samples = small_rig(), _samples(small_rig())
     samples[1] = seen(truth, 750.0, np.random.default_rng(0), bow_mm=3.0)
-    with pytest.raises(CalibrationError, match=r"750 mm are .* mm rms off a plane"):
+    with pytest.raises(CalibrationError, match=r"750 mm are .* mm RMS off a plane"):
         refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
 
 

@@ -49,7 +49,7 @@ def test_tilted_filter_is_a_doubt() -> None:
     found = found_wavelengths(published_rig(), filters)[index]
     unusable, sentence = verdict(filters[index], found, 3.0, 1.0)
     assert not unusable
-    assert "nm less than it should; it may be tilted" in sentence
+    assert "nm shorter than it should; it may be tilted" in sentence
 
 
 def test_broad_light_is_no_filter() -> None:

@@ -50,7 +50,7 @@ HEADS = (
         for name in CHANNELS
     ),
     ("Expected, %", "Expected from the refined curves: red, green, blue"),
-    ("In fit", "Rms of measured minus modelled signals, % of the patch's white"),
+    ("In fit", "RMS of measured minus modelled signals, % of the patch's white"),
     ("Held out", "The same with curves fitted without the patch"),
 )
 
@@ -73,7 +73,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         self.table = NumberTable("Patches", HEADS)
         self.residuals = ChartBox(
             "Residuals of the patches",
-            "Rms of measured minus modelled signals; held out: with curves fitted without the patch.",
+            "RMS of measured minus modelled signals; held out: with curves fitted without the patch.",
             "Of white (%)",
             "",
         )

@@ -65,8 +65,8 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         self._curves: tuple[StageCurve, ...] | Exception | None = None
         self.planes = ChartBox(
             "Scatter about the plane",
-            "Rms distance of the triangulated points from their plane, by position of the stage.",
-            "Rms (mm)",
+            "RMS distance of the triangulated points from their plane, by position of the stage.",
+            "RMS (mm)",
             "Position (mm)",
         )
         self.steps = ChartBox(
@@ -78,9 +78,9 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         self.film = NumberTable("Film", FILM_HEADS, words=(0, 4))
         self.held_out = ChartBox(
             "Error of held-out first orders",
-            "Rms error, in columns of the projector, of what was held out of the fit in turn; all include the"
+            "RMS error, in columns of the projector, of what was held out of the fit in turn; all include the"
             " noise of the samples.",
-            "Rms (px)",
+            "RMS (px)",
             "",
         )
         self.shifts = ChartBox(

@@ -31,12 +31,12 @@ if TYPE_CHECKING:
 HEADS = (
     ("Pose", "Untick a pose to solve again without it"),
     ("Corners", "Corners of the board that were found, and how many of them are outliers"),
-    ("Camera, px", "Rms error of the corners in the camera's picture"),
-    ("Projector, px", "Rms error of the corners in the projector's picture"),
+    ("Camera, px", "RMS error of the corners in the camera's picture"),
+    ("Projector, px", "RMS error of the corners in the projector's picture"),
     ("At, mm", "Mean distance of the board along the camera's axis"),
     ("Tilt, °", "Angle between board and image plane"),
     ("Square, mm", "Side of a square, triangulated, with its deviation"),
-    ("Plane, mm", "Rms distance of the triangulated corners from their best plane"),
+    ("Plane, mm", "RMS distance of the triangulated corners from their best plane"),
     ("Verdict", "Whether the pose is used, and why not"),
 )
 
@@ -50,15 +50,15 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         self._unticked: frozenset[str] = frozenset()
         self.coverage = ChartBox(
             "Corners over the camera's picture",
-            "Each dot is a corner of the board; shaded cells hold one. The selected pose is marked.",
+            "Each dot is a corner of the board; shaded cells contain one. The selected pose is marked.",
             "Row (px)",
             "Column (px)",
             prepare=like_a_picture,
         )
         self.errors = ChartBox(
             "Error of each pose",
-            f"Rms distance of corners from their expected positions; below {GOOD_RMS_PX} px is good.",
-            "Rms error (px)",
+            f"RMS distance of corners from their expected positions; below {GOOD_RMS_PX} px is good.",
+            "RMS error (px)",
             "Pose",
             left_width=60,
         )

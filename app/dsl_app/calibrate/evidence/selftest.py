@@ -133,7 +133,7 @@ class SelfTestEvidence(Evidence[SelfTest]):
             draw_points(box, ramp.level, off, None, colours[ramp.colour], size=5)
             span = max(span, 1.1 * float(np.abs(off[ramp.level > DIM]).max(initial=0)))
         for limit in (-RAMP_PERCENT, RAMP_PERCENT):
-            level_line(box, limit, self._theme.bad, "limit, rms" if limit > 0 else "")
+            level_line(box, limit, self._theme.bad, "limit, RMS" if limit > 0 else "")
         box.item.setRange(xRange=(0, 1), yRange=(-span, span), padding=0.02)
         box.name_curves(
             [

@@ -133,8 +133,8 @@ def _words(record: SpectralonCalibration) -> str:
     emission, plane = record.emission, record.plane
     added = with_spread(emission.additivity, emission.additivity_std)
     return (
-        f"White over the sum of the LEDs, by spectra: {added}, from {emission.readings} readings."
-        f" Target {plane.distance_mm:.0f} mm away, tilted by {plane.tilt_deg:.1f}°."
-        f" Unevenness left by the flat field: {100 * record.unevenness:.2f} % rms; reduced χ² of an even"
-        f" camera {record.flat_field_chi_square:.1f}."
+        f"White over the sum of the LEDs, by spectra: {added}, from {emission.readings} readings. Target"
+        f" {plane.distance_mm:.0f} mm away, tilted by {plane.tilt_deg:.1f}°. Unevenness left by the flat"
+        f" field: {100 * record.unevenness:.2f} % RMS; reduced χ² of an even camera"
+        f" {record.flat_field_chi_square:.1f}."
     )

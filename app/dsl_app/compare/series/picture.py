@@ -28,8 +28,8 @@ class SeriesPicture(QWidget):
         self.canvas = pg.GraphicsLayoutWidget()
         self.canvas.setAccessibleName("Residuals of the plane")
         self.canvas.setToolTip(
-            "How far each pixel is behind (red) or in front of (blue) the plane of the target; empty where it"
-            " is not counted."
+            "How far each pixel is behind (red) or in front of (blue) the plane of the target; blank where"
+            " it is not counted."
         )
         self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
         self.image = pg.ImageItem(axisOrder="row-major")

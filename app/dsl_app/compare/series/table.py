@@ -27,7 +27,7 @@ TIPS = {
     "Depth (mm)": "RMS error of depth, over single pixels",
     "Reflectance": "RMS error of reflectance, over single pixels and bands",
     "Angle (rad)": "Mean angle between spectra",
-    "Remark": "Why a result does not count, or whether no faster scan beats it",
+    "Remark": "Why a result is not counted, or whether no faster scan beats it",
 }
 POSITION = 1
 

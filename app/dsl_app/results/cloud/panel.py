@@ -78,7 +78,7 @@ class CloudPanel(QWidget):
 
     def _prepare(self) -> None:
         self._is_preparing = True
-        self._hint.setText("Preparing the 3D view …")
+        self._hint.setText("Preparing the 3D view…")
         self._runner.submit(
             Job(
                 "Prepare the 3D view",

@@ -82,7 +82,7 @@ FIGURES: tuple[ForecastFigure, ...] = (
         axis="angle (rad)",
     ),
     ForecastFigure(
-        "delta_e", "Colour ΔE₀₀", "CIEDE2000 under D65, of patch means", "{:.2f}".format, axis="ΔE₀₀"
+        "delta_e", "Colour ΔE00", "CIEDE2000 under D65, of patch means", "{:.2f}".format, axis="ΔE00"
     ),
     ForecastFigure(
         "fwhm_nm",

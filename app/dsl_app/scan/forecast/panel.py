@@ -32,7 +32,7 @@ ROW_PX = 19
 NOTHING_YET = (
     "Nothing is predicted yet. Predictions need a connected rig with a calibration, and no running scan."
 )
-_HEADS = ("Expected of", "This plan", "Published", "Last scan")
+_HEADS = ("Figure", "This plan", "Published", "Last scan")
 CHART = "a Color Checker at 700 mm"
 
 
@@ -195,7 +195,7 @@ class ForecastPanel(QWidget):
         elif state.refusal.value:
             text = state.refusal.value
         elif not state.points.value:
-            text = "Predicting …" if total else NOTHING_YET
+            text = "Predicting…" if total else NOTHING_YET
         else:
             scene = CHART if state.look.value is None else f"the scene of {state.look.value.stem}"
             origin = f"Expected from the calibration, for {scene} (press F1 to read how)."

@@ -67,7 +67,7 @@ def calibration(**changes: Any) -> GeometryCalibration:
         poses=(pose(1), pose(2), pose(4, used=False), pose(5)),
         left_out=(
             LeftOut(name="Pose 3", reason="The board was not found."),
-            LeftOut(name="Pose 6", reason="A person left it out.", by_hand=True),
+            LeftOut(name="Pose 6", reason="Left out by hand.", by_hand=True),
         ),
         warnings=("Pose 2 is blurred: focus.",),
     )
