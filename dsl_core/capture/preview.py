@@ -118,7 +118,7 @@ def _focus(green: NDArray[np.uint16]) -> float:
 
 
 @dataclass(frozen=True)
-class IntensityGraph:
+class BlockGraph:
     """What a block of pixels saw of each pattern.
 
     ``position_px`` (patterns,) is where each pattern's first line begins on the projector; ``mean_dn``
@@ -132,7 +132,7 @@ class IntensityGraph:
     mean_dn: NDArray[np.float32]
 
 
-class IntensityGraphs:
+class BlockGraphs:
     """Collects spectral frames of a plan as block means."""
 
     def __init__(self, plan: CapturePlan, bayer: BayerPattern, budget_bytes: int = BUDGET_BYTES) -> None:
@@ -161,7 +161,7 @@ class IntensityGraphs:
             self._means[shot.setting, shot.pattern, channel] = sums / cells**2
         self._there[shot.setting, shot.pattern] = True
 
-    def graph(self, pixel: tuple[int, int]) -> IntensityGraph | None:
+    def graph(self, pixel: tuple[int, int]) -> BlockGraph | None:
         """The graph of the block around a pixel ``(x, y)``; None outside the image."""
         row, column = pixel[1] // self.block_px, pixel[0] // self.block_px
         rows, columns = self._means.shape[-2:]
@@ -169,7 +169,7 @@ class IntensityGraphs:
             return None
         means = self._means[..., row, column].copy()
         means[~self._there] = np.nan
-        return IntensityGraph(pixel, self.block_px, line_positions(self._plan), means)
+        return BlockGraph(pixel, self.block_px, line_positions(self._plan), means)
 
 
 def line_positions(plan: CapturePlan) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from dsl_core.errors import DslError
 WINDOW = EntryPoint("dsl-scan-gui", "dsl_app.__main__:main", "gui_scripts")
 
 
-class Theme(StrEnum):
+class Colours(StrEnum):
     """Colours of the window."""
 
     SYSTEM = "system"
@@ -31,7 +31,7 @@ def gui(
     rig: Annotated[str | None, typer.Option(help="Rig to connect instead of the last one used.")] = None,
     option: RigOptions = [],  # noqa: B006
     demo: Annotated[bool, typer.Option("--demo", help="Open a finished scan of the twin.")] = False,
-    theme: Annotated[Theme | None, typer.Option(help="Colours to use instead of the last ones.")] = None,
+    theme: Annotated[Colours | None, typer.Option(help="Colours to use instead of the last ones.")] = None,
 ) -> None:
     """Open the window: scan, calibrate and read spectra by hand."""
     words = [] if path is None else [str(path)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.capture.preview import IntensityGraphs, line_positions, quick_picture, statistics
+from dsl_core.capture.preview import BlockGraphs, line_positions, quick_picture, statistics
 from dsl_core.capture.sink import MemorySink, WatchedSink
 from dsl_core.errors import DecodeError
 from dsl_core.model.frames import Frame
@@ -80,7 +80,7 @@ def lines(setting: int) -> list[Shot]:
 
 @pytest.mark.parametrize("bayer", ["RGGB", "GBRG"])
 def test_a_graph_fills_frame_by_frame(bayer: BayerPattern) -> None:
-    graphs = IntensityGraphs(PLAN, bayer)
+    graphs = BlockGraphs(PLAN, bayer)
     mosaic = np.asarray((40, 30, 20), np.uint16)[bayer_channels(bayer, 10, 18)]
     graphs.add(lines(1)[2], mosaic)
     graph = graphs.graph((3, 4))
@@ -92,7 +92,7 @@ def test_a_graph_fills_frame_by_frame(bayer: BayerPattern) -> None:
 
 
 def test_blocks_are_means_and_grow_until_the_budget_holds() -> None:
-    graphs = IntensityGraphs(PLAN, "RGGB", budget_bytes=2000)
+    graphs = BlockGraphs(PLAN, "RGGB", budget_bytes=2000)
     assert graphs.block_px == 4
     mosaic = np.zeros((10, 18), np.uint16)
     mosaic[0::2, 0::2] = np.arange(9) * 10
@@ -104,14 +104,14 @@ def test_blocks_are_means_and_grow_until_the_budget_holds() -> None:
 
 
 def test_other_frames_and_places_outside_give_nothing() -> None:
-    graphs = IntensityGraphs(PLAN, "RGGB")
+    graphs = BlockGraphs(PLAN, "RGGB")
     graphs.add(next(PLAN.shots()), np.full((10, 18), 7, np.uint16))
     inside = graphs.graph((0, 0))
     assert inside is not None
     assert np.isnan(inside.mean_dn).all()
     assert graphs.graph((18, 0)) is None
     none = PLAN.model_copy(update={"spectral": NoSpectral()})
-    assert IntensityGraphs(none, "RGGB").graph((0, 0)) is None
+    assert BlockGraphs(none, "RGGB").graph((0, 0)) is None
 
 
 def test_patterns_without_lines_are_counted() -> None:

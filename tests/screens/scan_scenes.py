@@ -11,7 +11,7 @@ from dsl_app.connection.state import RigChoice
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.forecast.controller import ForecastController
 from dsl_app.scan.forecast.job import usual_candidates
-from dsl_app.scan.forecast.state import Measured
+from dsl_app.scan.forecast.state import MeasuredScan
 from dsl_app.scan.page import ScanPage
 from dsl_app.scan.state import Phase, ScanState
 
@@ -126,7 +126,7 @@ def forecast(stage: Stage) -> None:
     stage.shoot("afterwards")
 
 
-def _only(control: ForecastController) -> Measured:
+def _only(control: ForecastController) -> MeasuredScan:
     found = control.state.measured.value
     assert found is not None
     return found

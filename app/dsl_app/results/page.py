@@ -33,7 +33,7 @@ from dsl_app.results.welcome import Offer, Welcome
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.figure_file import Figure
+from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import label, push_button, splitter
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.page import PageWidget
@@ -262,13 +262,13 @@ class ResultsPage(PageWidget):
         """The command that reconstructs or exports what is open."""
         return self._control.command_line()
 
-    def figure(self) -> Figure | None:
+    def figure(self) -> PlotFigure | None:
         """The spectra, if there are any."""
         result, spectra = self._state.result.value, self._spectra.made
         if result is None or not result.has_spectra or spectra is None:
             return None
         name = f"{result.path.stem}_spectra"
-        return Figure(name, spectra.plot, spectra.apply_theme, spectra.named_curves)
+        return PlotFigure(name, spectra.plot, spectra.apply_theme, spectra.named_curves)
 
     def release(self) -> None:
         """Release the graphics and stop following the recent files."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dsl_app.scan.state import LivePicture
-from dsl_core.capture.preview import IntensityGraph, IntensityGraphs, quick_picture
+from dsl_core.capture.preview import BlockGraph, BlockGraphs, quick_picture
 from dsl_core.capture.runner import Runner, Status
 from dsl_core.devices.base import CameraInfo, DeviceRig
 from dsl_core.model.frames import Frame
@@ -44,7 +44,7 @@ class ScanJob:
         #: A lock of its own: the runner reports its status under a lock, and that takes the other one.
         self._pausing = threading.Lock()
         self._is_paused = False
-        self._graphs: IntensityGraphs | None = None
+        self._graphs: BlockGraphs | None = None
         self._status: Status | None = None
         self._picture: LivePicture | None = None
 
@@ -63,7 +63,7 @@ class ScanJob:
         else:
             devices, overridden = self._calibrated()
             plan, notes = request.plan, request.notes | overridden
-        graphs = IntensityGraphs(plan, devices.camera.info.bayer)
+        graphs = BlockGraphs(plan, devices.camera.info.bayer)
         if request.is_resumed:
             self._read_before(graphs, progress)
         self._graphs = graphs
@@ -89,7 +89,7 @@ class ScanJob:
         devices, overridden = with_calibration(request.devices, request.calibration, request.override)
         return devices, {"calibration_overridden": "; ".join(overridden)} if overridden else {}
 
-    def _read_before(self, graphs: IntensityGraphs, progress: Progress) -> None:
+    def _read_before(self, graphs: BlockGraphs, progress: Progress) -> None:
         """Add the frames of earlier runs to the graphs."""
         from dsl_core.io.scan.folder import ScanReader
 
@@ -123,7 +123,7 @@ class ScanJob:
             self._status = self._picture = None
         return news
 
-    def graph(self, pixel: tuple[int, int]) -> IntensityGraph | None:
+    def graph(self, pixel: tuple[int, int]) -> BlockGraph | None:
         """The intensity graph of a pixel, as far as captured."""
         return None if self._graphs is None else self._graphs.graph(pixel)
 

@@ -30,7 +30,7 @@ from dsl_app.scan.state import Phase, Reconnection, ScanState
 from dsl_app.scan.view import ScanView
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.figure_file import Figure
+from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.page import PageWidget
@@ -217,12 +217,12 @@ class ScanPage(PageWidget):
         """The command that captures this scan."""
         return self._controller.command_line()
 
-    def figure(self) -> Figure | None:
+    def figure(self) -> PlotFigure | None:
         """The curve of accuracy against time, once predicted."""
         curve = self.forecast.curve.made
         if curve is None or not curve.front():
             return None
-        return Figure("accuracy-against-time", curve.plot, curve.apply_theme)
+        return PlotFigure("accuracy-against-time", curve.plot, curve.apply_theme)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

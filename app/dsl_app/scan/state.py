@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Event, Value
-from dsl_core.capture.preview import IntensityGraph
+from dsl_core.capture.preview import BlockGraph
 from dsl_core.capture.runner import State, Status
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.model.presets import PRESETS, Preset, on_cycles
@@ -137,7 +137,7 @@ class ScanState:
         self.note = Value("")
         self.picture: Value[LivePicture | None] = Value(None)
         self.cursor: Value[tuple[int, int] | None] = Value(None)
-        self.graph: Value[IntensityGraph | None] = Value(None)
+        self.graph: Value[BlockGraph | None] = Value(None)
         self.result: Event[Path] = Event()
 
     @property

@@ -17,7 +17,7 @@ from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.pictures import arrow_step
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
-from dsl_core.capture.preview import IntensityGraph
+from dsl_core.capture.preview import BlockGraph
 from dsl_core.model.plan import CapturePlan, Shot
 
 #: Red, green and blue of the camera: they are data and the same in every theme.
@@ -159,7 +159,7 @@ class GraphPlot(QWidget):
         column.addWidget(self._title)
         column.addWidget(self.plot, 1)
 
-    def show_graph(self, graph: IntensityGraph | None) -> None:
+    def show_graph(self, graph: BlockGraph | None) -> None:
         """Draw a graph, as far as captured."""
         if graph is None:
             self._title.setText("Intensity graph")

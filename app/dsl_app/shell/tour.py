@@ -20,7 +20,7 @@ _BACK = (Qt.Key.Key_Left, Qt.Key.Key_Backspace, Qt.Key.Key_PageUp)
 
 
 @dataclass(frozen=True)
-class Step:
+class TourStep:
     """One step: the page it is about, the object name of the widget it points at, and its text."""
 
     page: str
@@ -29,50 +29,50 @@ class Step:
     text: str
 
 
-STEPS: tuple[Step, ...] = (
-    Step(
+STEPS: tuple[TourStep, ...] = (
+    TourStep(
         "rig",
         "rail",
         "Five pages, in the order of the work",
         "Rig, Calibrate, Scan, Results, Compare. Ctrl+1 to Ctrl+5 open them. You need no hardware: a"
         " simulated rig is included.",
     ),
-    Step(
+    TourStep(
         "rig",
         "live-view",
         "Camera picture",
         "Start the live view to see raw frames with their histogram. Red cells are saturated; the focus score"
         " rises as edges get sharper. The display never changes what is saved.",
     ),
-    Step(
+    TourStep(
         "scan",
         "scan-plan",
         "What to scan",
         "Choose a preset, or your own patterns and exposures. The curve next to it shows what accuracy costs"
         " in time on this rig.",
     ),
-    Step(
+    TourStep(
         "scan",
         "scan-run",
         "Start, pause, resume",
         "Frames, time and disk space are shown before the start, and so is anything that prevents it. Every"
         " frame is saved before the next one is captured: a scan can always be resumed.",
     ),
-    Step(
+    TourStep(
         "results",
         "spectra",
         "Spectra with their uncertainty",
         "The spectrum under the cursor, with its 95 % band; dashed where there was no light and only the"
         " smoothness prior decides. Click the picture to pin it; drop a spectroradiometer file to compare.",
     ),
-    Step(
+    TourStep(
         "results",
         "result-pictures",
         "Five views, one cursor",
         "Keys 1 to 5: colours, one band, depth, quality, and the 3D cloud. All share one cursor, and the key"
         " I shows what its pixel received from each line.",
     ),
-    Step(
+    TourStep(
         "results",
         "menu-bar",
         "Help wherever you are",
@@ -91,7 +91,7 @@ class Tour(QWidget):
     step_changed = Signal(object)
     ended = Signal()
 
-    def __init__(self, steps: Sequence[Step], theme: Theme, window: QWidget) -> None:
+    def __init__(self, steps: Sequence[TourStep], theme: Theme, window: QWidget) -> None:
         super().__init__(window)
         self._window = window
         self._steps, self._theme, self._at = tuple(steps), theme, 0
@@ -128,7 +128,7 @@ class Tour(QWidget):
         return card
 
     @property
-    def step(self) -> Step:
+    def step(self) -> TourStep:
         """The step that is shown."""
         return self._steps[self._at]
 

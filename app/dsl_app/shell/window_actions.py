@@ -21,7 +21,7 @@ from dsl_app.shared.widgets.figure_file import FORMATS, save_figure
 from dsl_app.shared.widgets.help_window import help_of, help_window
 from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.paged_window import PagedWindow
-from dsl_app.shell.tour import STEPS, Step, Tour
+from dsl_app.shell.tour import STEPS, Tour, TourStep
 from dsl_core import __version__
 from dsl_core.errors import DslError
 from dsl_core.io.staging import staged
@@ -144,7 +144,7 @@ class WindowActions:
         self._tour.start()
         self._parts.settings.tour_seen = True
 
-    def _show_step(self, step: Step) -> None:
+    def _show_step(self, step: TourStep) -> None:
         page = self._window.open_page(step.page)
         # Parts of a result only exist while one is open.
         target = self._window.findChild(QWidget, step.target)

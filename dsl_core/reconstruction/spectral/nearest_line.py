@@ -17,7 +17,7 @@ from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.demosaic import demosaic
 from dsl_core.optics.spectra import hat_moments
 from dsl_core.progress import Progress
-from dsl_core.reconstruction.spectral.published_objective import Measured, PublishedReconstruction
+from dsl_core.reconstruction.spectral.published_objective import LineData, PublishedReconstruction
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
 
@@ -33,7 +33,7 @@ class NearestLine(PublishedReconstruction):
     Bands that the chosen order does not reach take the value of the nearest band that it does.
     """
 
-    def fit(self, measured: Measured) -> Tensor:
+    def fit(self, measured: LineData) -> Tensor:
         """Spectra (bands, pixels), 0 to 1.5."""
         white = measured.first_white
         power = white.square().sum(0).clip(min=1e-12)

@@ -54,7 +54,7 @@ class AdamOptions:
 
 
 @dataclass(frozen=True)
-class Measured:
+class LineData:
     """One pixel set's intensities in units of white, their model and weights.
 
     ``first`` and ``first_white`` (3, bands, pixels); ``zero`` (3, pixels) and ``zero_white`` (3, bands);
@@ -129,7 +129,7 @@ class PublishedReconstruction:
             work_through(work, starts, threads, "spectra", progress)
         return out
 
-    def fit(self, measured: Measured) -> Tensor:
+    def fit(self, measured: LineData) -> Tensor:
         """Spectra (bands, pixels) that minimise the objective."""
         return fit(measured, self.options)
 
@@ -187,7 +187,7 @@ class PublishedReconstruction:
         kappa: Tensor,
         first: Tensor,
         zero: Tensor,
-    ) -> Measured:
+    ) -> LineData:
         shading = torch.as_tensor(self.pixels.shading.ravel()[flat], dtype=torch.float32)
         white = torch.zeros_like(first)
         for m in ORDERS:
@@ -199,7 +199,7 @@ class PublishedReconstruction:
         zero_white = torch.as_tensor(moments.sum(1), dtype=torch.float32)
         unit, zero_unit = white.amax().clip(min=1e-12), zero_white.sum(1).amax().clip(min=1e-12)
         to_device = self.device
-        return Measured(
+        return LineData(
             torch.where(reached, first / (shading * unit), 0.0).to(to_device),
             (white / unit).to(to_device),
             (zero / (shading * zero_unit)).to(to_device),
@@ -233,7 +233,7 @@ class PublishedReconstruction:
         out.reach.reshape(self.grid.count, -1)[:, flat] = reach.to(torch.uint8).numpy()
 
 
-def objective(spectra: Tensor, measured: Measured, smoothness: float) -> Tensor:
+def objective(spectra: Tensor, measured: LineData, smoothness: float) -> Tensor:
     """Sum over pixels of the L1 terms and the smoothness of spectra (bands, pixels), all per band."""
     bands = spectra.shape[0]
     misfit = (measured.first_white * spectra - measured.first).abs().sum(0)
@@ -243,7 +243,7 @@ def objective(spectra: Tensor, measured: Measured, smoothness: float) -> Tensor:
     return (measured.kappa * first + (1 - measured.kappa) * zero + smoothness * rough).sum()
 
 
-def fit(measured: Measured, options: AdamOptions) -> Tensor:
+def fit(measured: LineData, options: AdamOptions) -> Tensor:
     """Spectra (bands, pixels) in 0..1 that minimise the objective from a grey start, by Adam."""
     free = torch.zeros_like(measured.first[0], requires_grad=True)
     adam = torch.optim.Adam([free], lr=options.learning_rate)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.simulation.scenes.surfaces import HeightField, Surface
+from dsl_core.simulation.scenes.surfaces import HeightField, Shape
 from dsl_core.simulation.scenes.truth import Parts, SceneTruth
 
 Floats = NDArray[np.float64]
@@ -103,7 +103,7 @@ class Patches:
         factors[factors < _FAINT] = 0.0
         return np.asarray(factors / np.maximum(factors.sum(1, keepdims=True), 1.0))
 
-    def visible(self, factors: Floats, surfaces: tuple[Surface, ...]) -> NDArray[np.bool_]:
+    def visible(self, factors: Floats, surfaces: tuple[Shape, ...]) -> NDArray[np.bool_]:
         """Which patches see each other past the surfaces of a scene, (N, N), where they exchange light."""
         seen = np.ones(factors.shape, bool)
         meet = (factors > 0) | (factors.T > 0)
@@ -149,7 +149,7 @@ def _side(normals: Floats) -> Indices:
     return np.asarray(2 * axis + (np.take_along_axis(normals, axis[None], 0)[0] > 0))
 
 
-def blocks(surface: Surface, start_mm: Floats, lines_mm: Floats) -> NDArray[np.bool_]:
+def blocks(surface: Shape, start_mm: Floats, lines_mm: Floats) -> NDArray[np.bool_]:
     """Whether a surface stands on lines (3, n) from a place, ends aside."""
     if isinstance(surface, HeightField):
         # A height field is made for rays from the front, so lines inside it are looked at place by place.

@@ -33,7 +33,7 @@ _DIFFERENCE_MM = 1e-3
 _MAX_STEPS = 4000
 
 
-class Surface(Protocol):
+class Shape(Protocol):
     """Something a ray can hit."""
 
     def intersect(self, origin: Floats, directions: Floats) -> Floats:
@@ -74,7 +74,7 @@ class Rectangle:
         )
 
     def intersect(self, origin: Floats, directions: Floats) -> Floats:
-        """See `Surface`: t = n.(centre - origin) / n.direction, kept where both coordinates are inside."""
+        """See `Shape`: t = n.(centre - origin) / n.direction, kept where both coordinates are inside."""
         normal = self.normal
         with np.errstate(divide="ignore"):
             t = (normal @ (self.centre_mm - origin)) / (normal @ directions)
@@ -86,11 +86,11 @@ class Rectangle:
         return t
 
     def normals(self, points: Floats) -> Floats:
-        """See `Surface`."""
+        """See `Shape`."""
         return np.broadcast_to(self.normal[:, None], points.shape)
 
     def paint(self, points: Floats) -> NDArray[np.int32]:
-        """See `Surface`."""
+        """See `Shape`."""
         return self.painter(*self._coordinates(points))
 
 
@@ -130,7 +130,7 @@ class Sphere:
     painter: Paint
 
     def intersect(self, origin: Floats, directions: Floats) -> Floats:
-        """See `Surface`: the nearer root of ``|o + t d - c|^2 = r^2``."""
+        """See `Shape`: the nearer root of ``|o + t d - c|^2 = r^2``."""
         offset = origin - self.centre_mm
         a = np.einsum("in,in->n", directions, directions)
         half_b = offset @ directions
@@ -139,11 +139,11 @@ class Sphere:
         return np.where((disc >= 0) & (t > 0), t, np.inf)
 
     def normals(self, points: Floats) -> Floats:
-        """See `Surface`."""
+        """See `Shape`."""
         return (points - self.centre_mm[:, None]) / self.radius_mm
 
     def paint(self, points: Floats) -> NDArray[np.int32]:
-        """See `Surface`."""
+        """See `Shape`."""
         return self.painter(points[0] - self.centre_mm[0], points[1] - self.centre_mm[1])
 
 
@@ -156,7 +156,7 @@ class Block:
     material: int
 
     def intersect(self, origin: Floats, directions: Floats) -> Floats:
-        """See `Surface`: the slab method; rays that start inside do not count."""
+        """See `Shape`: the slab method; rays that start inside do not count."""
         with np.errstate(divide="ignore", invalid="ignore"):
             first = (self.low_mm - origin)[:, None] / directions
             second = (self.high_mm - origin)[:, None] / directions
@@ -165,7 +165,7 @@ class Block:
         return np.where((enter <= leave) & (enter > 0), enter, np.inf)
 
     def normals(self, points: Floats) -> Floats:
-        """See `Surface`: the axis whose face is nearest."""
+        """See `Shape`: the axis whose face is nearest."""
         gap = np.minimum(np.abs(points - self.low_mm[:, None]), np.abs(points - self.high_mm[:, None]))
         result = np.zeros_like(points)
         axis = gap.argmin(axis=0)
@@ -173,7 +173,7 @@ class Block:
         return result
 
     def paint(self, points: Floats) -> NDArray[np.int32]:
-        """See `Surface`."""
+        """See `Shape`."""
         return np.full(points.shape[1], self.material, np.int32)
 
 
@@ -187,7 +187,7 @@ class HeightField:
     painter: Paint
 
     def intersect(self, origin: Floats, directions: Floats) -> Floats:
-        """See `Surface`.
+        """See `Shape`.
 
         Sphere tracing (J. C. Hart, The Visual Computer 12, 1996): the gap along z divided by the fastest
         rate at which a ray can close it is a step that never passes the surface.
@@ -206,7 +206,7 @@ class HeightField:
         return np.where(t > 0, t, np.inf)
 
     def normals(self, points: Floats) -> Floats:
-        """See `Surface`: from central differences of the height, ``(dz/dx, dz/dy, -1)`` made unit."""
+        """See `Shape`: from central differences of the height, ``(dz/dx, dz/dy, -1)`` made unit."""
         x, y = points[:2]
         h = _DIFFERENCE_MM
         slope_x = (self.height(x + h, y) - self.height(x - h, y)) / (2 * h)
@@ -215,7 +215,7 @@ class HeightField:
         return np.asarray(normals / np.linalg.norm(normals, axis=0))
 
     def paint(self, points: Floats) -> NDArray[np.int32]:
-        """See `Surface`."""
+        """See `Shape`."""
         return self.painter(points[0], points[1])
 
 
@@ -241,7 +241,7 @@ class Hits:
     lit: NDArray[np.bool_]
 
 
-def trace(surfaces: tuple[Surface, ...], rays: Floats, projector_centre_mm: Floats) -> Hits:
+def trace(surfaces: tuple[Shape, ...], rays: Floats, projector_centre_mm: Floats) -> Hits:
     """First hits of camera rays (3, n) with z = 1, and whether the projector's centre sees them."""
     nearest, owner = _first(surfaces, rays)
     count = rays.shape[1]
@@ -257,7 +257,7 @@ def trace(surfaces: tuple[Surface, ...], rays: Floats, projector_centre_mm: Floa
     return Hits(np.where(owner >= 0, nearest, np.nan), normals, material, lit)
 
 
-def materials_along(surfaces: tuple[Surface, ...], rays: Floats) -> NDArray[np.int32]:
+def materials_along(surfaces: tuple[Shape, ...], rays: Floats) -> NDArray[np.int32]:
     """Material of the first hits of camera rays (3, n) with z = 1; -1 where nothing is hit."""
     nearest, owner = _first(surfaces, rays)
     material = np.full(rays.shape[1], -1, np.int32)
@@ -267,7 +267,7 @@ def materials_along(surfaces: tuple[Surface, ...], rays: Floats) -> NDArray[np.i
     return material
 
 
-def _first(surfaces: tuple[Surface, ...], rays: Floats) -> tuple[Floats, NDArray[np.int64]]:
+def _first(surfaces: tuple[Shape, ...], rays: Floats) -> tuple[Floats, NDArray[np.int64]]:
     """Depth of the first hit of every ray, inf for none, and which surface it is on, -1 for none."""
     nearest = np.full(rays.shape[1], np.inf)
     owner = np.full(rays.shape[1], -1)
@@ -286,7 +286,7 @@ def _facing(normals: Floats, rays: Floats) -> Floats:
     return np.where(away, -normals, normals)
 
 
-def _lit(surfaces: tuple[Surface, ...], points: Floats, normals: Floats, centre: Floats) -> NDArray[np.bool_]:
+def _lit(surfaces: tuple[Shape, ...], points: Floats, normals: Floats, centre: Floats) -> NDArray[np.bool_]:
     """Whether points (3, n) face the projector and nothing stands between it and them."""
     beams = points - centre[:, None]
     lit = np.einsum("in,in->n", beams, normals) < 0

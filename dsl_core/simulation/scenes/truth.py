@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import PlanError
 from dsl_core.model.geometry import Lens
 from dsl_core.optics.pinhole import pixel_rays, rays_at
-from dsl_core.simulation.scenes.surfaces import Surface, materials_along, trace
+from dsl_core.simulation.scenes.surfaces import Shape, materials_along, trace
 
 #: Fine grid of all palettes, nm: 400 to 700 in steps of 1, shape (301,).
 FINE_NM: NDArray[np.float64] = np.arange(400.0, 701.0)
@@ -143,7 +143,7 @@ class Scene:
 
     name: str
     description: str
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[Shape, ...]
     materials: Materials
     mixed_edges: bool = False
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import torch
 
-from dsl_core.reconstruction.spectral.published_objective import AdamOptions, Measured, fit, objective
+from dsl_core.reconstruction.spectral.published_objective import AdamOptions, LineData, fit, objective
 
 
-def measured(truth: torch.Tensor, kappa: float) -> Measured:
+def measured(truth: torch.Tensor, kappa: float) -> LineData:
     """Exact data of spectra (bands, pixels) for three broad channels."""
     bands = torch.linspace(0, 1, len(truth))
     white = torch.stack([torch.exp(-0.5 * ((bands - c) / 0.3) ** 2) for c in (0.2, 0.5, 0.8)])
     zero_white = white / len(truth)
-    return Measured(
+    return LineData(
         white[:, :, None] * truth,
         white[:, :, None].expand(3, *truth.shape),
         zero_white @ truth,
@@ -54,5 +54,5 @@ def test_unreached_bands_have_no_say() -> None:
 def test_gradient_of_the_objective_agrees_with_differences() -> None:
     data = measured(smooth_spectra(), 0.7)
     spectra = torch.full((24, 3), 0.31, dtype=torch.float64, requires_grad=True)
-    double = Measured(*(part.double() if part.is_floating_point() else part for part in vars(data).values()))
+    double = LineData(*(part.double() if part.is_floating_point() else part for part in vars(data).values()))
     assert torch.autograd.gradcheck(lambda x: objective(x, double, 0.3), spectra, eps=1e-7, atol=1e-5)

@@ -30,7 +30,7 @@ class StepPage(QWidget):
         self.instruction.setAccessibleName("What to do")
         self.instruction.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.drawing = PlacementDrawing()
-        self.picture = LivePicture()
+        self.picture = LiveFrameView()
         self.verdict = label("", "muted", wraps=True)
         self.verdict.setAccessibleName("Whether the target is right")
         self.figures = FiguresTable("What the look found")
@@ -75,7 +75,7 @@ class StepPage(QWidget):
             part.apply_theme(theme)
 
 
-class LivePicture(QWidget):
+class LiveFrameView(QWidget):
     """The camera's last frame while a target is placed and captured; saturated pixels are red."""
 
     def __init__(self) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dsl_app.connection.state import RigState
 from dsl_app.scan.forecast.job import ForecastBasis, ForecastJob, usual_candidates
-from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, Measured, identity
+from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, MeasuredScan, identity
 from dsl_app.scan.plan import KEEPS_ITS_PLAN, ScanPlanController
 from dsl_app.scan.state import Phase, ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
@@ -216,7 +216,7 @@ class ForecastController:
         status, plan = self._scan.status.value, self._scan.plan.value
         seconds = None if self._is_faster_than_real else status.elapsed_s
         name = self._scan.target.value.stem
-        self.state.measured.set(Measured(name, plan, status.total, seconds, plan.raw_bytes))
+        self.state.measured.set(MeasuredScan(name, plan, status.total, seconds, plan.raw_bytes))
 
     @property
     def _is_faster_than_real(self) -> bool:
@@ -234,7 +234,7 @@ class ForecastController:
         if scan is None or scan.name != result.stem:
             return
 
-        def work(progress: Progress) -> Measured:
+        def work(progress: Progress) -> MeasuredScan:
             progress.report("compare with the truth", 0, 0)
             return measure(scan, result)
 
@@ -254,7 +254,7 @@ class ForecastController:
         self._stop()
 
 
-def measure(scan: Measured, result: Path) -> Measured:
+def measure(scan: MeasuredScan, result: Path) -> MeasuredScan:
     """The scan with the duration of its reconstruction and, where the truth is known, its errors."""
     from dsl_core.evaluation.summary import evaluate
     from dsl_core.io.result.result_file import load_result
@@ -270,7 +270,7 @@ def measure(scan: Measured, result: Path) -> Measured:
     return _with_errors(known, evaluate(found, truth))
 
 
-def _with_errors(scan: Measured, found: Evaluation) -> Measured:
+def _with_errors(scan: MeasuredScan, found: Evaluation) -> MeasuredScan:
     if found.depth is not None:
         scan = replace(scan, depth_rmse_mm=found.depth.rmse_mm, coverage=found.depth.coverage)
     if not found.patches:

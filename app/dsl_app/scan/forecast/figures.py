@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dsl_app.scan.forecast.state import Measured
+from dsl_app.scan.forecast.state import MeasuredScan
 
 if TYPE_CHECKING:
     from dsl_core.planning.prediction import Prediction
@@ -16,7 +16,7 @@ NOTHING = "–"
 
 @dataclass(frozen=True)
 class ForecastFigure:
-    """A figure: its field in `Prediction`, its format, and its field in `Measured` if different."""
+    """A figure: its field in `Prediction`, its format, and its field in `MeasuredScan` if different."""
 
     field: str
     title: str
@@ -32,7 +32,7 @@ class ForecastFigure:
         """The predicted value as text."""
         return _words(self, None if prediction is None else getattr(prediction, self.field))
 
-    def found(self, scan: Measured | None) -> str:
+    def found(self, scan: MeasuredScan | None) -> str:
         """The measured value as text."""
         return _words(self, None if scan is None else getattr(scan, self.measured or self.field))
 

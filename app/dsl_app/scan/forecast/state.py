@@ -46,7 +46,7 @@ class ForecastPoint:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredScan:
     """Measured figures of a scan; errors are None without a known truth, times on a rig that does not wait.
 
     ``rmse``, ``angle_rad`` and ``delta_e`` are means over patches, ``pixel_*`` those of single pixels.
@@ -86,7 +86,7 @@ class ForecastState:
         self.answer = Value("")
         self.look: Value[Path | None] = Value(None)
         self.last_look: Value[Path | None] = Value(None)
-        self.measured: Value[Measured | None] = Value(None)
+        self.measured: Value[MeasuredScan | None] = Value(None)
 
     @property
     def published(self) -> ForecastPoint | None:

@@ -25,7 +25,7 @@ SUFFIXES = (".svg", ".png")
 
 
 @dataclass(frozen=True)
-class Figure:
+class PlotFigure:
     """A plot that can be saved: its proposed file name, and what applies the colours of a theme.
 
     ``curves`` are those that the window names next to the plot; the file gets a legend instead.
@@ -37,7 +37,7 @@ class Figure:
     curves: tuple[tuple[Any, str], ...] = ()
 
 
-def save_figure(figure: Figure, path: Path, theme: Theme) -> None:
+def save_figure(figure: PlotFigure, path: Path, theme: Theme) -> None:
     """Write a figure as the screen shows it, but in the light theme; ``theme`` is applied again afterwards.
 
     Raises `StoreError` for an ending that is not in `SUFFIXES`, and when the file cannot be written.
@@ -55,7 +55,7 @@ def save_figure(figure: Figure, path: Path, theme: Theme) -> None:
     write_atomic(path, data)
 
 
-def _legend(figure: Figure) -> Any:
+def _legend(figure: PlotFigure) -> Any:
     legend = pg.LegendItem(offset=(-12, 8), labelTextColor=LIGHT.text, brush=pg.mkBrush(f"{LIGHT.base}d0"))
     # It scales with the figure.
     legend.setFlag(legend.GraphicsItemFlag.ItemIgnoresTransformations, False)

@@ -9,7 +9,7 @@ from PySide6.QtCore import QMimeData
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.figure_file import Figure
+from dsl_app.shared.widgets.figure_file import PlotFigure
 
 
 class PageWidget(QWidget):
@@ -23,7 +23,7 @@ class PageWidget(QWidget):
         """The command that does what the page does now; empty when there is none."""
         return ""
 
-    def figure(self) -> Figure | None:
+    def figure(self) -> PlotFigure | None:
         """The plot of the page that can be saved as a figure; None when there is none."""
         return None
 

@@ -13,7 +13,7 @@ from dsl_app.results.spectrum_panel import SpectrumPanel
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.spectrum import Spectrum
 from dsl_app.shared.theme import DARK, LIGHT
-from dsl_app.shared.widgets.figure_file import PNG_SCALE, Figure, save_figure
+from dsl_app.shared.widgets.figure_file import PNG_SCALE, PlotFigure, save_figure
 from PIL import Image
 from PySide6.QtWidgets import QFileDialog
 from pytestqt.qtbot import QtBot
@@ -27,7 +27,7 @@ PAPER = tuple(bytes.fromhex(LIGHT.base[1:]))
 
 
 @pytest.fixture
-def figure(qtbot: QtBot) -> Iterator[Figure]:
+def figure(qtbot: QtBot) -> Iterator[PlotFigure]:
     state = ResultsState()
     panel = SpectrumPanel(state)
     qtbot.addWidget(panel)
@@ -37,12 +37,12 @@ def figure(qtbot: QtBot) -> Iterator[Figure]:
     qtbot.waitExposed(panel)
     spectrum = Spectrum(NM, np.linspace(0.1, 0.9, NM.size), np.full(NM.size, 0.05))
     state.marks.set((Mark("pin", "sky <1>", 0, spectrum, pixel=(3, 4)),))
-    yield Figure("spectra", panel.plot, panel.apply_theme, panel.named_curves)
+    yield PlotFigure("spectra", panel.plot, panel.apply_theme, panel.named_curves)
     assert not any(isinstance(item, pg.LegendItem) for item in panel.plot.scene().items())
     assert panel.plot.backgroundBrush().color().name() == DARK.base
 
 
-def test_svg_holds_lines_and_text(figure: Figure, tmp_path: Path) -> None:
+def test_svg_holds_lines_and_text(figure: PlotFigure, tmp_path: Path) -> None:
     save_figure(figure, tmp_path / "figure.svg", DARK)
     text = (tmp_path / "figure.svg").read_text("utf-8")
     root = ET.fromstring(text)
@@ -60,7 +60,7 @@ def test_svg_holds_lines_and_text(figure: Figure, tmp_path: Path) -> None:
     assert "<image" not in text
 
 
-def test_png_is_sharp_and_light(figure: Figure, tmp_path: Path) -> None:
+def test_png_is_sharp_and_light(figure: PlotFigure, tmp_path: Path) -> None:
     save_figure(figure, tmp_path / "figure.png", DARK)
     size = figure.plot.viewport().size()
     with Image.open(tmp_path / "figure.png") as picture:
@@ -71,7 +71,7 @@ def test_png_is_sharp_and_light(figure: Figure, tmp_path: Path) -> None:
     assert (pixels == tuple(bytes.fromhex(LIGHT.pins[0][1:]))).all(2).any()
 
 
-def test_what_cannot_be_written_says_so(figure: Figure, tmp_path: Path) -> None:
+def test_what_cannot_be_written_says_so(figure: PlotFigure, tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"does not end in \.svg or \.png"):
         save_figure(figure, tmp_path / "figure.pdf", DARK)
     with pytest.raises(StoreError, match="could not be written"):
