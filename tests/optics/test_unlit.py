@@ -8,7 +8,7 @@ import torch
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import correspondence, zero_order
-from dsl_core.optics.unlit import unlit_px
+from dsl_core.optics.unlit import first_order_reach_px, unlit_px
 from dsl_core.simulation.published_rig import published_rig
 
 WIDTH_PX = 5
@@ -29,15 +29,17 @@ def test_no_first_order_lies_between_the_distances(lines_per_mm: float, columns:
     rig = rig_of(lines_per_mm, columns)
     near, far = unlit_px(rig, WIDTH_PX)
     assert far > near + WIDTH_PX
+    nearest, farthest = first_order_reach_px(rig)
     rng = np.random.default_rng(0)
     pixels = torch.as_tensor(rng.integers(0, 890 * 580, 500))
     depth = torch.as_tensor(rng.uniform(*rig.depth_range_mm, 500))
     zero = zero_order(rig, pixels, depth)[0]
     model = correspondence(rig)
     for order in (1, -1):
-        seen = model.trace(pixels, depth, order, np.array([400.0]))
+        seen = model.trace(pixels, depth, order, np.array([400.0, 700.0]))
         apart = (seen.columns - zero).abs()[seen.inside(columns, columns * 9 // 16)]
         assert float(apart.min()) > far + WIDTH_PX / 2
+        assert nearest < float(apart.min()) < float(apart.max()) < farthest
 
 
 def test_the_published_film_keeps_the_columns_it_always_had() -> None:

@@ -31,7 +31,7 @@ def test_function_is_found_within_its_stated_deviation() -> None:
     assert 0.6 < np.sqrt(np.mean(np.square(sigmas))) < 1.4
 
 
-@pytest.mark.parametrize("factor", [1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0])
+@pytest.mark.parametrize("factor", [1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 16.0, 32.0, 64.0])
 def test_evidence_finds_by_how_much_noise_was_understated(factor: float) -> None:
     _, design, seen = draw(1, 0.0)
     # Residuals of exactly the deviation they are meant to have, so that chance plays no part.

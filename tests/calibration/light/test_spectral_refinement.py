@@ -76,6 +76,13 @@ def test_refined_response_is_better_than_the_data_sheet(seed: int) -> None:
     assert all(min(curve.values) >= 0 for curve in response)
 
 
+def test_the_evidence_has_no_gap_of_more_than_a_decade_among_its_weights() -> None:
+    decades = np.diff(np.log10(WEIGHTS))
+    assert (decades > 0).all()
+    assert decades.max() < 1.01
+    assert PUBLISHED_WEIGHT in WEIGHTS
+
+
 def test_derivatives_are_those_of_the_signals() -> None:
     model, data = SpectralModel(published_rig()), surfaces(published_rig(), 1e-3)
     x = 0.1 * np.random.default_rng(1).standard_normal(model.size)

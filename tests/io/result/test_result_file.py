@@ -60,7 +60,17 @@ def test_one_band_is_read_without_its_neighbours(tmp_path: Path) -> None:
     assert load_result(path, lazy=False)["reflectance"].variable._in_memory
 
 
-@pytest.mark.parametrize(("name", "value"), [("reflectance", 5.0), ("reflectance_std", np.inf)])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("reflectance", 5.0),
+        ("reflectance_std", np.inf),
+        # The integers that stand for NaN.
+        ("reflectance", -32768 * 5e-5),
+        ("reflectance_std", 65535 * 5e-5),
+        ("data_share", 255 / 250),
+    ],
+)
 def test_values_outside_the_integer_range_are_kept_as_float(tmp_path: Path, name: str, value: float) -> None:
     result = small_result()
     result[name][0, 2, 2] = value

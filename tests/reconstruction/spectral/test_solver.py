@@ -111,6 +111,17 @@ def test_evidence_prefers_loose_priors_for_peaks_and_tight_ones_for_smooth_spect
     assert chosen["peak"].min() > 0.08
 
 
+@pytest.mark.parametrize("diagonals", [1, 2])
+def test_diagonals_of_zeros_may_be_left_out(diagonals: int) -> None:
+    data, right = banded_equations(*observations(smooth_truth(), 0.1))
+    whole = torch.zeros_like(data)
+    # What two bands have in common is less than what each has.
+    whole[0] = 2 * data[0]
+    whole[1:diagonals] = data[1:diagonals]
+    found = solve_spectra(whole[:diagonals], right, None, Prior())
+    assert (found.mean - solve_spectra(whole, right, None, Prior()).mean).abs().max() < 1e-9
+
+
 def test_broad_rows_by_the_woodbury_identity_equal_dense_algebra() -> None:
     rows, values = observations(smooth_truth(), 0.1)
     data, right = banded_equations(rows, values)
