@@ -1,6 +1,6 @@
 """Pictures of every page, wizard step and dialog: ``python -m tests.screens OUT``.
 
-Each scene of the table opens the application anew, brings it into a state as a person would, and takes
+Each scene of the table opens the application again, brings it into a state as a person would, and takes
 pictures of the whole screen. What scenes open (a calibrated campaign, results, a library) is made once, in a
 folder that the next call finds again. ``OUT/index.html`` shows all pictures.
 """
@@ -50,7 +50,7 @@ def _take(look: Look, out: Path, material: Path, only: list[str]) -> bool:
             "DISPLAY": display,
             "QT_QPA_PLATFORM": "xcb",
             "QT_API": "pyside6",
-            "PYTHONPATH": str(ROOT),
+            "PYTHONPATH": os.pathsep.join(map(str, (ROOT, ROOT / "app"))),
         }
         return subprocess.run(command, env=environment, cwd=ROOT).returncode != 0
 
@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
         "--material",
         type=Path,
         default=Path(tempfile.gettempdir()) / "dsl-scan-screens",
-        help="folder of what scenes open; remove it to have it made anew",
+        help="folder of what scenes open; remove it to have it made again",
     )
     return parser
 

@@ -26,7 +26,7 @@ HALF, BEGUN = ("selftest", "geometry"), Path("spectralon") / "emission"
 
 @dataclass(frozen=True)
 class Material:
-    """Where everything lies below a folder; scenes open copies of what they would change."""
+    """Where everything is below a folder; scenes open copies of what they would change."""
 
     folder: Path
 
@@ -63,7 +63,7 @@ def make_material(folder: Path) -> Material:
     _scan(made.scans, "chart-again", "preview")
     (made.scans / "chart-again.dsl").rename(made.scans / "unreconstructed.dsl")
     _calibrate(made)
-    (folder / DONE).write_text("Remove this folder to have all of it made anew.\n")
+    (folder / DONE).write_text("Remove this folder to have all of it made again.\n")
     return made
 
 
