@@ -19,8 +19,8 @@ CAMPAIGN_HINT = (
     " Begin a new one, or open an existing one."
 )
 NO_VERSION = (
-    "<p>The library is empty. It keeps every calibrated rig on this computer, dated and never overwritten:"
-    " calibrate everything of a campaign, keep one in the library, or import a file.</p>"
+    "<p>The library is empty. It keeps every rig calibrated on this computer, dated and never overwritten:"
+    " calibrate everything in a campaign, keep a campaign in the library, or import a file.</p>"
 )
 _ROLES = {
     RowState.MISSING: "muted",
@@ -96,7 +96,7 @@ def row_display(row: Row, is_busy: bool = False) -> RowDisplay:
     title, figure = row.about.title, row.figure
     begun = row.state is RowState.BEGUN or row.has_candidate
     word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
-    tip = f"Open the wizard of {title}, which continues where you left it"
+    tip = f"Open the wizard of {title}, which continues where it was left"
     return RowDisplay(
         state=f"● {row.state.value}",
         state_role=_ROLES.get(row.state, "warn"),

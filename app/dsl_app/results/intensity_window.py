@@ -148,10 +148,7 @@ def graph_text(graph: IntensityGraph) -> str:
     reached = [name for order, name in ORDER_NAMES.items() if known(graph.orders.get(order)).size]
     parts = []
     if graph.zero is not None:
-        where = " and ".join(reached)
-        parts.append(
-            f"First order {where} reaches the pixel." if reached else "No first order reaches the pixel."
-        )
+        parts.append(_reached_text(reached))
         parts.append("The upper axis is in nm.")
     if graph.model is None:
         parts.append("The pixel has no spectrum, so there is no model to compare with.")
@@ -159,3 +156,12 @@ def graph_text(graph: IntensityGraph) -> str:
         miss = float(np.sqrt(np.nanmean((graph.measured - graph.model) ** 2)))
         parts.append(f"Measured and model differ by {miss:.3g} DN/ms (RMS over all frames and colours).")
     return " ".join(parts)
+
+
+def _reached_text(reached: list[str]) -> str:
+    match reached:
+        case []:
+            return "No first order reaches the pixel."
+        case [order]:
+            return f"First order {order} reaches the pixel."
+    return f"First orders {' and '.join(reached)} reach the pixel."

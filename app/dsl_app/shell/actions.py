@@ -128,7 +128,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     Action(
         "scan_pause",
-        "&Pause or resume",
+        "&Pause or continue",
         "Scan",
         "Ctrl+Shift+P",
         "Pause before the next frame",

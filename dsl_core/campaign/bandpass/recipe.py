@@ -48,10 +48,10 @@ FILTERS_NM = tuple(float(nm) for nm in range(430, 661, 10))
 class BandpassRecipe(Recipe[BandpassCalibration]):
     """The calibration with bandpass filters.
 
-    ``filters_nm`` are nominal centres; ``line_px`` is width and step of the lines through a filter, which
-    must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for noisy cameras;
-    ``pixels`` is how many pixels of the camera are used; ``depth_mm`` is how far away the target stands;
-    ``reflectance`` is that of the target.
+    ``filters_nm`` are the nominal centres of the filters; ``line_px`` is the width and step of the lines
+    through a filter, which must tile the frame; ``long_ratio`` above 1 adds a second, longer exposure, for
+    noisy cameras; ``pixels`` is how many camera pixels are used; ``depth_mm`` is the distance of the target;
+    ``reflectance`` is the reflectance of the target.
     """
 
     name = "bandpass"

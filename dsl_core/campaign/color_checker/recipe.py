@@ -45,9 +45,9 @@ _Corners = tuple[tuple[float, float], tuple[float, float], tuple[float, float], 
 class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
     """The calibration with a classic Color Checker of 24 patches.
 
-    ``chart`` names the table of reflectances in colour-science; ``corners_px`` are column and row of the four
-    outer corners of the patches, in cyclic order from any of them, where the chart is not found without;
-    ``depth_mm`` is how far away it stands.
+    ``chart`` is the name of the chart's reflectances in colour-science; ``corners_px`` are column and row of
+    the four outer corners of the patches, in cyclic order from any of them, if the chart is not found
+    automatically; ``depth_mm`` is the distance of the chart.
     """
 
     name = "color-checker"

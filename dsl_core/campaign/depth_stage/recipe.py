@@ -58,12 +58,12 @@ class StageNote(Record):
 class DepthStageRecipe(Recipe[DepthStageCalibration]):
     """The calibration with a plane on a stage.
 
-    ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the deviation with which it keeps
-    them; ``filters_nm`` are nominal centres of bandpass filters. ``code_step_px`` is the step of the lines
-    without filter, at most 5; ``filter_step_px`` is the step of the lines through filters, which may be far
-    apart. ``reflectance`` is that of the target; ``chain`` lets the plane correct the product of response,
-    emission and efficiency; ``grid`` adds a model of the columns that is derived from the data, which needs
-    three positions.
+    ``positions_mm`` are the positions of the stage; ``stage_std_mm`` is the standard deviation of the
+    stage's positions; ``filters_nm`` are the nominal centres of the bandpass filters. ``code_step_px`` is
+    the step of the lines without filter, at most 5; ``filter_step_px`` is the step of the lines through
+    filters, which may be far apart. ``reflectance`` is the reflectance of the target; ``chain`` lets the
+    plane correct the product of response, emission and efficiency; ``grid`` adds a model of the columns
+    derived from the data, which needs three positions.
     """
 
     name = "depth-stage"

@@ -29,10 +29,10 @@ from dsl_core.progress import Progress
 class GeometryRecipe(Recipe[GeometryCalibration]):
     """The calibration of both lenses and their pose.
 
-    ``board`` is the printed board, its squares measured; ``poses`` how many of the proposed poses are taken.
-    ``ratio`` is how much longer a second exposure is, 1 for none: ink reflects a twentieth of what paper
-    does, which one exposure spans. ``left_out`` are keys of steps, such as ``pose-03``, that the fit does
-    without; their captures are kept.
+    ``board`` is the printed board, its squares measured; ``poses`` is how many proposed poses to capture.
+    ``ratio`` is how many times longer a second exposure is, 1 for none: one exposure covers both paper and
+    ink, which reflects a twentieth as much. ``left_out`` are the steps, such as ``pose-03``, that the fit
+    leaves out; their captures are kept.
     """
 
     name = "geometry"

@@ -33,7 +33,7 @@ _STEP = Step(
 
 @dataclass(frozen=True)
 class SelfTestRecipe(Recipe[SelfTest]):
-    """The self-test as a calibration; ``wanted_ms`` are the exposures that scans would like."""
+    """The self-test as a calibration; ``wanted_ms`` are the exposures that scans should use."""
 
     name = "selftest"
     title = "Self-test"

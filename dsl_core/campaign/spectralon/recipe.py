@@ -34,10 +34,10 @@ EMISSION, PICTURES = "emission", "pictures"
 class SpectralonRecipe(Recipe[SpectralonCalibration]):
     """The calibration with a Spectralon.
 
-    ``reflectance`` is its certified reflectance, or ``reflectance_file`` a text file of it over wavelength.
-    ``readings`` is how often the spectroradiometer reads each picture; ``emission_folder`` holds text files
-    ``red*``, ``green*``, ``blue*``, ``white*``, ``black*`` of an instrument that is not connected.
-    ``depth_mm`` is how far away the target stands.
+    ``reflectance`` is the certified reflectance of the Spectralon; ``reflectance_file`` is a text file of
+    reflectance against wavelength, used instead. ``readings`` is how many times the spectroradiometer
+    reads each picture; ``emission_folder`` holds text files ``red*``, ``green*``, ``blue*``, ``white*``,
+    ``black*`` from an instrument that is not connected. ``depth_mm`` is the distance of the target.
     """
 
     name = "spectralon"

@@ -143,7 +143,8 @@ def _survey_folder(
     folder = find_folder(root, role, setting, plan.settings[setting])
     if folder is None:
         name = f"{folder_name(role, setting)}/"
-        record = FileRecord(name, None, "missing", f"{_loss(role)} ({count} images)")
+        images = "1 image" if count == 1 else f"{count} images"
+        record = FileRecord(name, None, "missing", f"{_loss(role)} ({images})")
         result.add(record)
         result.by_place |= {(role, setting, pattern): record for pattern in range(count)}
         return

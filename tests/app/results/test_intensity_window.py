@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from dsl_app.results.intensity_window import ticks
+from dsl_app.results.intensity_window import graph_text, ticks
 
 from dsl_core.workflows.inspection import IntensityGraph
 from tests.app.support.results_bench import Bench
@@ -23,6 +23,8 @@ def test_the_intensity_graph_shows_orders_in_nm(bench: Bench) -> None:
     assert window.isVisible()
     assert "4, 5" in window.windowTitle()
     assert "First order +1 reaches the pixel" in window.text.text()
+    both = graph_text(replace(graph, orders={1: frames, -1: frames - 50.0}))
+    assert both.startswith("First orders +1 and −1 reach the pixel.")
     assert [text for _, text in ticks(graph)] == ["450", "500", "550", "600", "650", "zero order"]
     assert window.item.viewRange()[1][1] < 5
     window.faint.setChecked(False)

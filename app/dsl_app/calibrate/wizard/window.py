@@ -273,6 +273,7 @@ class WizardButtons(QWidget):
         self._bar.setRange(0, shown.total)
         self._bar.setValue(shown.done)
         self._text.setText(shown.text)
+        self._text.setToolTip(shown.text)
 
 
 def _button(text: str, tip: str) -> QPushButton:
