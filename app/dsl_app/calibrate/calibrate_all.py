@@ -127,4 +127,4 @@ class UnattendedGuide:
 def products_text(made: Products) -> str:
     """Where a rig and its report were saved."""
     kept = f" It is in the library as {made.entry!r}." if made.entry else ""
-    return f"The rig is saved in {made.rig}, next to its report ({made.report.name}).{kept}"
+    return f"The rig is saved in {made.rig}, next to its report.{kept}"

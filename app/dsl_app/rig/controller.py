@@ -71,7 +71,7 @@ class LiveController:
     def _look(self, devices: DeviceRig, progress: Progress) -> None:
         lost, self._counts = 0, FrameCounts()
         while True:
-            progress.report("live", self._counts.shown, 0)
+            progress.report("", self._counts.shown, 0)
             start = time.monotonic()
             try:
                 devices.camera.configure(self.state.exposure_ms.value)

@@ -100,13 +100,16 @@ class LiveView(QWidget):
             switches.addWidget(box)
         switches.addStretch(1)
         switches.setSpacing(6)
-        for figure in (self._rate, self._counts):
-            switches.addWidget(figure)
+        frames = QHBoxLayout()
+        frames.addWidget(self._rate)
+        frames.addStretch(1)
+        frames.addWidget(self._counts)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.addWidget(self.view, 1)
         column.addWidget(self._pixel)
         column.addLayout(figures)
+        column.addLayout(frames)
         column.addLayout(switches)
         column.addWidget(self._histogram)
 

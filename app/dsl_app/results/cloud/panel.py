@@ -176,7 +176,7 @@ class CloudPanel(QWidget):
         self._hint.setText(
             "Draw around points with the left button."
             if lasso
-            else "Drag to rotate, Shift+drag to pan, wheel to zoom; arrow keys rotate, + and − zoom."
+            else "Drag or arrow keys rotate, Shift+drag pans, wheel or +/− zooms."
         )
 
     # Mouse -----------------------------------------------------------------------------------------

@@ -24,7 +24,11 @@ from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 _COLUMNS = ("Effect", "At most", "In σ", "Per frame", "Why")
 _CHOICES = (
     (EffectChoice.USUAL, "Default", "the effects of the plain renderer"),
-    (EffectChoice.AUTO, "What the scene calls for", "the others change no pixel by more than the tolerance"),
+    (
+        EffectChoice.AUTO,
+        "Automatic",
+        "what the scene calls for; the others change no pixel by more than the tolerance",
+    ),
     (EffectChoice.ALL, "All", "including the expensive ones"),
     (EffectChoice.NONE, "None", "only those that cannot be left out"),
     (EffectChoice.CHOSEN, "Custom", "the effects ticked below"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
+from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QKeySequence, QShortcut, QTextBlock, QTextCursor
 from PySide6.QtWidgets import (
     QDialog,
@@ -81,7 +81,8 @@ class HelpWindow(QDialog):
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(False)
         self.setWindowTitle("Help")
-        self.resize(960, 720)
+        # A window's frame needs some of a small screen.
+        self.resize(QSize(960, 720).boundedTo(self.screen().availableSize() * 0.92))
         self.pages = QListWidget()
         self.pages.setAccessibleName("Help pages")
         self.pages.setToolTip("All pages of the help")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, QTimer
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -21,6 +21,8 @@ RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 #: Space between rows with wrapped lines, px: without it two rows look like one.
 ROOM_PX = 6
+#: Least width of a column with wrapped lines, px: a few words.
+LEAST_WRAPPED_PX = 160
 
 
 class _Roomy(QStyledItemDelegate):
@@ -35,7 +37,7 @@ class ReadTable(QTableWidget):
 
     def __init__(self, name: str, tip: str, heads: Sequence[str], rows: int = 0) -> None:
         super().__init__(rows, len(heads))
-        self._wraps = False
+        self._wrapped: int | None = None
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.setHorizontalHeaderLabels(heads)
@@ -49,16 +51,34 @@ class ReadTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
 
     def wrap(self, column: int) -> None:
-        """Let a column take the remaining width, and wrap its lines."""
-        self._wraps = True
+        """Let a column take the remaining width, but not less than `LEAST_WRAPPED_PX`, and wrap its lines."""
+        self._wrapped = column
         self.setItemDelegate(_Roomy(self))
         header = self.horizontalHeader()
         header.setSectionResizeMode(column, QHeaderView.ResizeMode.Stretch)
         # All columns are resized one after the other; the rows only once.
         self.fit_rows = QTimer(self)
         self.fit_rows.setSingleShot(True)
-        self.fit_rows.timeout.connect(self.resizeRowsToContents)
+        self.fit_rows.timeout.connect(self._fit_wrapped)
         header.sectionResized.connect(lambda *_: self.fit_rows.start(0))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Fit the wrapped column to the new width."""
+        super().resizeEvent(event)
+        if self._wrapped is not None:
+            self.fit_rows.start(0)
+
+    def _fit_wrapped(self) -> None:
+        """Scroll sideways if the remaining width would hold a word a line only."""
+        assert self._wrapped is not None
+        header = self.horizontalHeader()
+        others = sum(header.sectionSize(i) for i in range(header.count()) if i != self._wrapped)
+        if self.viewport().width() - others < LEAST_WRAPPED_PX:
+            header.setSectionResizeMode(self._wrapped, QHeaderView.ResizeMode.Fixed)
+            header.resizeSection(self._wrapped, LEAST_WRAPPED_PX)
+        else:
+            header.setSectionResizeMode(self._wrapped, QHeaderView.ResizeMode.Stretch)
+        self.resizeRowsToContents()
 
     def show_rows(self, rows: Sequence[Sequence[QTableWidgetItem]]) -> None:
         """Show other rows; columns and rows are resized once, not after every item."""
@@ -69,7 +89,7 @@ class ReadTable(QTableWidget):
                 self.setItem(number, column, item)
         self.model().blockSignals(False)
         self.model().layoutChanged.emit()
-        if self._wraps:
+        if self._wrapped is not None:
             self.resizeRowsToContents()
 
 
