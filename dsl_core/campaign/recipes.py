@@ -1,4 +1,4 @@
-"""All calibrations in their order, loaded when they are asked for."""
+"""All calibrations in their order, loaded when they are requested."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ ADDED_SETTINGS = ("rig", "exposures")
 
 @dataclass(frozen=True)
 class StepStatus:
-    """Where a step stands; ``reason`` says why its captures are refused."""
+    """The state of a step; ``reason`` says why its captures are refused."""
 
     step: Step
     state: State
@@ -89,11 +89,11 @@ class CalibrationSession:
         return self.recipe.steps(self.bench)
 
     def statuses(self) -> tuple[StepStatus, ...]:
-        """Where every step stands, read from disk."""
+        """The state of every step, read from disk."""
         return tuple(self.status(step) for step in self.steps)
 
     def status(self, step: Step) -> StepStatus:
-        """Where a step stands, read from disk; damaged files are a reason to refuse it."""
+        """The state of a step, read from disk; damaged files are a reason to refuse it."""
         folder = self._folder(step)
         try:
             note = read_note(folder)

@@ -1,7 +1,7 @@
 """Doing a plan: one small state machine around one loop.
 
-Shots are taken in order and pushed to a sink. Pausing and cancelling act between shots. Whatever
-happens, the projector is dark at the end and every stored frame stays stored.
+Shots are captured in order and pushed to a sink. Pausing and cancelling act between shots. Whatever
+happens, the projector is dark at the end and every saved frame is kept.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from dsl_core.progress import CancelToken, NoProgress, Progress
 
 
 class State(StrEnum):
-    """Where a scan stands; the last three are final."""
+    """The state of a scan; the last three are final."""
 
     IDLE = "idle"
     CHECKING = "checking"
@@ -42,7 +42,7 @@ class State(StrEnum):
 
 @dataclass(frozen=True)
 class Status:
-    """A moment of a scan; ``done`` counts stored frames, those of earlier runs included.
+    """A moment of a scan; ``done`` counts saved frames, those of earlier runs included.
 
     ``elapsed_s`` is the time spent running, pauses left out; ``remaining_s`` is estimated from it.
     """
@@ -112,7 +112,7 @@ class Runner:
             self._condition.notify_all()
 
     def cancel(self) -> None:
-        """End before the next shot; what is stored stays stored."""
+        """End before the next shot; saved frames are kept."""
         self._token.cancel()
         with self._condition:
             self._condition.notify_all()
@@ -121,7 +121,7 @@ class Runner:
         """Take every missing shot and return the final status.
 
         Raises `PlanError` when the plan is impossible on the rig, `DeviceError` when a shot cannot be taken,
-        `StoreError` when it cannot be stored, `Cancelled` when someone asked for the end.
+        `StoreError` when it cannot be saved, `Cancelled` when someone requested the end.
         """
         if self._status.state is not State.IDLE:
             raise RuntimeError("a runner runs once; make a new one to continue with the same sink")

@@ -31,7 +31,7 @@ class MemorySink:
         return self._plan
 
     def missing(self) -> Iterator[Shot]:
-        """Shots of the plan that are not stored yet, in order."""
+        """Shots of the plan that are not saved yet, in order."""
         return (shot for shot in self._plan.shots() if shot.index not in self.frames)
 
     def write(self, shot: Shot, frame: Frame) -> None:
@@ -52,14 +52,14 @@ class MemorySink:
 
 
 class WatchedSink:
-    """A `FrameSink` that shows each frame to someone once it is stored; their failure is only logged."""
+    """A `FrameSink` that shows each frame to someone once it is saved; their failure is only logged."""
 
     def __init__(self, sink: FrameSink, watch: Watch) -> None:
         """The sink stays the caller's."""
         self._sink, self._watch = sink, watch
 
     def missing(self) -> Iterator[Shot]:
-        """Shots of the plan that are not stored yet, in order."""
+        """Shots of the plan that are not saved yet, in order."""
         return self._sink.missing()
 
     def write(self, shot: Shot, frame: Frame) -> None:

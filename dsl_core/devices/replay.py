@@ -55,7 +55,7 @@ class ReplayCamera(Camera):
         self._index = shot_index
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
-        """The stored frame; raises `StoreError` when it is damaged."""
+        """The saved frame; raises `StoreError` when it is damaged."""
         pixels = self._source.read(self._shots[self._index]).copy()
         self._taken += 1
         self._time_s += self._exposure_ms / 1000.0

@@ -19,7 +19,7 @@ class ReplayOptions(BaseModel):
 
 @with_options(ReplayOptions)
 def open_replay(options: dict[str, str]) -> DeviceRig:
-    """Plays a stored scan back; option ``session`` is its folder.
+    """Plays a saved scan back; option ``session`` is its folder.
 
     Raises `DeviceError` for other options, `StoreError` when the folder is not a scan.
     """

@@ -18,7 +18,7 @@ _SCHEMA_VERSION = 1
 def save_rig(rig: Rig, path: Path, *, overwrite: bool = False) -> Path:
     """Write a rig, whole or not at all, and return its path.
 
-    Raises `StoreError` when the file exists already (unless ``overwrite``) or cannot be written.
+    Raises `StoreError` when the file already exists (unless ``overwrite``) or cannot be written.
     """
     return write_record(path, rig, overwrite=overwrite)
 

@@ -81,7 +81,7 @@ def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind 
 
 
 def _require_form(target: Path, kind: FolderKind | None) -> None:
-    """Raise `StoreError` when a folder stands where a file is needed, or the reverse."""
+    """Raise `StoreError` when there is a folder where a file is needed, or the reverse."""
     if target.is_dir() and kind is None:
         raise StoreError(f"{target} is a folder, but a file is to be written. Choose another name.")
     if not target.is_dir() and kind is not None:

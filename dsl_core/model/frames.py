@@ -41,7 +41,7 @@ class FrameSink(Protocol):
     """Where a runner puts frames, one by one, safely."""
 
     def missing(self) -> Iterator[Shot]:
-        """Shots of the plan that are not stored yet, in order."""
+        """Shots of the plan that are not saved yet, in order."""
 
     def write(self, shot: Shot, frame: Frame) -> None:
         """Store a frame so that it survives a crash from this moment on; raises `StoreError`."""

@@ -1,4 +1,4 @@
-"""What stands before the camera during a step of a calibration."""
+"""What is in front of the camera during a step of a calibration."""
 
 from __future__ import annotations
 

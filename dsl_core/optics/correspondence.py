@@ -276,7 +276,7 @@ def _linear_matrix(nodes: NDArray[np.float64], targets: NDArray[np.float64]) -> 
 
 
 def correspondence(rig: Rig, model: str = "auto") -> Correspondence:
-    """The model asked for: ``grating``, ``hybrid``, ``grid``, or ``auto``.
+    """The requested model: ``grating``, ``hybrid``, ``grid``, or ``auto``.
 
     ``auto`` is hybrid where the rig holds a residual, else grid where it holds one, else grating.
     """

@@ -1,4 +1,4 @@
-"""Bandpass filters before the camera."""
+"""Bandpass filters in front of the camera."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The few pixels that stand for a whole picture."""
+"""The few pixels that represent a whole picture."""
 
 from __future__ import annotations
 

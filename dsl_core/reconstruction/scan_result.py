@@ -45,7 +45,7 @@ def known_pixels(geometry: Geometry) -> Pixels:
 def assemble(
     rig: Rig, plan: CapturePlan, grid: WavelengthGrid, geometry: Geometry, spectra: SpectralMaps | None
 ) -> xr.Dataset:
-    """The dataset of a scan; without spectra when only depth was asked for."""
+    """The dataset of a scan; without spectra when only depth was requested."""
     from dsl_core.optics.colour import reflectance_to_srgb
 
     flags = geometry.flags.copy()

@@ -15,7 +15,7 @@ def has_cuda() -> bool:
 
 
 def torch_device(name: str) -> str:
-    """``cpu`` or ``cuda`` for one of `DEVICES`; raises `DecodeError` when the one asked for is not there."""
+    """``cpu`` or ``cuda`` for one of `DEVICES`; raises `DecodeError` when it does not exist."""
     if name == "cpu":
         return name
     found = has_cuda()

@@ -47,7 +47,7 @@ class TwinHand:
         self.world.noise_key = (zlib.crc32(placement.model_dump_json().encode()),)
 
     def _scene(self, placement: Placement) -> tuple[Callable[[float], Scene], float]:
-        """The scene at each stage position, and the position asked for."""
+        """The scene at each stage position, and the requested position."""
         options = dict(placement.options)
         match placement.target:
             case "nothing":

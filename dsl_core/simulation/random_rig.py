@@ -130,7 +130,7 @@ def _curve(
 
 
 def _smooth_factor(rng: np.random.Generator, amplitude: float) -> Callable[[Floats], Floats]:
-    """A cubic through random values, one a correlation length, uniform within the amplitude of one."""
+    """A cubic through random values, one per correlation length, uniform within the amplitude of one."""
     from scipy.interpolate import CubicSpline
 
     knots = np.arange(360.0, 760.0, CORRELATION_NM)

@@ -1,4 +1,4 @@
-"""A scene as the camera of a rig sees it, and as it is rendered with the effects that were asked for."""
+"""A scene as the camera of a rig sees it, and as it is rendered with the requested effects."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AMBIENT_DN_PER_MS = 0.002
 class Setup:
     """The devices, what is in their beams, and the room: all of a picture but scene and pattern.
 
-    ``filter`` stands before the camera. With ``led_cycle_ms`` the projector flashes its LEDs one after the
+    ``filter`` is in front of the camera. With ``led_cycle_ms`` the projector flashes its LEDs one after the
     other, running freely on the world's clock; None is steady light. ``device`` is what torch computes on.
     """
 
@@ -110,6 +110,6 @@ class RenderedScene:
         return make_view(self.path)
 
     def through(self, transmission: SpectralCurve | None) -> PatternView:
-        """What the camera sees of any pattern, through a filter before it (None: without)."""
+        """What the camera sees of any pattern, through a filter in front of it (None: without)."""
         with one_kernel_thread():
             return self._bare.through(transmission) if transmission else self._bare

@@ -1,4 +1,4 @@
-"""What the twin can be asked for: a record of its options, read from text and listed by ``dsl-scan rigs``."""
+"""What the twin offers: a record of its options, read from text and listed by ``dsl-scan rigs``."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ class World:
             self.position_mm = position_mm
 
     def place(self, scene_at: Callable[[float], Scene], position_mm: float) -> None:
-        """Put another scene before the camera."""
+        """Put another scene in front of the camera."""
         self.scene_at, self.position_mm = scene_at, position_mm
 
     def insert(self, film: bool, filter: SpectralCurve | None) -> None:
@@ -139,7 +139,7 @@ class World:
 
     @property
     def scene(self) -> Scene:
-        """What stands before the camera."""
+        """What is in front of the camera."""
         return self._in_view.scene
 
     @property

@@ -32,7 +32,7 @@ def calibrate_geometry(
     baseline_mm: float | None = None,
     progress: Progress | None = None,
 ) -> GeometryCalibration:
-    """Lenses and pose of camera and projector from folders of pictures, one a board pose, film off.
+    """Lenses and pose of camera and projector from folders of pictures, one per board pose, film off.
 
     Leaves out poses whose board or code cannot be read, and says so. Raises `CalibrationError` that
     names the picture that is missing, or the poses that are wrong when too few are left.

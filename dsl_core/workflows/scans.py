@@ -136,7 +136,7 @@ def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
 
 
 def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
-    """What the twin knows of its scene; None for a real rig."""
+    """The ground truth of the twin's scene; None for a real rig."""
     from dsl_core.evaluation.summary import Truth
     from dsl_core.simulation.sim_devices import SimCamera
 

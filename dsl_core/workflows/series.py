@@ -109,7 +109,7 @@ def read_targets(
 
 
 class TruthReference:
-    """What the twin knows of the scene; all results must show the same one."""
+    """The ground truth of the twin's scene; all results must show the same one."""
 
     name = "the truth of the twin"
 

@@ -38,7 +38,7 @@ PATCH_PX, PATCHES, RIM_PX = 10, (6, 4), 4
 PIECE_PX = (PATCH_PX * PATCHES[0] + 2 * RIM_PX, PATCH_PX * PATCHES[1] + 2 * RIM_PX)
 #: Middles of the pieces, as shares of the picture: where +1 reaches all bands, and where both orders meet.
 PLACES = ((0.14, 0.5), (0.6, 0.5))
-#: Lets all light pass; with a filter before the camera the twin renders any pattern in fine slices.
+#: Lets all light pass; with a filter in front of the camera the twin renders any pattern in fine slices.
 CLEAR = SpectralCurve.of([390.0, 710.0], [1.0, 1.0])
 
 

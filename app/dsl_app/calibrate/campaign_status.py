@@ -1,4 +1,4 @@
-"""Where every calibration of a campaign stands, read from its folder. No Qt, no devices."""
+"""State of every calibration of a campaign, read from its folder. No Qt, no devices."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Kinds:
     clock: Callable[[], datetime] = _utc_now
 
     def rows(self, folder: Path, conditions: CaptureConditions | None = None) -> tuple[Row, ...]:
-        """Where every calibration of a campaign stands, read from disk; raises `StoreError`.
+        """State of every calibration of a campaign, read from disk; raises `StoreError`.
 
         ``conditions`` are those of the connected rig, if any.
         """
@@ -87,7 +87,7 @@ def judge(
     now: datetime,
     ageing: timedelta,
 ) -> tuple[RowState, str]:
-    """How an accepted calibration stands, and why.
+    """The state of an accepted calibration, and why.
 
     ``before`` says when those it should be based on were accepted; older than ``ageing`` is ageing.
     """

@@ -195,7 +195,7 @@ class CalibrationRow(QFrame):
         self._purpose.setFixedWidth(_NAME_PX)
 
     def show_row(self, row: Row, is_busy: bool = False) -> None:
-        """Show where the calibration stands; while ``is_busy`` its wizard cannot be opened."""
+        """Show the state of the calibration; while ``is_busy`` its wizard cannot be opened."""
         shown = row_display(row, is_busy)
         self._state.setText(shown.state)
         set_role(self._state, shown.state_role)

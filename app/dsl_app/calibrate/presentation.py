@@ -165,7 +165,7 @@ def version_texts(line: LibraryLine, in_use: str) -> tuple[str, ...]:
 
 
 def stamp_date(stamp: str) -> str:
-    """When a version was stored, in local time; a stamp that is not a time stays."""
+    """When a version was saved, in local time; a stamp that is not a time stays."""
     try:
         return _local(datetime.strptime(f"{stamp}+0000", "%Y%m%d-%H%M%S-%f%z"))
     except ValueError:

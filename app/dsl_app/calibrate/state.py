@@ -1,4 +1,4 @@
-"""The calibrations of a rig as the window knows them: the campaign, its rows, and the library."""
+"""The window's view of the calibrations of a rig: the campaign, its rows, and the library."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class RowState(Enum):
-    """Where a calibration of the campaign stands; the words are shown."""
+    """State of a calibration of the campaign; the words are shown."""
 
     MISSING = "missing"
     BEGUN = "begun"

@@ -1,1 +1,1 @@
-"""Which page gets which controller and state; the only place that knows all slices."""
+"""Which page gets which controller and state; the only module that imports all slices."""

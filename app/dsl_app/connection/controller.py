@@ -62,7 +62,7 @@ class RigController:
         self._open(choice, require_answers, connected, still_lost, failed)
 
     def lose(self, reason: str) -> None:
-        """Mark the rig as lost: a device does not answer any more."""
+        """Mark the rig as lost: a device no longer responds."""
         self.state.link.set(Link.LOST)
         self.state.trouble.set(reason)
 

@@ -1,4 +1,4 @@
-"""The rig as the window knows it: which one, whether it is connected, what uses it."""
+"""The window's view of the rig: which one, whether it is connected, what uses it."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class SessionRestore(QObject):
     # Restore ---------------------------------------------------------------------------------------
 
     def restore(self, session: Session) -> None:
-        """Open again what a session holds; a message tells what does not exist any more."""
+        """Open again what a session holds; a message names what no longer exists."""
         from dsl_app.compare.page import ComparePage
         from dsl_app.session import parts
 

@@ -1,7 +1,7 @@
 """Saves the session on disk while the program runs, and finds the session of a program that crashed. No Qt.
 
 Each running program has a file of its own, named by its process. It removes the file when it ends normally:
-a file whose process does not run any more is from a crash.
+a file whose process no longer runs is from a crash.
 """
 
 from __future__ import annotations

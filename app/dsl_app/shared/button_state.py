@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ButtonState:
-    """What there is to see of a button; a text or tip of None leaves the one that it was made with.
+    """What a button shows; a text or tip of None leaves the one that it was made with.
 
     ``is_primary`` marks the button that does what a person most likely wants next.
     """

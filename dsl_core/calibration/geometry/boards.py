@@ -38,7 +38,7 @@ class Corners:
 
 
 def grey_of(picture: NDArray[Any], bayer: BayerPattern | None = None) -> NDArray[np.float32]:
-    """A picture of one value a pixel, shape (rows, columns), from mono, colour or mosaic; unit unchanged."""
+    """One value per pixel, shape (rows, columns), from a mono, colour or mosaic picture; unit unchanged."""
     values = np.asarray(picture, np.float32)
     if values.ndim == 3:
         return np.asarray(values.mean(2))
@@ -137,7 +137,7 @@ def pitches_px(points: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def _eight_bit(grey: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """The detectors want bytes; all but the brightest thousandth keep their differences."""
+    """The detectors need bytes; all but the brightest thousandth keep their differences."""
     top = max(float(np.quantile(grey, 0.999)), 1e-12)
     return np.asarray(np.clip(grey * (255 / top), 0, 255).round(), np.uint8)
 

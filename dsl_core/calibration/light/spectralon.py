@@ -217,7 +217,7 @@ def _blocks(relative: Floats, usable: Mask) -> tuple[Floats, Floats, Floats, Flo
 
 
 def _roughness() -> Floats:
-    """Third differences of the grid along rows and columns, one a row."""
+    """Third differences of the grid along rows and columns, one per row."""
     down, across = NODES
     d, a = np.diff(np.eye(down), 3, axis=0), np.diff(np.eye(across), 3, axis=0)
     return np.concatenate([np.kron(d, np.eye(across)), np.kron(np.eye(down), a)])

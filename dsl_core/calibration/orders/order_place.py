@@ -165,7 +165,7 @@ def find_order(graph: LineGraph, sign: int, reach_px: tuple[float, float]) -> Or
 
 
 def find_second(graph: LineGraph, sign: int, first: OrderPlace | None) -> OrderPlace | None:
-    """The second order, a multiple of the first's distance; where none stands out, where it would stand."""
+    """The second order, a multiple of the first's distance; where none stands out, where it would be."""
     if first is None:
         return None
     lined = first.at(graph.pixels.place)

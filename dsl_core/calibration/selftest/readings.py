@@ -19,7 +19,7 @@ class Readings:
 
     The region holds the well lit pixels of each channel, ``beside`` those outside the projected picture.
     ``pair_variance_dn2`` is half the variance of the difference to the frame before over the region, 0 where
-    ``is_pair`` is not set. ``gap_ms`` is the wait that was asked for before the frame, ``since_show`` how
+    ``is_pair`` is not set. ``gap_ms`` is the wait requested before the frame, ``since_show`` how
     many frames came before it since the picture changed. ``drive`` is the level (0..255) shown.
     """
 

@@ -1,4 +1,4 @@
-"""Spectra of chosen pixels as a table: one row a pixel and band, units in the names of the columns.
+"""Spectra of chosen pixels as a table: one row per pixel and band, units in the names of the columns.
 
 Lines that begin with ``#`` say where the data come from; ``pandas.read_csv(..., comment="#")`` skips them.
 What has no answer is written as ``nan``.

@@ -1,6 +1,6 @@
 """Depth as TIFF or NumPy array: float32 in mm, NaN where there is no answer; deviation and flags too.
 
-TIFF revision 6.0, one plane a file and uncompressed, so that readers of measured images accept it. A NumPy
+TIFF revision 6.0, one plane per file and uncompressed, so that readers of measured images accept it. A NumPy
 file has no room for where the data come from; ``NAME.zarr`` says it. Pictures that show depth in colours are
 written by `export_png`.
 """

@@ -181,7 +181,7 @@ def save_tables(
 ) -> list[Path]:
     """Write a rig's curves as the three tables, sampled on a grid (430 to 660 nm every 5 nm if not given).
 
-    Raises `StoreError` when a file exists already (unless ``overwrite``), `CalibrationError` when the rig
+    Raises `StoreError` when a file already exists (unless ``overwrite``), `CalibrationError` when the rig
     has no efficiency for one of the orders -1, 0, +1.
     """
     # Order zero is one by definition of a rig's efficiencies, and then not in the rig.

@@ -51,7 +51,7 @@ _END_BYTES = 256
 
 @dataclass(frozen=True)
 class PublishedScan:
-    """A `FrameSource` that reads the files of a published dataset when they are asked for."""
+    """A `FrameSource` that reads the files of a published dataset when they are requested."""
 
     root: Path
     plan: CapturePlan
@@ -61,7 +61,7 @@ class PublishedScan:
 
     @property
     def table(self) -> list[FileRecord]:
-        """Every file that the plan wants or that is in its way."""
+        """Every file that the plan needs or that is in its way."""
         return self.found.records
 
     def require_frames(self) -> None:

@@ -88,7 +88,7 @@ class FolderSurvey:
 
 
 def check_dataset(root: Path, plan: CapturePlan) -> list[FileRecord]:
-    """The table of a dataset folder: a line for every file that a plan wants or that is in its way.
+    """The table of a dataset folder: a line for every file that a plan needs or that is in its way.
 
     A folder that is missing as a whole has one line.
     """

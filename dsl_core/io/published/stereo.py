@@ -98,7 +98,7 @@ def stereo_of(found: GeometryCalibration) -> Stereo:
 def save_stereo(stereo: Stereo, path: Path, *, overwrite: bool = False) -> Path:
     """Write a calibration in its dialect (``.xml``, or ``.yml`` as Moreno and Taubin do); return the path.
 
-    Raises `StoreError` when the file exists already (unless ``overwrite``) or cannot be written.
+    Raises `StoreError` when the file already exists (unless ``overwrite``) or cannot be written.
     """
     import cv2
 

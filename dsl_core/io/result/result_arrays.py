@@ -47,7 +47,7 @@ class ResultArrays:
         return self.arrays[name]
 
     def at(self, name: str, pixel: tuple[int, int]) -> NDArray[Any]:
-        """Everything that a variable holds for a pixel ``(x, y)``: one value, or one a band or axis."""
+        """Everything that a variable holds for a pixel ``(x, y)``: one value, or one per band or axis."""
         return self.arrays[name][..., pixel[1], pixel[0]]
 
     def holds(self, pixel: tuple[int, int]) -> bool:

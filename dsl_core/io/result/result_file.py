@@ -49,7 +49,7 @@ _INTEGERS: dict[str, type[np.unsignedinteger[Any]]] = {"flags": np.uint16, "reac
 def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> Path:
     """Store a result as a folder, whole or not at all, and return its path.
 
-    Raises `StoreError` when the folder exists already (unless ``overwrite``, and it is a result too), the
+    Raises `StoreError` when the folder already exists (unless ``overwrite``, and it is a result too), the
     disk fails, or the dataset is not a result of this version.
     """
     _check_version(result.attrs.get("schema_version"), path)
@@ -66,7 +66,7 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
 
 
 def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
-    """Open a stored result; bands are read when they are first used unless ``lazy`` is false.
+    """Open a saved result; bands are read when they are first used unless ``lazy`` is false.
 
     Raises `StoreError` when the folder is missing, damaged, not a result, or of another schema version.
     """

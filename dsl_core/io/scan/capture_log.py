@@ -18,7 +18,7 @@ from dsl_core.model.base import Record
 
 
 class LogEntry(Record):
-    """How a stored frame was taken.
+    """How a saved frame was captured.
 
     ``run`` counts how often the scan was opened for writing: frame numbers and clocks of a camera
     start again with it. ``attempts`` above one means that the frame was taken again before it was kept.

@@ -48,7 +48,7 @@ class Estimate:
 
 
 def estimate(plan: CapturePlan, folder: Path, latency_ms: float) -> Estimate:
-    """What a plan takes on a rig whose projector needs ``latency_ms`` a frame, stored in ``folder``."""
+    """What a plan takes on a rig whose projector needs ``latency_ms`` per frame, saved in ``folder``."""
     return Estimate(
         plan.shot_count,
         plan.duration_s(latency_ms),

@@ -256,7 +256,7 @@ class ScanWriter:
         return cls.create(folder, plan, rig, notes)
 
     def missing(self) -> Iterator[Shot]:
-        """Shots of the plan that are not stored yet, in order."""
+        """Shots of the plan that are not saved yet, in order."""
         return (shot for shot in self.plan.shots() if shot.index not in self._done)
 
     def write(self, shot: Shot, frame: Frame) -> None:

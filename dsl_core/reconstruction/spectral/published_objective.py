@@ -70,7 +70,7 @@ class LineData:
 
 
 def require_single_lines(plan: CapturePlan) -> LineSet:
-    """The lines of a plan that shows one line a frame; raises `PlanError` for any other."""
+    """The lines of a plan that shows one line per frame; raises `PlanError` for any other."""
     lines = LineSet.of(plan)
     if lines is None or not lines.single:
         raise PlanError(

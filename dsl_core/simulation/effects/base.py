@@ -44,7 +44,7 @@ class PatternView(Protocol):
         """Signal as without a mosaic, (3, rows, columns)."""
 
     def through(self, transmission: SpectralCurve | None) -> PatternView:
-        """The same view through a filter before the camera."""
+        """The same view through a filter in front of the camera."""
 
 
 class ImageStep(Protocol):
@@ -54,7 +54,7 @@ class ImageStep(Protocol):
         """The picture with the effect: the mosaic as (1, rows, columns), or (3, rows, columns) of colours."""
 
     def through(self, transmission: SpectralCurve | None) -> ImageStep:
-        """The same behind a filter before the camera."""
+        """The same behind a filter in front of the camera."""
 
 
 @dataclass(frozen=True)

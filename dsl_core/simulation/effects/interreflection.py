@@ -184,7 +184,7 @@ class _InterreflectionStep:
         return plane.reshape(self.path.truth.depth_mm.shape).astype(np.float32)
 
     def through(self, transmission: SpectralCurve | None) -> _InterreflectionStep:
-        """See `ImageStep`: the filter stands before the camera, so that the light on surfaces stays."""
+        """See `ImageStep`: the filter is in front of the camera, so that the light on surfaces stays."""
         red, green, blue = self.path.rig.response
         if transmission is not None:
             passed = np.interp(NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)

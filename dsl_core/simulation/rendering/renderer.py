@@ -84,7 +84,7 @@ class Renderer:
         self._colours: tuple[Renderer, ...] = ()
 
     def through(self, transmission: SpectralCurve | None) -> Renderer:
-        """The same view through a filter before the camera (None: without); the geometry is shared."""
+        """The same view through a filter in front of the camera (None: without); the geometry is shared."""
         other = copy.copy(self)
         other.rig, other.slicing, other._white, other._colours = self._bare, BROAD, None, ()
         if transmission is not None:

@@ -43,7 +43,7 @@ class SceneEntry:
 
 
 def scene_catalogue() -> tuple[SceneEntry, ...]:
-    """Every scene that `make_scene` knows."""
+    """Every scene that `make_scene` can make."""
     return tuple(
         SceneEntry(name, (builder.__doc__ or "").split("\n")[0], _defaults(builder))
         for name, builder in _BUILDERS.items()

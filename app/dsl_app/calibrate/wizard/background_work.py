@@ -45,7 +45,7 @@ class Opened:
 
 @dataclass(frozen=True)
 class Captured:
-    """Where the steps stand after a capture; ``error`` is why it failed, None when it did not."""
+    """State of the steps after a capture; ``error`` is why it failed, None when it did not."""
 
     statuses: tuple[StepStatus, ...]
     error: Exception | None = None

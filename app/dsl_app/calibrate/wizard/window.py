@@ -169,7 +169,7 @@ class PageList(QListWidget):
             self.chosen.emit(row)
 
     def show_pages(self, lines: tuple[PageLine, ...]) -> None:
-        """Show where every step stands; the current page stays."""
+        """Show the state of every step; the current page stays."""
         self._lines = lines
         row = self.currentRow()
         self.blockSignals(True)

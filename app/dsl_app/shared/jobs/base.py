@@ -129,7 +129,7 @@ class Job(Generic[T]):
 
 
 class JobRunner(Protocol):
-    """Runs jobs and knows those that have not ended."""
+    """Runs jobs and keeps those that have not ended."""
 
     @property
     def active(self) -> tuple[Job[Any], ...]:

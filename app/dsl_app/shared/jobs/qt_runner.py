@@ -44,7 +44,7 @@ class QtRunner(QObject):
     def submit(self, job: Job[Any]) -> Job[Any]:
         """Start a job; raises `DeviceError` when another job uses the same exclusive resource.
 
-        After `shut_down` no job is started any more.
+        After `shut_down` no job is started.
         """
         if self._is_over:
             job.state = JobState.CANCELLED
