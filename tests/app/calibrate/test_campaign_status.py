@@ -31,7 +31,7 @@ def test_rows_say_why_a_calibration_is_not_good(bench: CalibrateBench) -> None:
     control.leave()
     assert states(bench) == [RowState.OUTSIDE, RowState.SUPERSEDED]
     assert bench.row("selftest").reason == "Open the aperture."
-    assert bench.row("geometry").reason == "Self-test changed since. Fit again; its captures are kept."
+    assert bench.row("geometry").reason == "Changed since: Self-test. Fit again; its captures are kept."
     devices = bench.rig.state.devices.value
     assert devices is not None
     devices.camera._info = replace(devices.camera.info, binning=2)  # type: ignore[attr-defined]

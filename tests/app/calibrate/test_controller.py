@@ -53,7 +53,7 @@ def test_a_rig_in_use_is_not_taken(tmp_path: Path) -> None:
     bench = with_a_campaign(make_bench(tmp_path, runner))
     runner.jobs = (Job("Scan one", lambda progress: None, exclusive="the rig"),)
     bench.control.run("selftest")
-    assert bench.told == "Scan one uses the rig. Wait for it, or cancel it."
+    assert bench.told == "Scan one is using the rig. Wait until it ends, or cancel it."
 
 
 def test_wrong_folders_and_other_rigs_are_named(bench: CalibrateBench, tmp_path: Path) -> None:
