@@ -115,7 +115,7 @@ def test_a_rig_in_use_stays_connected_whatever_is_asked(qtbot: QtBot, busy: Busy
     rig.disconnect()
     rig.connect(RigChoice("twin", (("scene", "box"), ("size", "64x48"))))
     assert [level for level, _ in busy.notifier.told] == ["warning", "warning"]
-    assert "which Scan first uses" in busy.notifier.told[-1][1]
+    assert "which Scan first is using" in busy.notifier.told[-1][1]
     assert (links, state.choice.value, state.devices.value) == ([], TWIN, devices)
     busy.gate.set()
     qtbot.waitUntil(busy.is_idle)

@@ -74,7 +74,7 @@ def test_callbacks_run_in_the_thread_of_the_window(qtbot: QtBot) -> None:
 def test_two_jobs_cannot_use_one_rig(qtbot: QtBot) -> None:
     runner, gate = QtRunner(), threading.Event()
     runner.submit(Job("First scan", lambda progress: gate.wait(5), exclusive="the rig"))
-    with pytest.raises(DeviceError, match="Second scan needs the rig, which First scan uses"):
+    with pytest.raises(DeviceError, match="Second scan needs the rig, which First scan is using"):
         runner.submit(Job("Second scan", lambda progress: None, exclusive="the rig"))
     gate.set()
     qtbot.waitUntil(lambda: runner.active == ())
