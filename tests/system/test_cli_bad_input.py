@@ -213,7 +213,7 @@ def test_frames_that_show_nothing(
         ("scan a.dsl --plan absent.json", "absent.json cannot be read"),
         ("scan a.dsl --plan empty.json", "empty.json is not valid"),
         ("scan a.dsl --plan empty.json --code full", "leave out --code"),
-        ("scan file/a.dsl -o size=112x72", "cannot be made"),
+        ("scan file/a.dsl -o size=112x72", "cannot be created"),
         ("resume absent.dsl", "is not a scan"),
         ("reconstruct absent.dsl", "is not a scan"),
         ("reconstruct folder", "is not a scan"),
