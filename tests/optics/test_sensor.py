@@ -1,4 +1,4 @@
-"""The camera's gain: bilinear between nodes, and divided out of what is measured."""
+"""The camera's noise is what is stated; its gain is bilinear, and divided out of what is measured."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from dsl_core.model.rig import FlatField, Rig
-from dsl_core.optics.sensor import relative_gain
+from dsl_core.optics.sensor import digitise, raw_variance, relative_gain
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 
@@ -18,6 +18,23 @@ FIELD = FlatField(rows_px=(5.0, 25.0), columns_px=(0.0, 20.0, 44.0), gain=((0.8,
 def rig(field: FlatField | None) -> Rig:
     full = published_rig()
     return full.model_copy(update={"camera": full.camera.resized(*SIZE), "flat_field": field})
+
+
+@pytest.mark.parametrize("signal_dn", [0.0, 40.0, 2000.0])
+def test_raw_values_have_the_stated_mean_and_variance(signal_dn: float) -> None:
+    sensor = published_rig().sensor
+    expected = np.full(200_000, signal_dn, np.float32)
+    values = digitise(sensor, expected, np.random.default_rng(0)).astype(float)
+    assert values.mean() == pytest.approx(sensor.black_level_dn + signal_dn, abs=0.5)
+    # A deviation of 0.3 % is what so many samples leave.
+    assert values.var() == pytest.approx(float(raw_variance(sensor, np.array(signal_dn))), rel=0.015)
+
+
+def test_values_without_noise_are_rounded_and_end_at_full_scale() -> None:
+    sensor = published_rig().sensor
+    black, full = sensor.black_level_dn, sensor.full_scale_dn
+    signal = np.array([-2 * black, 0.4, 0.6, 2 * full], np.float32)
+    assert digitise(sensor, signal, None).tolist() == [0, black, black + 1, full]
 
 
 def test_gain_is_bilinear_between_nodes_and_constant_outside() -> None:
