@@ -44,6 +44,17 @@ def test_blur_halo_and_columns_are_found_from_decoded_columns() -> None:
     assert np.sqrt(np.mean((fit.column_px - column)[fit.good] ** 2)) < 0.01
 
 
+def test_pixels_that_see_a_second_light_are_left_out() -> None:
+    column, radiance, std = lines_seen(400, TRUTH)
+    second = np.arange(400) % 10 == 0
+    radiance[:, second] += 0.3 * np.roll(radiance[:, second], 10, axis=0)
+    fit = fit_zero_order(LINES, np.round(column), radiance, std, START, REACH_PX)
+    assert not fit.good[second].any()
+    assert fit.good[~second].mean() > 0.98
+    assert fit.chi_square == pytest.approx(1.0, abs=0.1)
+    assert fit.response.blur_px == pytest.approx(TRUTH.blur_px, rel=0.01)
+
+
 def test_no_halo_is_found_as_none() -> None:
     truth = TRUTH.model_copy(update={"halo_peak_per_px": 0.0})
     column, radiance, std = lines_seen(300, truth)
