@@ -522,7 +522,7 @@ def test_who_stops_a_lost_scan_does_not_find_it_gone_on(outage: Outage) -> None:
     outage.is_gone = False
     outage.wait(10 * RETRY_S)
     assert (phase(bench), outage.link) == (Phase.LOST, Link.LOST)
-    assert "No scan is under way." not in [text for _, text in bench.notifier.told]
+    assert "No scan is running." not in [text for _, text in bench.notifier.told]
 
 
 def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
