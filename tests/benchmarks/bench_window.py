@@ -1,4 +1,4 @@
-"""How the window comes round while each heavy job runs, and how fast it answers.
+"""How responsive the window stays while each heavy job runs.
 
 Run ``python -m tests.benchmarks.bench_window``. The whole application works on a virtual display and on the
 twin. Gaps between ticks of a 10 ms timer are given by the clock and *quiet*: as they would be were the

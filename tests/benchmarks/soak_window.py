@@ -1,4 +1,4 @@
-"""Scans, reconstructions, clicks and keys at random on the whole application, for as long as one likes.
+"""Scans, reconstructions, clicks and keys at random on the whole application, for as long as you like.
 
 Run ``python -m tests.benchmarks.soak_window --minutes 60``. Every round takes a handful of random actions and
 one scan with its result, and then counts what should not grow: widgets, threads, open files, memory. An
