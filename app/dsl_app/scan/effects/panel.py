@@ -26,7 +26,7 @@ _CHOICES = (
     (EffectChoice.USUAL, "Default", "the effects of the plain renderer"),
     (
         EffectChoice.AUTO,
-        "Automatic",
+        "Auto",
         "what the scene calls for; the others change no pixel by more than the tolerance",
     ),
     (EffectChoice.ALL, "All", "including the expensive ones"),

@@ -73,7 +73,9 @@ class ReadTable(QTableWidget):
         assert self._wrapped is not None
         header = self.horizontalHeader()
         others = sum(header.sectionSize(i) for i in range(header.count()) if i != self._wrapped)
-        if self.viewport().width() - others < LEAST_WRAPPED_PX:
+        items = (self.item(row, self._wrapped) for row in range(self.rowCount()))
+        has_text = any(item is not None and item.text() for item in items)
+        if has_text and self.viewport().width() - others < LEAST_WRAPPED_PX:
             header.setSectionResizeMode(self._wrapped, QHeaderView.ResizeMode.Fixed)
             header.resizeSection(self._wrapped, LEAST_WRAPPED_PX)
         else:
@@ -90,7 +92,7 @@ class ReadTable(QTableWidget):
         self.model().blockSignals(False)
         self.model().layoutChanged.emit()
         if self._wrapped is not None:
-            self.resizeRowsToContents()
+            self._fit_wrapped()
 
 
 def cell(text: str, colour: str = "", side: Qt.AlignmentFlag = LEFT) -> QTableWidgetItem:
