@@ -74,8 +74,8 @@ def result(**attributes: object) -> ResultArrays:
         (True, None, "", Content.RESULT, "", False),
         (False, "leaf.dsl", "", Content.OFFER, "leaf.dsl has no result yet. Reconstruct it now?", True),
         (True, "leaf.dsl", "", Content.OFFER, "leaf.dsl has no result yet. Reconstruct it now?", True),
-        (True, "leaf.dsl", "Open leaf", Content.OFFER, "Open leaf …", False),
-        (False, None, "Open leaf", Content.OFFER, "Open leaf …", False),
+        (True, "leaf.dsl", "Open leaf", Content.OFFER, "Open leaf…", False),
+        (False, None, "Open leaf", Content.OFFER, "Open leaf…", False),
     ],
 )
 def test_the_page_shows_a_result_an_offer_or_the_welcome(
