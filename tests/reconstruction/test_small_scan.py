@@ -14,7 +14,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, PlanError
 from dsl_core.evaluation.summary import Evaluation
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
-from dsl_core.model.result import build_result
+from dsl_core.model.result import Reach, build_result
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
@@ -107,6 +107,26 @@ def test_published_objective_is_close_and_the_banded_solver_closer(
     assert theirs.mean("rmse") < 0.06
     # Only the means: eight times fewer pixels than the camera has mix columns that are far apart.
     assert ours.mean("rmse") < theirs.mean("rmse")
+
+
+def test_where_no_line_reaches_a_band_the_colour_of_the_zero_order_narrows_it_down() -> None:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
+    devices, scan = twin_scan(plan, size="112x72", scene="plane")
+    rig, truth = calibration_of(devices), scans.twin_truth(devices, GRID)
+    assert truth is not None
+    assert truth.spectra is not None
+    stack, pixels = solver_input(rig, scan)
+    errors = []
+    for share in (1.0, 0.0):
+        solver = SpectralReconstruction(
+            rig, scan.plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels
+        )
+        solver.colour_weight *= share
+        found = solver.run()
+        error = np.abs(np.moveaxis(found.reflectance, 0, -1) - truth.spectra[truth.material])
+        errors.append(error[np.moveaxis(found.reach == Reach.ZERO_ONLY, 0, -1)])
+    assert errors[0].size > 1000
+    assert np.median(errors[0]) < 0.6 * np.median(errors[1])
 
 
 def test_published_objective_refuses_several_lines_a_frame(scanned: tuple[DeviceRig, MemoryScan]) -> None:
