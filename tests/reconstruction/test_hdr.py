@@ -147,7 +147,7 @@ def test_wrong_input_is_refused() -> None:
     raw = np.zeros(SHAPE, np.uint16)
     with pytest.raises(DecodeError, match="has 2 settings, given 1"):
         merger.merge([raw])
-    with pytest.raises(DecodeError, match="wanted"):
+    with pytest.raises(DecodeError, match="is needed"):
         merger.merge([raw, raw[1:]])
     with pytest.raises(DecodeError, match="whole numbers"):
         merger.merge([raw, raw.astype(np.float32)])

@@ -124,7 +124,7 @@ def test_light_that_comes_by_another_way_only_is_flagged_with_the_reason() -> No
     disagree = (flags & int(Flag.CODES_DISAGREE)) != 0
     assert disagree[wall.upset].mean() > 0.9
     assert not disagree[(wall.straight > 0) & ~wall.upset].any()
-    assert "another way" in REASONS[Flag.CODES_DISAGREE]
+    assert "another path" in REASONS[Flag.CODES_DISAGREE]
 
 
 def test_without_reflections_the_ensemble_finds_what_the_gray_code_finds() -> None:
