@@ -70,6 +70,7 @@ def reconstruct(
             save_result(result, target, overwrite=force)
     output.costs(timer.stages)
     share = coverage(result)
+    print_fit(output, result)
     output.say(f"{share:.1%} of the pixels have a depth. The result is saved in {target}")
     output.put(result=target, pixels_with_depth=share)
     output.finish()
@@ -102,6 +103,7 @@ def evaluate(
     evaluation = pipeline.evaluate(result, truth)
     pipeline.write_report(report_content(path.stem, result, truth, evaluation), report, force)
     print_figures(output, evaluation)
+    print_fit(output, result)
     output.say(f"The report is saved in {report}")
     output.put(report=report, figures=figures(evaluation), deviations=deviations(evaluation))
     output.finish()
@@ -169,6 +171,16 @@ def print_figures(output: Output, evaluation: Evaluation) -> None:
     from dsl_core.evaluation.verdict import verdicts
 
     output.table(("figure", "value", "unit"), [(v.figure, v.words, v.unit) for v in verdicts(evaluation)])
+
+
+def print_fit(output: Output, result: xr.Dataset) -> None:
+    """What the result says about the fit of its model; nothing for one that does not say."""
+    from dsl_core.model.fit import Fit
+
+    fit = Fit.read({str(name): value for name, value in result.attrs.items()})
+    if fit is not None:
+        output.say(fit.words)
+        output.put(fit={"words": fit.words, "findings": [f.model_dump() for f in fit.findings]})
 
 
 def _require_one_of(option: str, given: str, choices: tuple[str, ...]) -> None:

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core import __version__
+from dsl_core.model.fit import ATTRIBUTE
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.reconstruction.fit.findings import fit_of
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
@@ -69,6 +71,7 @@ def assemble(
         )
     arrays["flags"] = flags
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
+    attributes[ATTRIBUTE] = fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra).model_dump_json()
     return build_result(arrays, grid.centres_nm, attributes)
 
 

@@ -75,6 +75,7 @@ class ResultsPage(PageWidget):
         self._graph: IntensityWindow | None = None
         self._panels = (self.bar, self._image, self.cloud, self._spectra, self.marks)
         self.title, self.about = label("Results", "title"), label("", "muted")
+        self.warning = label("", "warn", wraps=True)
         self.reconstruct_again = push_button(
             "Reconstruct again…",
             "Make another result from the same frames, with other bands, solver or calibration (Ctrl+R)",
@@ -137,6 +138,7 @@ class ResultsPage(PageWidget):
         column = QVBoxLayout(self)
         column.setContentsMargins(16, 10, 12, 8)
         column.addLayout(head)
+        column.addWidget(self.warning)
         column.addWidget(self.stack, 1)
 
     def _content(self) -> QWidget:
@@ -190,6 +192,9 @@ class ResultsPage(PageWidget):
         self.title.setText(summary.title)
         self.about.setText(summary.about)
         self.about.setToolTip(summary.details)
+        self.warning.setText(summary.warning)
+        self.warning.setToolTip(summary.advice)
+        self.warning.setVisible(bool(summary.warning))
 
     def _show_graph(self, graph: IntensityGraph | None) -> None:
         if graph is None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from dsl_core.evaluation.rendered_effects import RenderedEffects
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.fit import Fit
 
 
 class Content(IntEnum):
@@ -23,7 +24,8 @@ class Content(IntEnum):
 class Summary:
     """What the page shows: texts of its head, and which buttons can be used.
 
-    ``message`` stands in place of a result; ``can_reconstruct`` means that a scan is offered.
+    ``message`` stands in place of a result; ``can_reconstruct`` means that a scan is offered. ``warning``
+    says what of the model does not fit, ``advice`` what to do; both are empty where all of it fits.
     """
 
     content: Content
@@ -33,6 +35,8 @@ class Summary:
     message: str = ""
     can_reconstruct: bool = False
     has_result: bool = False
+    warning: str = ""
+    advice: str = ""
 
 
 def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Summary:
@@ -50,15 +54,19 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Sum
     bands = f" · {len(result.wavelengths_nm)} bands" if result.has_spectra else " · depth only"
     captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
     effects, details = effects_text(result.attributes)
+    fit = Fit.read(result.attributes)
+    doubts = fit is not None and bool(fit.significant)
     parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
     return Summary(
         content,
         title=result.path.stem,
         about=" · ".join(part for part in parts if part),
-        details="\n\n".join(part for part in (str(result.path), details) if part),
+        details="\n\n".join(part for part in (str(result.path), fit.words if fit else "", details) if part),
         message=message,
         can_reconstruct=can_reconstruct,
         has_result=True,
+        warning=fit.headline if fit and doubts else "",
+        advice=fit.words if fit and doubts else "",
     )
 
 

@@ -24,6 +24,7 @@ from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import ReportPicture, colour_picture, flag_picture, value_picture
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Goal, Verdict, verdicts
+from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class ReportContent:
     """What a report is made of; everything but title and result may be absent.
 
     ``pixels`` are (row, column) whose spectra are shown; ``effects`` is what a twin rendered; ``provenance``
-    lists facts by name.
+    lists facts by name, ``fit`` says how well the model fits.
     """
 
     title: str
@@ -52,6 +53,7 @@ class ReportContent:
     effects: RenderedEffects | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
     pixels: Sequence[tuple[int, int]] = ()
+    fit: Fit | None = None
 
 
 def render_report(content: ReportContent) -> str:
@@ -67,6 +69,7 @@ def render_report(content: ReportContent) -> str:
         "report.html.j2",
         title=content.title,
         summary=content.summary,
+        fit=content.fit,
         verdicts=content.verdicts,
         pictures=_pictures(content, pixels),
         spectra=_spectra(content, pixels),
@@ -218,6 +221,8 @@ def report_content(
     attributes = dict(result.attrs)
     costs = [StageCost(**cost) for cost in json.loads(attributes.pop("stage_costs", "[]"))]
     plan = attributes.pop("capture_plan", None)
+    fit = Fit.read(attributes)
+    attributes.pop(ATTRIBUTE, None)
     effects = RenderedEffects.of_note(str(attributes.get("effects", "")))
     if effects is not None:
         del attributes["effects"]
@@ -231,5 +236,6 @@ def report_content(
         costs=costs,
         plan=CapturePlan.model_validate_json(plan) if plan else None,
         effects=effects,
+        fit=fit,
         provenance={str(key).replace("_", " "): str(value) for key, value in attributes.items()},
     )

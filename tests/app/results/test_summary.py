@@ -17,6 +17,7 @@ from pytestqt.qtbot import QtBot
 
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.model.fit import Fit, FitFinding
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
 from tests.app.support.small_result import write_small_result
 
@@ -47,15 +48,20 @@ def test_nothing_is_said_where_nothing_is_known(attributes: dict[str, object]) -
     assert effects_text(attributes) == ("", "")
 
 
-def test_the_results_page_says_which_effects_a_scan_had(qtbot: QtBot, tmp_path: Path) -> None:
-    plain = load_result(write_small_result(tmp_path)).load()
-    path = save_result(plain.assign_attrs(effects=json.dumps(NOTE)), tmp_path / "rendered.zarr")
+def make_page(qtbot: QtBot) -> ResultsPage:
     state, runner = ResultsState(), InlineRunner()
     control = ResultsController(state, runner, RecordingNotifier(), UndoStack())
     welcome = Welcome(RecentFiles(Settings()), lambda _: None, lambda: None)
     page = ResultsPage(state, control, runner, welcome)
     qtbot.addWidget(page)
-    control.open(path)
+    return page
+
+
+def test_the_results_page_says_which_effects_a_scan_had(qtbot: QtBot, tmp_path: Path) -> None:
+    plain = load_result(write_small_result(tmp_path)).load()
+    path = save_result(plain.assign_attrs(effects=json.dumps(NOTE)), tmp_path / "rendered.zarr")
+    page = make_page(qtbot)
+    page.open_path(path)
     assert "effects auto within 1 DN: 1 of 2" in page.about.text()
     assert "left out specular" in page.about.toolTip()
     assert help_of(page.pixel_info) == "hard-cases"
@@ -93,3 +99,22 @@ def test_the_head_tells_size_bands_time_and_path() -> None:
     assert found.details == "/scans/leaf.zarr"
     depth = ResultArrays(Path("a.zarr"), np.empty(0), {"depth_mm": np.zeros((48, 64))})
     assert summarise(depth, None, "").about == "64 × 48 px · depth only · a.zarr"
+
+
+def test_a_model_that_does_not_fit_is_told_in_a_line_of_its_own(qtbot: QtBot, tmp_path: Path) -> None:
+    found = FitFinding(
+        part="film", name="shift", value=0.1, unit="mm", limit=0.02, significant=True,
+        sentence="The film has moved by 0.1 mm.", advice="Run the drift check.",
+    )  # fmt: skip
+    plain = load_result(write_small_result(tmp_path)).load()
+    fits, doubts = (Fit.of(f).model_dump_json() for f in ((), (found,)))
+    texts = []
+    for name, fit in (("good", fits), ("bad", doubts)):
+        path = save_result(plain.assign_attrs(fit=fit), tmp_path / f"{name}.zarr")
+        page = make_page(qtbot)
+        page.open_path(path)
+        texts.append((page.warning.isVisibleTo(page), page.warning.text(), page.warning.toolTip()))
+    assert texts[0] == (False, "", "")
+    assert texts[1][0]
+    assert "the place of the film" in texts[1][1]
+    assert "moved by 0.1 mm. Run the drift check." in texts[1][2]

@@ -14,9 +14,10 @@ from matplotlib.image import imread
 
 from dsl_core.evaluation.cost import StageCost
 from dsl_core.evaluation.report.pictures import flag_picture, value_picture
-from dsl_core.evaluation.report.scan_report import ReportContent, render_report
+from dsl_core.evaluation.report.scan_report import ReportContent, render_report, report_content
 from dsl_core.evaluation.summary import evaluate
 from dsl_core.evaluation.verdict import Goal, verdicts
+from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import REASONS, Flag
 
@@ -100,6 +101,18 @@ def test_full_report_says_what_was_found(full: ReportContent) -> None:
     ):
         assert words in page.text
     assert REASONS[Flag.SATURATED] not in page.text
+
+
+def test_what_does_not_fit_is_told_with_its_figure(known: Any) -> None:
+    found = FitFinding(
+        part="orders", name="gain", value=0.08, std=0.01, unit="1", limit=0.02, significant=True,
+        sentence="Order +1 is 8 % brighter.", advice="Calibrate the orders again.",
+    )  # fmt: skip
+    noted = known.result.assign_attrs(fit=Fit.of([found]).model_dump_json())
+    text = Page(render_report(report_content("Fit", noted, known.truth, evaluate(noted, known.truth)))).text
+    for words in ("Look at the light of the diffraction orders", "0.08 ± 0.01", "brighter", "orders again"):
+        assert words in text
+    assert "findings" not in text
 
 
 def test_both_themes_are_there(full: ReportContent) -> None:

@@ -1,0 +1,111 @@
+"""How well the model of a rig fits a scan: findings, and the verdict that they give in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Literal
+
+from pydantic import ValidationError
+
+from dsl_core.model.base import Record
+
+#: Name of the attribute of a result that holds its `Fit` as JSON.
+ATTRIBUTE = "fit"
+
+Part = Literal[
+    "profile",
+    "response",
+    "film",
+    "orders",
+    "light",
+    "motion",
+    "mixed pixels",
+    "bands",
+    "coverage",
+    "geometry",
+]
+
+#: The parts as a sentence names them.
+PARTS: dict[Part, str] = {
+    "profile": "the profile of the lines",
+    "response": "the response of camera or projector",
+    "film": "the place of the film",
+    "orders": "the light of the diffraction orders",
+    "light": "the level of the light",
+    "motion": "the scene, which should not move",
+    "mixed pixels": "pixels that see several surfaces",
+    "bands": "the width of the bands",
+    "coverage": "the part of the picture that was measured",
+    "geometry": "the geometry",
+}
+
+
+class FitFinding(Record):
+    """One figure of how the model fits a scan, and what it says about a part of the model.
+
+    ``value`` has the standard deviation ``std`` (None where nobody knows it); above ``limit`` it matters.
+    ``significant`` means that it matters and that chance does not explain it. ``sentence`` says what was
+    found, ``advice`` what to do about it.
+    """
+
+    part: Part
+    name: str
+    value: float
+    std: float | None = None
+    unit: str
+    limit: float
+    significant: bool
+    sentence: str
+    advice: str = ""
+
+    @property
+    def severity(self) -> float:
+        """How far the value is beyond its limit: 1 at the limit."""
+        return abs(self.value) / self.limit if self.limit else float("inf")
+
+
+class Fit(Record):
+    """What a result says about the fit of its model, from the worst finding to the best."""
+
+    findings: tuple[FitFinding, ...] = ()
+
+    @classmethod
+    def of(cls, findings: Iterable[FitFinding]) -> Fit:
+        """The findings in their order: significant ones first, and by severity among them."""
+        return cls(findings=tuple(sorted(findings, key=lambda f: (not f.significant, -f.severity))))
+
+    @classmethod
+    def read(cls, attributes: Mapping[str, object]) -> Fit | None:
+        """The fit that a result's attributes hold; None where there is none, or none that can be read."""
+        try:
+            return cls.model_validate_json(str(attributes[ATTRIBUTE]))
+        except (KeyError, ValidationError):
+            return None
+
+    @property
+    def significant(self) -> tuple[FitFinding, ...]:
+        """The findings that matter, the worst first."""
+        return tuple(finding for finding in self.findings if finding.significant)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts of the model that do not fit, the worst first, each once."""
+        return tuple(dict.fromkeys(finding.part for finding in self.significant))
+
+    @property
+    def headline(self) -> str:
+        """The verdict in one sentence.
+
+        >>> Fit().headline
+        'The model fits this rig and scene.'
+        """
+        if not self.parts:
+            return "The model fits this rig and scene."
+        names = [PARTS[part] for part in self.parts]
+        listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+        return f"The model does not fit this rig and scene in every respect. Look at {listed}."
+
+    @property
+    def words(self) -> str:
+        """The verdict: how well the model fits, then what does not, each with what to do about it."""
+        return "\n".join([self.headline, *(f"{f.sentence} {f.advice}".strip() for f in self.significant)])

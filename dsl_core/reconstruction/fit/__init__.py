@@ -1,0 +1,1 @@
+"""What a scan says by itself about how well its model fits."""

@@ -1,0 +1,47 @@
+"""The verdict on a fit: its order, its words, and how it travels in a result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.io.result.result_file import load_result, save_result
+from dsl_core.model.fit import ATTRIBUTE, Fit, FitFinding, Part
+from dsl_core.model.result import build_result
+
+
+def finding(part: Part, value: float, significant: bool) -> FitFinding:
+    return FitFinding(
+        part=part, name=f"{part} figure", value=value, std=0.1, unit="px", limit=1.0,
+        significant=significant, sentence=f"The {part} is off by {value:g} px.", advice="Look there.",
+    )  # fmt: skip
+
+
+def test_findings_that_matter_come_first_and_the_worst_of_them_leads() -> None:
+    fit = Fit.of(
+        [finding("light", 9.0, False), finding("film", 2.0, True), finding("profile", -3.0, True),
+         finding("film", 2.5, True)]
+    )  # fmt: skip
+    assert fit.parts == ("profile", "film")
+    assert [found.value for found in fit.findings] == [-3.0, 2.5, 2.0, 9.0]
+    assert fit.headline.endswith("Look at the profile of the lines and the place of the film.")
+    assert fit.words.splitlines()[1] == "The profile is off by -3 px. Look there."
+    assert "light" not in fit.words
+
+
+def test_a_fit_without_findings_that_matter_says_that_the_model_fits() -> None:
+    assert Fit.of([finding("light", 0.5, False)]).words == "The model fits this rig and scene."
+
+
+def test_it_travels_in_a_saved_result(tmp_path: Path) -> None:
+    fit = Fit.of([finding("orders", 1.5, True), finding("mixed pixels", 0.25, False)])
+    arrays: dict[str, NDArray[np.generic]] = {"depth_mm": np.ones((2, 3), np.float32)}
+    made = build_result(arrays, np.empty(0), {ATTRIBUTE: fit.model_dump_json()})
+    assert Fit.read(load_result(save_result(made, tmp_path / "a.zarr")).attrs) == fit
+
+
+def test_results_without_a_fit_that_can_be_read_have_none() -> None:
+    assert Fit.read({}) is None
+    assert Fit.read({ATTRIBUTE: '{"findings": 3}'}) is None
