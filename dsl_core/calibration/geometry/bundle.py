@@ -26,6 +26,9 @@ LENS = 9
 SHARED = 2 * LENS + 6
 #: Corners farther off than this many robust deviations are not on the plane of the board, or are misread.
 OUTLIER_SIGMAS, MAX_ROUNDS = 4.0, 12
+#: A corner nearer than this (px) is never left out, only weighed less: errors that small do no harm, however
+#: sharp all other corners are.
+HARMLESS_PX = 0.08
 #: Before that, corners weigh less the farther off they are, from this many deviations on.
 CAUCHY_SIGMAS, ROBUST_ROUNDS = 2.0, 3
 #: Deviations stated over those that the scatter of corners explains: eight drawn rigs with noise, 145 rows of
@@ -146,21 +149,22 @@ def adjust(
     problem = Problem(poses)
     parameters, one = start, np.ones(2)
     for _ in range(ROBUST_ROUNDS):
-        far = _farthest(problem, parameters, np.ones(len(problem.pose_of), bool))
+        far, _ = _farthest(problem, parameters, np.ones(len(problem.pose_of), bool))
         parameters = _solve(problem, parameters, (one, one), 1 / (1 + (far / CAUCHY_SIGMAS) ** 2))
     used = np.ones(len(problem.pose_of), bool)
     for _ in range(MAX_ROUNDS):
         sigmas = _noises(problem, parameters, used)
-        before, used = used, _farthest(problem, parameters, used) <= outlier_sigmas
+        weights = _weights(problem, parameters, used, outlier_sigmas)
+        before, used = used, weights > 0
         if 4 * used.sum() <= len(parameters):
             raise CalibrationError(
                 "Camera and projector do not fit one board: most corners are outliers. Check the number of"
                 " corners of the board, the projector's size, and that nothing moved during a pose."
             )
-        parameters = _solve(problem, parameters, sigmas, used.astype(float))
+        parameters = _solve(problem, parameters, sigmas, weights)
         if np.array_equal(before, used):
             break
-    return _summary(problem, parameters, used, sigmas)
+    return _summary(problem, parameters, weights, sigmas)
 
 
 def refit(poses: Sequence[PoseObservation], start: Floats) -> Floats:
@@ -168,9 +172,7 @@ def refit(poses: Sequence[PoseObservation], start: Floats) -> Floats:
     problem = Problem(poses)
     everything = np.ones(len(problem.pose_of), bool)
     sigmas = _noises(problem, start, everything)
-    return _solve(
-        problem, start, sigmas, (_farthest(problem, start, everything) <= OUTLIER_SIGMAS).astype(float)
-    )
+    return _solve(problem, start, sigmas, _weights(problem, start, everything, OUTLIER_SIGMAS))
 
 
 def _solve(problem: Problem, start: Floats, sigmas: tuple[Floats, Floats], weights: Floats) -> Floats:
@@ -210,15 +212,23 @@ def _noises(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> tu
     return _noise(camera[used]), _noise(projector[used])
 
 
-def _farthest(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> Floats:
-    """Largest of the four errors of every corner, in robust standard deviations of the used ones."""
+def _farthest(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Largest of the four errors of every corner: in robust standard deviations of the used ones, and px."""
     camera, projector, _, _ = problem.evaluate(parameters)
-    errors = [(np.abs(each) / _noise(each[used])).max(1) for each in (camera, projector)]
-    return np.asarray(np.maximum(*errors))
+    sigmas = [(np.abs(each) / _noise(each[used])).max(1) for each in (camera, projector)]
+    pixels = [np.abs(each).max(1) for each in (camera, projector)]
+    return np.asarray(np.maximum(*sigmas)), np.asarray(np.maximum(*pixels))
+
+
+def _weights(problem: Problem, parameters: Floats, used: NDArray[np.bool_], limit_sigmas: float) -> Floats:
+    """Weights of the corners: zero for outliers, and less than one beyond the limit where that is harmless."""
+    sigmas, pixels = _farthest(problem, parameters, used)
+    kept = (sigmas <= limit_sigmas) | (pixels <= HARMLESS_PX)
+    return np.where(kept, np.minimum(1.0, limit_sigmas / np.maximum(sigmas, 1e-12)), 0.0)
 
 
 def _summary(
-    problem: Problem, parameters: Floats, used: NDArray[np.bool_], sigmas: tuple[Floats, Floats]
+    problem: Problem, parameters: Floats, weights: Floats, sigmas: tuple[Floats, Floats]
 ) -> Adjustment:
     """The fit with its covariance, which allows for the errors of a corner being correlated.
 
@@ -226,8 +236,11 @@ def _summary(
     corners, not over coordinates (Huber's sandwich).
     """
     camera, projector, camera_jac, projector_jac = problem.evaluate(parameters)
-    errors = np.concatenate([camera / sigmas[0], projector / sigmas[1]], 1)[used]
+    used = weights > 0
+    root = np.sqrt(weights[used])
+    errors = np.concatenate([camera / sigmas[0], projector / sigmas[1]], 1)[used] * root[:, None]
     slopes = np.concatenate([camera_jac / sigmas[0][:, None], projector_jac / sigmas[1][:, None]], 1)[used]
+    slopes *= root[:, None, None]
     rows = slopes.reshape(-1, len(parameters))
     scale = np.linalg.norm(rows, axis=0)
     scale[scale == 0] = 1

@@ -21,7 +21,13 @@ from dsl_core.calibration.geometry.bundle import (
     triangulate,
     vector_of,
 )
-from dsl_core.calibration.geometry.pose_series import check_poses, coverage, doubts, largest_angle_deg
+from dsl_core.calibration.geometry.pose_series import (
+    GOOD_RMS_PX,
+    check_poses,
+    coverage,
+    doubts,
+    largest_angle_deg,
+)
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
@@ -40,6 +46,8 @@ Size = tuple[int, int]
 
 #: A pose does not fit when its error is this many times that of the typical pose, or so many corners are off.
 OUTLIER_POSE, OUTLIER_SHARE = 3.0, 0.4
+#: And only where that matters: above this share of the error that a whole calibration may have (px).
+HARMFUL_PX = GOOD_RMS_PX / 4
 MIN_POSES_TO_LEAVE_OUT = 4
 
 
@@ -123,11 +131,12 @@ def without(parameters: Floats, poses: Sequence[int] | NDArray[np.integer]) -> F
 
 
 def _fitting(poses: Sequence[PoseObservation], fit: Adjustment) -> NDArray[np.bool_]:
-    """Which poses agree with the others."""
+    """Which poses agree with the others, or differ from them by too little to do harm."""
     errors = np.array([_rms_px(fit, part, only_used=False) for part in _parts(poses)])
     lost = np.array([1 - fit.used[part].mean() for part in _parts(poses)])
     far = (np.median(np.abs(errors), 0) * OUTLIER_POSE < errors).any(1) & (lost > OUTLIER_SHARE / 2)
-    return np.asarray(~(far | (lost > OUTLIER_SHARE)))
+    harmful = (errors > HARMFUL_PX).any(1)
+    return np.asarray(~(harmful & (far | (lost > OUTLIER_SHARE))))
 
 
 def _parts(poses: Sequence[PoseObservation]) -> list[slice]:

@@ -128,6 +128,19 @@ def test_a_pose_that_moved_is_named_and_left_out() -> None:
     assert any(w.startswith("pose_3 does not fit the other poses") for w in found.warnings)
 
 
+@pytest.mark.parametrize(("off_px", "left_out"), [(0.06, []), (0.4, ["pose_3"])])
+def test_a_pose_is_left_out_for_what_it_does_not_for_standing_out(off_px: float, left_out: list[str]) -> None:
+    # Both are many times the noise of all other poses; only one of them is near the limit of .5 px.
+    poses = poses_seen(noise_px=0.005)
+    poses[3] = with_code(poses[3], poses[3].projector_px + [off_px, -off_px])
+    found = calibrated(poses)
+    assert [pose.name for pose in found.poses if not pose.used] == left_out
+    assert [warning for warning in found.warnings if "does not fit" in warning] == [
+        warning for warning in found.warnings if warning.startswith("pose_3")
+    ]
+    assert found.rms_px < 0.05
+
+
 def test_a_wrong_printed_size_scales_lengths_only_and_a_measured_one_tells(
     found: GeometryCalibration,
 ) -> None:
