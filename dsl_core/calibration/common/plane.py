@@ -20,6 +20,8 @@ Mask = NDArray[np.bool_]
 OUTLIER_SIGMAS, LEAST_RELATIVE = 4.0, 0.012
 ROUNDS = 8
 MIN_PIXELS = 200
+#: Planes through three pixels that the start is chosen from, and pixels that each is judged by.
+TRIALS, JUDGES = 200, 2000
 #: Pixels must spread this much across their longest extent, relative to it.
 LEAST_WIDTH = 0.02
 
@@ -37,20 +39,17 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
     """The plane through most of the depths (rows, columns); ``start`` marks pixels that are certainly on it.
 
     A plane's inverse depth is affine in the image coordinates, and inverse depth is nearly linear in the
-    projector column, so that the rounding of columns averages out without a bias. Raises `CalibrationError`
-    when too few pixels agree.
+    projector column, so that the rounding of columns averages out without a bias. Up to half of the pixels
+    may be elsewhere. Raises `CalibrationError` when too few pixels agree.
     """
     rays = pixel_rays(rig.camera)
     usable = usable & np.isfinite(depth_mm)
     inverse = 1 / np.where(usable, depth_mm, 1.0)
     on_plane = usable if start is None else usable & start
+    _require_pixels(rays, on_plane)
+    on_plane = on_plane & _near_first_plane(rays, inverse, on_plane)
     for _ in range(ROUNDS):
-        if on_plane.sum() < MIN_PIXELS:
-            raise CalibrationError(
-                f"Only {int(on_plane.sum())} pixels are on one plane. Check that a flat target fills the"
-                " middle of the picture, that the projector lights it, and that the code is readable."
-            )
-        _require_area(rays[:2, on_plane])
+        _require_pixels(rays, on_plane)
         plane = Plane(_least_squares(rays[:, on_plane], inverse[on_plane]))
         miss = np.tensordot(plane.inverse, rays, 1) / inverse - 1
         spread = float(robust_std(miss[on_plane]))
@@ -62,9 +61,35 @@ def fit_plane(rig: Rig, depth_mm: Floats, usable: Mask, start: Mask | None = Non
     return TargetPlane(plane, on_plane, float(np.sqrt(np.mean(off**2))))
 
 
-def _require_area(rays: Floats) -> None:
-    """Raise `CalibrationError` where pixels (2, n) form a line, which many planes contain."""
-    narrow, wide = np.linalg.eigvalsh(np.cov(rays))
+def _near_first_plane(rays: Floats, inverse: Floats, on_plane: Mask) -> Mask:
+    """Pixels near the plane through three of them that half of all are nearest to.
+
+    Least median of squares (Rousseeuw 1984): a plane through all pixels at once is drawn to what stands in a
+    corner, and then keeps it.
+    """
+    chosen = np.flatnonzero(on_plane)
+    rng = np.random.default_rng(0)
+    judges = rng.choice(chosen, min(JUDGES, len(chosen)), replace=False)
+    seen, value = rays.reshape(3, -1)[:, judges], inverse.ravel()[judges]
+    corners = rng.integers(0, len(judges), (TRIALS, 3))
+    matrices = seen.T[corners]
+    # Three pixels on a line determine no plane.
+    sound = np.abs(np.linalg.det(matrices)) > 1e-6 * np.ptp(seen[0]) * np.ptp(seen[1])
+    planes = np.linalg.solve(matrices[sound], value[corners[sound]][..., None])[..., 0]
+    middle = np.median(np.abs(planes @ seen / value - 1), 1)
+    best = int(middle.argmin())
+    miss = np.tensordot(planes[best], rays, 1) / inverse - 1
+    return np.asarray(np.abs(miss) < max(OUTLIER_SIGMAS * 1.4826 * float(middle[best]), LEAST_RELATIVE))
+
+
+def _require_pixels(rays: Floats, on_plane: Mask) -> None:
+    """Raise `CalibrationError` where pixels are few, or form a line, which many planes contain."""
+    if on_plane.sum() < MIN_PIXELS:
+        raise CalibrationError(
+            f"Only {int(on_plane.sum())} pixels are on one plane. Check that a flat target fills the"
+            " middle of the picture, that the projector lights it, and that the code is readable."
+        )
+    narrow, wide = np.linalg.eigvalsh(np.cov(rays[:2, on_plane]))
     if narrow < LEAST_WIDTH**2 * wide:
         raise CalibrationError(
             "The pixels on the plane form a line, which does not determine its tilt."

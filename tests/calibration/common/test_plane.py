@@ -37,6 +37,15 @@ def test_a_plane_is_found_and_what_stands_before_it_left_out(rig: Rig) -> None:
     assert found.rms_mm == pytest.approx(0.7, rel=0.05)
 
 
+@pytest.mark.parametrize("nearer", [0.5, 0.7, 0.9, 1.6])
+def test_outliers_in_a_corner_do_not_draw_the_plane(rig: Rig, nearer: float) -> None:
+    depth = seen(rig)
+    depth[:20, :29] = nearer * PLANE.depth_mm(rig)[:20, :29]  # 7 % of all pixels
+    found = fit_plane(rig, depth, np.ones((72, 112), bool))
+    assert found.plane.distance_mm == pytest.approx(700.0, abs=0.1)
+    assert not found.on_plane[:20, :29].any()
+
+
 def test_depths_that_are_unknown_or_unusable_do_not_count(rig: Rig) -> None:
     depth, usable = seen(rig), np.ones((72, 112), bool)
     depth[40:, ::3] = np.nan
