@@ -29,8 +29,8 @@ Mask = NDArray[np.bool_]
 
 #: Blocks along each side whose scatter gives the deviation of a mean.
 BLOCKS = 6
-#: A pixel this far (relative) from the median of its colour is dirt, a mark, or outside the target.
-OFF_MEDIAN = 0.2
+#: A pixel this far (relative) from the smooth course of its colour is dirt, a mark, or outside the target.
+OFF_COURSE, COURSE_ROUNDS = 0.2, 10
 MIN_PIXELS = 400
 #: Nodes over rows and columns, and blocks per node that the residual is judged by.
 NODES = (9, 13)
@@ -38,6 +38,9 @@ BLOCKS_PER_NODE = 3
 #: Weight of third differences between nodes against a block: noise should not bend the grid; vignetting,
 #: which is quadratic, costs nothing.
 STIFFNESS = 3.0
+#: Error of straight pieces through a parabola, rms over the pieces, as a share of its second difference:
+#: least squares leaves ``(t**2 - t + 1/6) / 2`` of it along a piece.
+STRAIGHT_PIECES = 0.5 / np.sqrt(180.0)
 #: Signals of a channel under an LED with a larger relative deviation say nothing of the response's shape.
 TRUSTED = 0.02
 #: Curvature against which a level counts: small, so that only the shape is kept smooth.
@@ -74,7 +77,7 @@ def measure_white(pictures: UniformPictures) -> WhiteMeasurement:
     channel = bayer_channels(pictures.sensor.bayer, *pictures.shading.shape)
     flat = pictures.radiance / np.where(pictures.shading > 0, pictures.shading, np.nan)
     good = pictures.usable & ~pictures.saturated & np.isfinite(flat).all(0)
-    used = good & _near_median(flat[3], channel, good)
+    used = good & _near_course(flat[3], channel, good)
     if used.sum() < MIN_PIXELS:
         raise CalibrationError(
             f"Only {int(used.sum())} pixels of the Spectralon are lit, even and unsaturated. Place it in the"
@@ -115,13 +118,24 @@ def spectralon_calibration(
     )
 
 
-def _near_median(white: Floats, channel: NDArray[np.int64], good: Mask) -> Mask:
-    near = np.zeros(good.shape, bool)
+def _near_course(white: Floats, channel: NDArray[np.int64], good: Mask) -> Mask:
+    """Pixels near a quadratic over the image, common to all colours: vignetting is no dirt, however strong."""
+    relative = np.full(good.shape, np.nan)
     for c in range(3):
         of_colour = good & (channel == c)
         if of_colour.any():
-            middle = float(np.median(white[of_colour]))
-            near |= of_colour & (np.abs(white - middle) < OFF_MEDIAN * abs(middle))
+            relative[of_colour] = white[of_colour] / max(float(np.median(white[of_colour])), 1e-12)
+    rows, columns = np.nonzero(good)
+    y, x = rows / good.shape[0] - 0.5, columns / good.shape[1] - 0.5
+    terms, value = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1), relative[good]
+    course = np.ones(len(value))
+    for _ in range(COURSE_ROUNDS if len(value) >= MIN_PIXELS else 0):
+        # Cauchy weights: what is far off pulls no more.
+        weight = 1 / (1 + ((value - course) / OFF_COURSE) ** 2)
+        fit = np.linalg.solve((terms.T * weight) @ terms + 1e-9 * np.eye(6), (terms.T * weight) @ value)
+        course = np.maximum(terms @ fit, 0.05)
+    near = np.zeros(good.shape, bool)
+    near[good] = np.abs(value / course - 1) < OFF_COURSE
     return near
 
 
@@ -167,7 +181,11 @@ def _square(values: Floats) -> Square3:
 
 @dataclass(frozen=True)
 class Evenness:
-    """A flat field, deviations of its nodes, reduced chi-square of an even camera, rms of blocks about it."""
+    """A flat field, its deviations, reduced chi-square of an even camera, rms of blocks about it.
+
+    The deviations are those of the gain at pixels around each node: noise, and what a grid leaves of a gain
+    that is curved between its nodes.
+    """
 
     flat_field: FlatField
     std: tuple[tuple[float, ...], ...]
@@ -200,6 +218,7 @@ def fit_evenness(relative: Floats, usable: Mask) -> Evenness:
         rows_px=tuple(rows_px.tolist()), columns_px=tuple(columns_px.tolist()), gain=_rows(gain / mean)
     )
     chi_square = even / variance if variance > 0 else 1.0
+    std = np.hypot(std, _between_nodes(gain))
     return Evenness(flat_field, _rows(std / mean), chi_square, float(np.sqrt(variance)))
 
 
@@ -221,6 +240,14 @@ def _roughness() -> Floats:
     down, across = NODES
     d, a = np.diff(np.eye(down), 3, axis=0), np.diff(np.eye(across), 3, axis=0)
     return np.concatenate([np.kron(d, np.eye(across)), np.kron(np.eye(down), a)])
+
+
+def _between_nodes(gain: Floats) -> Floats:
+    """Interpolation error (nodes,) of a bilinear grid by its second differences, rms around each node."""
+    grid = gain.reshape(NODES)
+    inside = np.diff(grid, 2, axis=0), np.diff(grid, 2, axis=1)
+    down, across = np.pad(inside[0], ((1, 1), (0, 0)), "edge"), np.pad(inside[1], ((0, 0), (1, 1)), "edge")
+    return np.asarray(STRAIGHT_PIECES * np.hypot(down, across).ravel())
 
 
 def _rows(values: Floats) -> tuple[tuple[float, ...], ...]:

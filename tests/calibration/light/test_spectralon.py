@@ -47,6 +47,23 @@ def test_an_even_camera_is_found_even_within_its_deviation() -> None:
     assert 0.5 < np.sqrt(np.mean(np.square(sigmas))) < 1.3
 
 
+@pytest.mark.parametrize("noise", [0.002, 0.01])
+def test_deviations_of_the_grid_hold_what_it_cannot_bend_to(noise: float) -> None:
+    truth = VIGNETTE / VIGNETTE.mean()
+    found = fit_evenness(truth + noise * np.random.default_rng(1).standard_normal(SHAPE), EVERY)
+    stated = gain_at_pixels(found.flat_field.model_copy(update={"gain": found.std}), *SHAPE)
+    sigmas = (gain_at_pixels(found.flat_field, *SHAPE) - truth) / stated
+    assert 0.7 < np.sqrt(np.mean(sigmas**2)) < 1.1
+
+
+def test_strong_vignetting_is_no_dirt() -> None:
+    found = measure_white(pictures(1 - 0.25 * (X**2 + Y**2)))
+    assert found.used.mean() > 0.99
+    dirty = pictures(1 - 0.25 * (X**2 + Y**2))
+    dirty.radiance[:, 20:30, 20:40] *= 0.7
+    assert not measure_white(dirty).used[20:30, 20:40].any()
+
+
 def test_white_signals_are_those_at_unit_shading_without_vignetting() -> None:
     found = measure_white(pictures(VIGNETTE))
     scale = found.white.array / SIGNAL
