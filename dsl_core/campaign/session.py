@@ -168,7 +168,7 @@ class CalibrationSession:
             conditions=current_conditions(self.devices),
             settings=self._settings(),
             based_on=self.based_on,
-            figures=self.recipe.figures(record),
+            figures=self.recipe.figures(record, self.based_on),
             record=record.model_dump(mode="json"),
         )
         self.campaign.propose(fitted)

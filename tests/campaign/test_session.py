@@ -265,6 +265,7 @@ def test_all_calibrations_make_a_rig_that_says_where_it_comes_from(
     assert rig.conditions is not None
     assert rig.provenance.camera_serial == "TWIN-C"
     assert load_rig(save_rig(rig, tmp_path / "rig.json")) == rig
+    assert [recipe.done_before for recipe in recipes] == [(), ("first",)]
     # Nothing is captured or fitted a second time.
     captured = [list(recipe.captured) for recipe in recipes]
     calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from dsl_core.campaign.common.recipe import Bench, Recipe, Step
@@ -36,6 +37,7 @@ class FakeRecipe(Recipe[Brightness]):
     bad_steps: set[str] = field(default_factory=set)
     looks: list[str] = field(default_factory=list)
     captured: list[str] = field(default_factory=list)
+    done_before: tuple[str, ...] = ()
 
     def steps(self, bench: Bench) -> tuple[Step, ...]:
         """One a key."""
@@ -76,9 +78,10 @@ class FakeRecipe(Recipe[Brightness]):
         progress.report("fit", 1, 1)
         return Brightness(means_dn=tuple(means))
 
-    def figures(self, record: Brightness) -> tuple[Figure, ...]:
+    def figures(self, record: Brightness, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """The brightest mean against its limit."""
         advice = "Open the aperture."
+        self.done_before = tuple(done)
         return (
             Figure(
                 name="brightest",

@@ -221,7 +221,7 @@ def _farthest(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> 
 
 
 def _weights(problem: Problem, parameters: Floats, used: NDArray[np.bool_], limit_sigmas: float) -> Floats:
-    """Weights of the corners: zero for outliers, and less than one beyond the limit where that is harmless."""
+    """Weights of the corners: zero for outliers, less than one beyond the limit where that is harmless."""
     sigmas, pixels = _farthest(problem, parameters, used)
     kept = (sigmas <= limit_sigmas) | (pixels <= HARMLESS_PX)
     return np.where(kept, np.minimum(1.0, limit_sigmas / np.maximum(sigmas, 1e-12)), 0.0)

@@ -119,7 +119,7 @@ def spectralon_calibration(
 
 
 def _near_course(white: Floats, channel: NDArray[np.int64], good: Mask) -> Mask:
-    """Pixels near a quadratic over the image, common to all colours: vignetting is no dirt, however strong."""
+    """Pixels near a quadratic over the image, common to all colours: strong vignetting is no dirt."""
     relative = np.full(good.shape, np.nan)
     for c in range(3):
         of_colour = good & (channel == c)

@@ -6,6 +6,7 @@ each pixel sees; through each filter, lines that tile the frame show how much li
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,9 +118,9 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
         progress.report("filters", len(filtered), len(filtered))
         return fit_bandpass(rig, scan, profile, seen, self.reflectance)
 
-    def figures(self, record: BandpassCalibration) -> tuple[Figure, ...]:
+    def figures(self, record: BandpassCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """Deviations of efficiency and response, blur and halo, and filters in doubt."""
-        return bandpass_figures(record)
+        return bandpass_figures(record, done)
 
     def apply(self, record: BandpassCalibration, rig: Rig) -> Rig:
         """The rig with efficiencies, response, white scale, blur and halo."""
@@ -198,7 +199,7 @@ class BandpassRecipe(Recipe[BandpassCalibration]):
         return SeenFilter(note.filter_nm, note.transmission, note.measured, light)
 
 
-def bandpass_figures(record: BandpassCalibration) -> tuple[Figure, ...]:
+def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
     """Deviations of efficiency and response, second orders, blur and halo, and filters in doubt."""
     centres = np.array([each.effective_nm for each in record.filters])
     figures = [
@@ -217,7 +218,7 @@ def bandpass_figures(record: BandpassCalibration) -> tuple[Figure, ...]:
             value=100 * float(np.median(_relative_std(curve, centres[_bright(curve, centres)]))),
             unit="%",
             high=5.0,
-            advice="Measure the filters' transmissions, or calibrate with a Color Checker first.",
+            advice=_response_advice(record, done),
         )
         for colour, curve in zip(("red", "green", "blue"), record.response, strict=True)
     ]
@@ -247,6 +248,21 @@ def bandpass_figures(record: BandpassCalibration) -> tuple[Figure, ...]:
         ),
     ]
     return tuple(figures)
+
+
+def _response_advice(record: BandpassCalibration, done: Collection[str]) -> str:
+    """What would make the response better known that has not been done yet."""
+    ways = []
+    if not all(each.curve_measured for each in record.filters):
+        ways.append("measure the filters' transmissions")
+    if "color-checker" not in done:
+        ways.append("calibrate with a Color Checker first")
+    ways = ways or [
+        "use more filters where this colour is bright",
+        "set a second exposure (long_ratio)",
+    ]
+    text = ", or ".join(ways)
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _plain(name: str, unit: str, value: float, std: float) -> Figure:

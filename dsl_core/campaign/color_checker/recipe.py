@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,7 +102,7 @@ class ColorCheckerRecipe(Recipe[ColorCheckerCalibration]):
         with naming(step):
             return self._fit(bench, step, progress)
 
-    def figures(self, record: ColorCheckerCalibration) -> tuple[Figure, ...]:
+    def figures(self, record: ColorCheckerCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """Residuals of the patches, against their limits."""
         return color_checker_figures(record)
 

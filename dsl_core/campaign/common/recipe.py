@@ -7,7 +7,7 @@ in its folder, so that an interrupted calibration can continue where it stopped.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -137,8 +137,11 @@ class Recipe(ABC, Generic[RecordT]):
         """Calibrate from the captures of all steps; the devices are not used."""
 
     @abstractmethod
-    def figures(self, record: RecordT) -> tuple[Figure, ...]:
-        """The key figures of a fit against their limits."""
+    def figures(self, record: RecordT, done: Collection[str] = ()) -> tuple[Figure, ...]:
+        """The key figures of a fit against their limits.
+
+        ``done`` are the names of the calibrations that it was fitted on, which advice need not name.
+        """
 
     @abstractmethod
     def apply(self, record: RecordT, rig: Rig) -> Rig:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,7 +126,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             return found
         return found.model_copy(update={"chain": self._chain(bench, plain, found, progress)})
 
-    def figures(self, record: DepthStageCalibration) -> tuple[Figure, ...]:
+    def figures(self, record: DepthStageCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """Flatness, steps, held-out error and doubts."""
         return depth_stage_figures(record)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -107,7 +107,7 @@ class GeometryRecipe(Recipe[GeometryCalibration]):
         progress.report("adjust lenses and pose", 1, 1)
         return record
 
-    def figures(self, record: GeometryCalibration) -> tuple[Figure, ...]:
+    def figures(self, record: GeometryCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """Reprojection, planes, squares and coverage against their limits."""
         return geometry_figures(record)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,7 +88,7 @@ class SelfTestRecipe(Recipe[SelfTest]):
         progress.report("self-test", 1, 1)
         return found
 
-    def figures(self, record: SelfTest) -> tuple[Figure, ...]:
+    def figures(self, record: SelfTest, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """Everything measured, against its limits."""
         return selftest_figures(record)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -95,7 +96,7 @@ class SpectralonRecipe(Recipe[SpectralonCalibration]):
         with naming(pictures):
             return self._pictures(bench, pictures, emission, reflectance, progress)
 
-    def figures(self, record: SpectralonCalibration) -> tuple[Figure, ...]:
+    def figures(self, record: SpectralonCalibration, done: Collection[str] = ()) -> tuple[Figure, ...]:
         """What was measured, against its limits."""
         return spectralon_figures(record)
 

@@ -132,7 +132,7 @@ def test_a_pose_that_moved_is_named_and_left_out() -> None:
 def test_a_pose_is_left_out_for_what_it_does_not_for_standing_out(off_px: float, left_out: list[str]) -> None:
     # Both are many times the noise of all other poses; only one of them is near the limit of .5 px.
     poses = poses_seen(noise_px=0.005)
-    poses[3] = with_code(poses[3], poses[3].projector_px + [off_px, -off_px])
+    poses[3] = with_code(poses[3], poses[3].projector_px + np.array([off_px, -off_px]))
     found = calibrated(poses)
     assert [pose.name for pose in found.poses if not pose.used] == left_out
     assert [warning for warning in found.warnings if "does not fit" in warning] == [

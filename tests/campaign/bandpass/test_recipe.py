@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -82,6 +83,24 @@ def test_response_comes_near_the_truth(bench: Bench, record: BandpassCalibration
 def test_figures_pass_and_record_goes_through_json(record: BandpassCalibration) -> None:
     assert failures(RECIPE.figures(record)) == ()
     assert BandpassCalibration.model_validate_json(record.model_dump_json()) == record
+
+
+@pytest.mark.parametrize(
+    ("measured", "done", "advised", "not_advised"),
+    [
+        (False, (), "Measure the filters' transmissions, or calibrate with a Color Checker", "long_ratio"),
+        (True, ("geometry",), "Calibrate with a Color Checker first.", "ransmissions"),
+        (True, ("color-checker",), "Use more filters .*long_ratio", "with a Color Checker|ransmissions"),
+    ],
+)
+def test_advice_names_nothing_that_was_done_already(
+    record: BandpassCalibration, measured: bool, done: tuple[str, ...], advised: str, not_advised: str
+) -> None:
+    filters = tuple(each.model_copy(update={"curve_measured": measured}) for each in record.filters)
+    figures = RECIPE.figures(record.model_copy(update={"filters": filters}), done)
+    (advice,) = {figure.advice for figure in figures if figure.name.startswith("response of")}
+    assert re.search(advised, advice)
+    assert not re.search(not_advised, advice)
 
 
 def test_finished_scan_is_not_taken_again(bench: Bench) -> None:
