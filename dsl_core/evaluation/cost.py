@@ -46,16 +46,6 @@ class StageTimer:
             seconds = time.perf_counter() - started
             self.stages.append(StageCost(name, seconds, watch.stop(), watch.first))
 
-    @property
-    def total_seconds(self) -> float:
-        """Seconds of all stages together."""
-        return sum(stage.seconds for stage in self.stages)
-
-    @property
-    def peak_bytes(self) -> int:
-        """Largest resident memory of any stage, 0 before the first."""
-        return max((stage.peak_bytes for stage in self.stages), default=0)
-
 
 class _MemoryWatch:
     """Reads the resident memory of this process in a thread until it is stopped."""

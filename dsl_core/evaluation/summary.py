@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,20 +107,6 @@ class Evaluation:
     @property
     def _widths_nm(self) -> list[float]:
         return [patch.peak.fwhm_nm for patch in self.patches if patch.peak]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything as plain numbers and lists, ready for JSON."""
-        return {key: _plain(value) for key, value in asdict(self).items()}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

@@ -63,12 +63,6 @@ class FilmFrame:
         return Vectors(*(float(q[0]) * p.x + float(q[1]) * p.y + float(q[2]) * p.z for q in r))
 
 
-def diffract(a: Tensor, b: Tensor, order: int, wavelength_over_period: Tensor | float) -> Vectors:
-    """Outgoing direction cosines of incoming (a, b); NaN where the order is evanescent."""
-    out = a - order * wavelength_over_period
-    return Vectors(out, b, torch.sqrt(1 - out * out - b * b))
-
-
 def incoming_direction(frame: FilmFrame, point: Vectors, order: int, wavelength_nm: Tensor) -> Vectors:
     """Direction in which light must leave the projector's centre to reach a point through an order.
 

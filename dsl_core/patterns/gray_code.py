@@ -68,11 +68,6 @@ def code_image(spec: BinaryCode, size_px: tuple[int, int], index: int) -> NDArra
     return image
 
 
-def code_images(spec: BinaryCode, size_px: tuple[int, int]) -> NDArray[np.uint8]:
-    """All frames of the code, shape (frames, height, width), 0 or 255; white and black are last."""
-    return np.stack([code_image(spec, size_px, i) for i in range(frame_count(spec, size_px))])
-
-
 @dataclass(frozen=True)
 class DecodedCode:
     """What a Gray code says of each camera pixel; arrays share one shape.
@@ -192,20 +187,6 @@ class GrayDecoder:
         self._row = np.zeros(shape if self._bits[1] else 0, np.int32)
         self._margin = np.full(shape, np.inf, np.float32)
         self._margin_sigmas = np.full(shape, np.inf, np.float32) if with_sigmas else None
-
-
-def decode(
-    positive: ArrayLike,
-    inverse: ArrayLike,
-    spec: BinaryCode,
-    size_px: tuple[int, int],
-    min_margin: float = 0.0,
-) -> DecodedCode:
-    """Decode whole stacks, shape (pairs, ...), columns before rows, most significant bit first."""
-    decoder = GrayDecoder(spec, size_px)
-    for one, other in zip(np.asarray(positive), np.asarray(inverse), strict=True):
-        decoder.add(one, other)
-    return decoder.finish(min_margin=min_margin)
 
 
 def lit_mask(white: ArrayLike, black: ArrayLike, threshold: ArrayLike) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import EnsembleCode, XorCode
-from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, code_image, frame_count
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, bit_counts, code_image
 
 #: Every bit of fine stripes stands this many deviations above its inverse where light comes straight.
 STRAIGHT_SIGMAS = 5.0
@@ -32,11 +32,6 @@ def xor_image(spec: Spec, size_px: tuple[int, int], index: int) -> NDArray[np.ui
     if pair in (base_pair, columns + rows):
         return image
     return np.asarray(image ^ code_image(spec, size_px, 2 * base_pair))
-
-
-def xor_images(spec: Spec, size_px: tuple[int, int]) -> NDArray[np.uint8]:
-    """All frames of the code, shape (frames, height, width), 0 or 255; white and black are last."""
-    return np.stack([xor_image(spec, size_px, i) for i in range(frame_count(spec, size_px))])
 
 
 class XorDecoder:

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.plan import GrayCode
-from dsl_core.patterns.gray_code import DecodedCode, decode
+from dsl_core.patterns.gray_code import DecodedCode
+from tests.cases.code_frames import decode
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[3] / "shared"))
 PROJECTOR_PX = (1024, 768)

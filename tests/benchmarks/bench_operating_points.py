@@ -12,7 +12,6 @@ from typing import Any
 
 from dsl_core import pipeline
 from dsl_core.capture.runner import Runner
-from dsl_core.capture.sink import MemorySink
 from dsl_core.evaluation.summary import Evaluation
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.presets import PRESETS
@@ -21,6 +20,7 @@ from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.sim_devices import LATENCY_MS, open_twin
 from dsl_core.workflows import scans
 from tests.benchmarks.common import options, print_table, write_json
+from tests.cases.memory_sink import MemorySink
 
 SIZE = "445x290"
 QUICK_SIZE = "112x72"

@@ -70,7 +70,7 @@ def read_all(folder: Path, step_nm: float) -> dict[str, Any]:
     from dsl_core.io.scan.folder import ScanReader
 
     reader = ScanReader(folder)
-    return {"frames": sum(1 for _ in reader.read_many(reader.plan.shots()))}
+    return {"frames": sum(reader.read(shot).ndim > 0 for shot in reader.plan.shots())}
 
 
 def save_all(folder: Path, step_nm: float) -> dict[str, Any]:
@@ -100,8 +100,8 @@ def grow(folder: Path, step_nm: float) -> dict[str, Any]:
         start = time.process_time()
         scans.reconstruct_scan(folder, options=choice, timer=timer)
         cpu_s = time.process_time() - start
-    used = max(first.peak_bytes, second.peak_bytes) - first.stages[0].start_bytes
-    return {"seconds": second.total_seconds, "cpu_s": cpu_s, "used_mb": used / MB}
+    used = max(s.peak_bytes for s in first.stages + second.stages) - first.stages[0].start_bytes
+    return {"seconds": sum(s.seconds for s in second.stages), "cpu_s": cpu_s, "used_mb": used / MB}
 
 
 def peak_mb() -> float:

@@ -18,8 +18,6 @@ from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan
 
-BATCH = 64
-
 
 def make_frames(plan: CapturePlan, count: int = 24) -> list[NDArray[np.uint16]]:
     """Lines on a dim object as a 12 bit camera sees them: 10 electrons per DN, read noise 0.5 DN."""
@@ -61,22 +59,13 @@ def main() -> None:
         stored = sum(path.stat().st_size for path in (folder / "frames").iterdir())
         print(f"{stored / 1e6:.0f} MB on disk, {plan.raw_bytes / stored:.2f} times smaller than raw")
         shots = list(plan.shots())
-        stack = np.zeros((BATCH, *frames[0].shape), np.uint16)
 
-        def read_stacks(threads: int, verify: bool) -> None:
-            for first in range(0, len(shots), BATCH):
-                some = shots[first : first + BATCH]
-                reader.read_stack(some, stack[: len(some)], threads, verify)
+        def read_all(verify: bool) -> None:
+            for shot in shots:
+                reader.read(shot, verify=verify)
 
-        for threads in (1, 2):
-            for verify in (True, False):
-                how = f"{threads} threads, {'verified' if verify else 'unverified'}"
-                timed(
-                    f"read_many, {how}",
-                    plan,
-                    lambda t=threads, v=verify: sum(1 for _ in reader.read_many(shots, t, v)),  # type: ignore[misc]
-                )
-                timed(f"read_stack, {how}", plan, lambda t=threads, v=verify: read_stacks(t, v))  # type: ignore[misc]
+        timed("read, verified", plan, lambda: read_all(True))
+        timed("read, unverified", plan, lambda: read_all(False))
         timed("resume (all frames checked)", plan, lambda: ScanWriter.resume(folder, plan).close())
 
 

@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.capture.movement import MovementReport, check_movement, pick_reference_shots
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
 from dsl_core.simulation.published_rig import published_rig
+from tests.cases.memory_sink import MemorySink
 
 PLAN = CapturePlan(
     camera_size_px=(64, 48),

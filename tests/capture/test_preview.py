@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.preview import BlockGraphs, line_positions, quick_picture, statistics
-from dsl_core.capture.sink import MemorySink, WatchedSink
+from dsl_core.capture.sink import WatchedSink
 from dsl_core.errors import DecodeError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines, Setting, Shot
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.sensor import bayer_channels
+from tests.cases.memory_sink import MemorySink
 
 PATTERNS: tuple[BayerPattern, ...] = ("RGGB", "BGGR", "GRBG", "GBRG")
 

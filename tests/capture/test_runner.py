@@ -14,13 +14,13 @@ import pytest
 
 from dsl_core.capture.exposure import RetryPolicy
 from dsl_core.capture.runner import Runner, State, Status
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DeviceError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Setting, Shot
 from dsl_core.progress import CallbackProgress
+from tests.cases.memory_sink import MemorySink
 
 Pattern = Callable[..., Any]
 

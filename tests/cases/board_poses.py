@@ -15,7 +15,7 @@ from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.plan import GrayCode
 from dsl_core.optics.pinhole import project
-from dsl_core.patterns.gray_code import code_images
+from tests.cases.code_frames import code_images
 
 BOARD = Checkerboard(columns=9, rows=7, square_mm=30.0)
 CAMERA_PX, PROJECTOR_PX = (890, 580), (640, 360)

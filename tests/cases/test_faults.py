@@ -7,7 +7,6 @@ import pytest
 
 from dsl_core.capture.exposure import RetryPolicy
 from dsl_core.capture.runner import Runner
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import Camera, DeviceRig, Projector
 from dsl_core.devices.conformance import CameraConformance, ProjectorConformance
 from dsl_core.devices.replay import replay_rig
@@ -16,6 +15,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
 from tests.cases.faults import FaultPlan, with_faults
+from tests.cases.memory_sink import MemorySink
 
 PLAN = CapturePlan(
     camera_size_px=(12, 8),

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from dsl_core import pipeline
 from dsl_core.capture.runner import Runner
-from dsl_core.capture.sink import MemorySink
 from dsl_core.evaluation.summary import Evaluation, Truth, interior
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -31,6 +30,7 @@ from dsl_core.simulation.scenes.surfaces import ENDLESS, tilted
 from dsl_core.simulation.scenes.truth import Materials, Scene
 from dsl_core.simulation.sim_devices import assemble
 from dsl_core.simulation.world import World
+from tests.cases.memory_sink import MemorySink
 
 #: Pixels of a patch across and down, patches of a piece, and its grey rim, where demosaicing lacks pixels.
 PATCH_PX, PATCHES, RIM_PX = 10, (6, 4), 4

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from dsl_core.capture.runner import Runner
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.registry import list_rigs, open_rig
 from dsl_core.errors import DeviceError, PlanError
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
+from tests.cases.memory_sink import MemorySink
 
 Install = Callable[..., None]
 

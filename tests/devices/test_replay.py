@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.runner import Runner
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import Camera, DeviceRig, Projector
 from dsl_core.devices.conformance import CameraConformance, ProjectorConformance, RigConformance
 from dsl_core.devices.registry import open_rig
@@ -18,6 +17,7 @@ from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
+from tests.cases.memory_sink import MemorySink
 
 PLAN = CapturePlan(
     camera_size_px=(12, 8),

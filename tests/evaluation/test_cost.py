@@ -25,10 +25,8 @@ def test_stages_are_kept_in_order_with_time_and_memory() -> None:
     assert [stage.name for stage in timer.stages] == ["small", "large"]
     small, large = timer.stages
     assert small.seconds >= 0.03
-    assert timer.total_seconds == pytest.approx(small.seconds + large.seconds)
     # The memory is freed before the stage ends, so only a reading while it ran can have seen it.
     assert large.peak_bytes - large.start_bytes > 150e6
-    assert timer.peak_bytes == large.peak_bytes
 
 
 def test_a_failing_stage_is_kept_and_its_thread_ends() -> None:
@@ -37,7 +35,3 @@ def test_a_failing_stage_is_kept_and_its_thread_ends() -> None:
         raise RuntimeError("broken")
     assert timer.stages[0].name == "fails"
     assert all(thread.name != "memory watch" for thread in threading.enumerate())
-
-
-def test_no_stage_no_cost() -> None:
-    assert StageTimer().peak_bytes == 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -93,11 +92,6 @@ def test_interior_leaves_out_borders() -> None:
     material[:, 10:] = 1
     inside = interior(material, 2)
     np.testing.assert_array_equal(np.flatnonzero(~inside[5]), [8, 9, 10, 11])
-
-
-def test_everything_goes_to_json(known: Any) -> None:
-    text = json.dumps(evaluate(known.result, known.truth).as_dict())
-    assert json.loads(text)["patches"][1]["peak"]["complete"] is True
 
 
 def test_verdicts_follow_their_goals(known: Any) -> None:

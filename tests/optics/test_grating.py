@@ -11,12 +11,18 @@ import torch
 from dsl_core.model.rig import Film, Rig
 from dsl_core.optics import grating
 from dsl_core.optics.correspondence import GratingModel, projector_points, zero_order
-from dsl_core.optics.grating import FilmFrame, Vectors, diffract, incoming_direction
+from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import project
 from dsl_core.simulation.published_rig import published_rig
 
 BANDS_NM = np.arange(430.0, 661.0, 5.0)
 NM = torch.tensor([430.0, 550.0, 660.0], dtype=torch.float64)
+
+
+def diffract(a: torch.Tensor, b: torch.Tensor, order: int, over_period: torch.Tensor | float) -> Vectors:
+    """Outgoing direction cosines of incoming (a, b); NaN where the order is evanescent."""
+    out = a - order * over_period
+    return Vectors(out, b, torch.sqrt(1 - out * out - b * b))
 
 
 def sampled(rig: Rig, count: int = 400) -> tuple[torch.Tensor, torch.Tensor]:

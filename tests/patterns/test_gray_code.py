@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import GrayCode
-from dsl_core.patterns.gray_code import GrayDecoder, code_images, decode, lit_mask
+from dsl_core.patterns.gray_code import GrayDecoder, lit_mask
+from tests.cases.code_frames import code_images, decode
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[3] / "shared"))
 CAPTURES = SHARED / "data" / "procam_checkerboard" / "half_res"

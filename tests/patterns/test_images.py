@@ -7,9 +7,10 @@ import pytest
 
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import CapturePlan, Columns, GrayCode, LineComb, ScanLines, Shot
-from dsl_core.patterns.gray_code import code_image, code_images, frame_count
+from dsl_core.patterns.gray_code import code_image, frame_count
 from dsl_core.patterns.images import pattern_image, spectral_profiles
 from dsl_core.patterns.multiplexed import profile, profiles
+from tests.cases.code_frames import code_images
 
 SIZE = (640, 360)
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
 from dsl_core.model.plan import GrayCode, XorCode
-from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, code_images
-from dsl_core.patterns.xor_code import XorDecoder, xor_images
+from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder
+from dsl_core.patterns.xor_code import XorDecoder
+from tests.cases.code_frames import code_images
 
 SIZE = (640, 360)
 COLUMNS = GrayCode(rows=False)
@@ -36,7 +37,7 @@ def widest_stripe_px(line: NDArray[np.uint8]) -> int:
 @pytest.mark.parametrize("size", [SIZE, (37, 20)])
 def test_round_trip_of_every_projector_pixel(base_px: BaseWidth, size: tuple[int, int]) -> None:
     code = XorCode(base_px=base_px)
-    images = xor_images(code, size)
+    images = code_images(code, size)
     found = decode(images, XorDecoder(code, size), len(images) // 2 - 1)
     rows, columns = np.indices(size[::-1])
     assert not found.undecided.any()
@@ -47,7 +48,7 @@ def test_round_trip_of_every_projector_pixel(base_px: BaseWidth, size: tuple[int
 
 @pytest.mark.parametrize("base_px", [2, 4])
 def test_stripes_are_fine(base_px: BaseWidth) -> None:
-    images = xor_images(XorCode(base_px=base_px), SIZE)
+    images = code_images(XorCode(base_px=base_px), SIZE)
     np.testing.assert_array_equal(images[-2:], np.stack([np.full(SIZE[::-1], 255), np.zeros(SIZE[::-1])]))
     assert max(widest_stripe_px(image[0]) for image in images[:20]) <= 2 * base_px
     assert max(widest_stripe_px(image[:, 0]) for image in images[20:38]) <= 2 * base_px
@@ -64,7 +65,7 @@ def test_interreflection_breaks_gray_but_not_xor() -> None:
         return np.asarray(0.4 * lines + 0.6 * far)[:, 50:400]
 
     gray = decode(seen(code_images(COLUMNS, SIZE)), GrayDecoder(COLUMNS, SIZE), 10)
-    xor = decode(seen(xor_images(FINE, SIZE)), XorDecoder(FINE, SIZE), 10)
+    xor = decode(seen(code_images(FINE, SIZE)), XorDecoder(FINE, SIZE), 10)
     np.testing.assert_array_equal(xor.column, np.arange(50, 400))
     assert xor.row is None
     assert (gray.column != np.arange(50, 400)).mean() > 0.3
@@ -72,7 +73,7 @@ def test_interreflection_breaks_gray_but_not_xor() -> None:
 
 def test_undecided_and_outside_stay_marked() -> None:
     code = XorCode(rows=False)
-    images = xor_images(code, (1024, 1))[:20].astype(float)
+    images = code_images(code, (1024, 1))[:20].astype(float)
     images[4, 0, 9] = images[5, 0, 9] = np.nan
     found = decode(images, XorDecoder(code, SIZE), 10)
     expected = np.arange(1024) >= 640
@@ -83,4 +84,4 @@ def test_undecided_and_outside_stay_marked() -> None:
 
 def test_too_small_for_the_base() -> None:
     with pytest.raises(PlanError, match="more than 4 columns"):
-        xor_images(XorCode(), (640, 2))
+        code_images(XorCode(), (640, 2))

@@ -8,7 +8,7 @@ import numpy as np
 import torch
 
 from dsl_core.model.plan import GrayCode
-from dsl_core.patterns.gray_code import code_images, decode
+from tests.cases.code_frames import code_images, decode
 from tests.stability.case import Case, Outcome
 from tests.stability.double_double import Floats
 

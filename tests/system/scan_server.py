@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.runner import Runner
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig
 from dsl_core.devices.replay import replay_rig
 from dsl_core.io.scan.folder import ScanWriter
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.patterns.images import pattern_image
+from tests.cases.memory_sink import MemorySink
 
 
 class Made:

@@ -69,7 +69,7 @@ class Server:
 
 def _frames(folder: Path) -> NDArray[np.uint16]:
     reader = ScanReader(folder)
-    return reader.read_stack(reader.plan.shots())
+    return np.stack([reader.read(shot) for shot in reader.plan.shots()])
 
 
 def _frames_left(folder: Path) -> int:

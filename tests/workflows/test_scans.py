@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.movement import pick_reference_shots
-from dsl_core.capture.sink import MemorySink
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DeviceError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.workflows.scans import prepare_resume, resume
+from tests.cases.memory_sink import MemorySink
 from tests.cases.small_rig import small_rig
 
 PLAN = CapturePlan(

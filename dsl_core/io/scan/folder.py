@@ -12,9 +12,8 @@ A frame is done when its line and its chunk exist and agree.
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -44,7 +43,6 @@ from dsl_core.model.rig import Rig
 SUFFIX = ".dsl"
 LOG_NAME = "frames.jsonl"
 FRAMES_NAME = "frames"
-_FRAMES_A_BLOCK = 8
 
 
 def store_of(folder: Path, plan: CapturePlan) -> FrameStore:
@@ -110,56 +108,6 @@ class ScanReader:
         if verify and (found := checksum(pixels)) != entry.crc32:
             raise StoreError(self._sentence(shot, self._mismatch(shot, found)))
         return pixels
-
-    def read_many(
-        self, shots: Iterable[Shot], threads: int = 2, verify: bool = True
-    ) -> Iterator[tuple[Shot, NDArray[np.uint16]]]:
-        """Shots with their mosaics, in the order asked, a few read ahead by ``threads`` threads."""
-        pending: deque[tuple[Shot, Future[NDArray[np.uint16]]]] = deque()
-        buffers = self._buffers()
-        with ThreadPoolExecutor(threads) as pool:
-            try:
-                for shot in shots:
-                    pending.append((shot, pool.submit(self.read, shot, next(buffers), verify)))
-                    if len(pending) > 2 * threads:
-                        first, future = pending.popleft()
-                        yield first, future.result()
-                while pending:
-                    first, future = pending.popleft()
-                    yield first, future.result()
-            finally:
-                for _, future in pending:
-                    future.cancel()
-
-    def read_stack(
-        self,
-        shots: Iterable[Shot],
-        out: NDArray[np.uint16] | None = None,
-        threads: int = 2,
-        verify: bool = True,
-    ) -> NDArray[np.uint16]:
-        """Mosaics of several shots, shape (shots, rows, columns), decompressed straight into place.
-
-        A stack handed in as ``out`` (C order) is reused, which saves a third of the time.
-        """
-        wanted = list(shots)
-        if out is None:
-            out = np.empty((len(wanted), self.store.height_px, self.store.width_px), np.uint16)
-        with ThreadPoolExecutor(threads) as pool:
-            futures = [pool.submit(self.read, s, o, verify) for s, o in zip(wanted, out, strict=True)]
-            try:
-                for future in futures:
-                    future.result()
-            finally:
-                for future in futures:
-                    future.cancel()
-        return out
-
-    def _buffers(self) -> Iterator[NDArray[np.uint16]]:
-        """Empty mosaics, cut from blocks that huge pages fit in."""
-        # First touching a lone mosaic of 1 MB, in small pages, takes longer than decompressing into it.
-        while True:
-            yield from np.empty((_FRAMES_A_BLOCK, self.store.height_px, self.store.width_px), np.uint16)
 
     def _mismatch(self, shot: Shot, found: int) -> str:
         twins = [e.shot for e in self.entries.values() if e.crc32 == found and e.shot != shot.index]

@@ -29,32 +29,6 @@ def test_frames_come_back_as_written(session: Path, plan: CapturePlan, frame_of:
         np.testing.assert_array_equal(reader.read(shot), frame_of(shot).pixels)
 
 
-def test_bulk_reading_keeps_the_order_asked_for(session: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
-    reader = ScanReader(session)
-    shots = list(plan.shots())[::-1]
-    wanted = np.stack([frame_of(shot).pixels for shot in shots])
-    many = list(reader.read_many(shots, threads=2))
-    assert [shot for shot, _ in many] == shots
-    np.testing.assert_array_equal(np.stack([pixels for _, pixels in many]), wanted)
-    np.testing.assert_array_equal(reader.read_stack(shots), wanted)
-    reused = np.zeros_like(wanted)
-    assert reader.read_stack(shots, reused) is reused
-    np.testing.assert_array_equal(reused, wanted)
-
-
-@pytest.mark.parametrize("threads", [1, 2, 3])
-def test_bulk_reading_keeps_all_threads_busy_and_holds_a_few_frames(
-    session: Path, plan: CapturePlan, threads: int
-) -> None:
-    shots = list(plan.shots())
-    asked = iter(shots)
-    reading = ScanReader(session).read_many(asked, threads=threads)
-    next(reading)
-    ahead = len(shots) - len(list(asked)) - 1
-    assert threads <= ahead <= 2 * threads
-    assert len(list(reading)) == ahead
-
-
 def test_any_zarr_reader_opens_the_frames(session: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
     zarr = pytest.importorskip("zarr")
     array = zarr.open_array(str(session / "frames"), mode="r")
