@@ -10,14 +10,16 @@ about makes the brightest pixel brighter.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, Protocol
+from types import MappingProxyType
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.base import Record
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
@@ -27,7 +29,7 @@ from dsl_core.simulation.effects.cost import slowness
 from dsl_core.simulation.effects.tolerance import EffectBound
 from dsl_core.simulation.rendering.renderer import ORDERS, Renderer, surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
-from dsl_core.simulation.scenes.truth import Scene, SceneTruth
+from dsl_core.simulation.scenes.truth import Parts, Scene, SceneTruth
 
 Image = NDArray[np.uint8]
 Signal = NDArray[np.float32]
@@ -47,14 +49,16 @@ class PatternView(Protocol):
         """The same view through a filter in front of the camera."""
 
 
-class ImageStep(Protocol):
+class ImageStep(ABC):
     """What an effect does to a picture of the direct light."""
 
+    @abstractmethod
     def apply(self, signal: Signal, image: Image) -> Signal:
         """The picture with the effect: the mosaic as (1, rows, columns), or (3, rows, columns) of colours."""
 
     def through(self, transmission: SpectralCurve | None) -> ImageStep:
-        """The same behind a filter in front of the camera."""
+        """The same behind a filter in front of the camera: itself where it only moves light about."""
+        return self
 
 
 @dataclass(frozen=True)
@@ -81,31 +85,52 @@ class LightPath:
         """An effect beyond the plain renderer, if the path has it."""
         return next((effect for effect in self.extras if effect.name == name), None)
 
+    def with_value(self, name: str, value: object) -> LightPath:
+        """The path with another value of ``shaded``, ``rig.sensor.bit_depth`` or the like."""
+        changed: LightPath = _with_value(self, name, value)
+        return changed
+
+    def renderer(self, parts: Parts | None = None) -> Renderer:
+        """The plain renderer, of all that the scene consists of or of some ``parts``."""
+        return Renderer(
+            self.rig, self.truth, film=self.film, device=self.device, orders=self.orders, shaded=self.shaded,
+            parts=parts,
+        )  # fmt: skip
+
+
+def _with_value(record: Any, name: str, value: object) -> Any:
+    field, _, rest = name.partition(".")
+    inner = _with_value(getattr(record, field), rest, value) if rest else value
+    if isinstance(record, Record):
+        return record.model_copy(update={field: inner})
+    return replace(record, **{field: inner})
+
 
 class Effect(ABC):
     """One thing that light or electronics do, which a scene may or may not call for.
 
-    ``needed`` effects cannot be left out. ``ns_per_pixel`` is the CPU time of a frame on the reference
-    machine (see `slowness`) that grows with the image, ``ms_per_frame`` what does not.
+    ``needed`` effects cannot be left out. A path without another has the values of ``ideal``, named as from
+    the path (``rig.sensor.bit_depth``), unless the effect overrides `leave_out`. ``ns_per_pixel`` is the CPU
+    time of a frame on the reference machine (see `slowness`) that grows with the image, ``ms_per_frame`` what
+    does not.
     """
 
     name: str
     summary: str
     needed: ClassVar[bool] = False
+    ideal: ClassVar[Mapping[str, object]] = MappingProxyType({})
     ns_per_pixel: ClassVar[float] = 0.0
     ms_per_frame: ClassVar[float] = 0.0
-
-    @abstractmethod
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """What it is set to, with units, for people."""
 
     @abstractmethod
     def bound(self, limits: Limits) -> EffectBound:
         """The most that leaving it out changes, whatever else is left out with it."""
 
-    @abstractmethod
     def leave_out(self, path: LightPath) -> LightPath:
         """The path without it."""
+        for name, value in self.ideal.items():
+            path = path.with_value(name, value)
+        return path
 
     def needs_colours(self, path: LightPath) -> bool:
         """Whether it mixes neighbouring pixels, for which every pixel is rendered in three colours."""
@@ -148,18 +173,6 @@ class ExtraEffect(Effect):
     def leave_out(self, path: LightPath) -> LightPath:
         """The path without this step."""
         return replace(path, extras=tuple(extra for extra in path.extras if extra.name != self.name))
-
-
-def with_response(path: LightPath, **update: float) -> LightPath:
-    """The path with other values of the projector's response."""
-    response = path.rig.projector_response.model_copy(update=update)
-    return replace(path, rig=path.rig.model_copy(update={"projector_response": response}))
-
-
-def with_sensor(path: LightPath, **update: float) -> LightPath:
-    """The path with other values of the sensor."""
-    sensor = path.rig.sensor.model_copy(update=update)
-    return replace(path, rig=path.rig.model_copy(update={"sensor": sensor}))
 
 
 #: For what the renderer's tables add by rounding and interpolation.
@@ -290,9 +303,8 @@ class Limits:
 
 def make_view(path: LightPath) -> PatternView:
     """What the camera sees in a path."""
-    direct = next((light for extra in path.extras if (light := extra.direct_light(path))), None) or Renderer(
-        path.rig, path.truth, film=path.film, device=path.device, orders=path.orders, shaded=path.shaded
-    )
+    own = (light for extra in path.extras if (light := extra.direct_light(path)))
+    direct = next(own, None) or path.renderer()
     if not path.extras:
         return direct
     mosaic = bayer_channels(path.rig.sensor.bayer, *path.truth.depth_mm.shape)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dsl_core.errors import DeviceError
 from dsl_core.simulation.effects.base import Effect, ExtraEffect, LightPath
 from dsl_core.simulation.effects.depth_of_field import DepthOfField
-from dsl_core.simulation.effects.film import FILM_BEND, FILM_PERIOD, FILM_TILT, Orders, SecondOrders
+from dsl_core.simulation.effects.film import FilmBend, FilmPeriod, FilmTilt, Orders, SecondOrders
 from dsl_core.simulation.effects.interreflection import Interreflection
 from dsl_core.simulation.effects.lens import Distortion, Glare, Vignetting
 from dsl_core.simulation.effects.projector_light import BlackLevel, Blur, Gamma, Halo, LedCycle
@@ -28,9 +28,9 @@ from dsl_core.simulation.effects.surfaces_light import Shading, Shadow
 EXTRAS: tuple[ExtraEffect, ...] = (Interreflection(), Subsurface(), Specular(), Glare(), DepthOfField())
 #: Every effect, from the projector to the numbers.
 EFFECTS: tuple[Effect, ...] = (
-    Orders(), SecondOrders(), FILM_BEND, FILM_TILT, FILM_PERIOD, Distortion(), Blur(), Halo(), BlackLevel(),
-    Gamma(), LedCycle(), Shading(), Shadow(), *EXTRAS, Vignetting(), Ambient(), Defocus(), ShotNoise(),
-    ReadNoise(), Saturation(), Quantisation(),
+    Orders(), SecondOrders(), FilmBend(), FilmTilt(), FilmPeriod(), Distortion(), Blur(), Halo(),
+    BlackLevel(), Gamma(), LedCycle(), Shading(), Shadow(), *EXTRAS, Vignetting(), Ambient(), Defocus(),
+    ShotNoise(), ReadNoise(), Saturation(), Quantisation(),
 )  # fmt: skip
 NAMES = tuple(effect.name for effect in EFFECTS)
 NEEDED = frozenset(effect.name for effect in EFFECTS if effect.needed)

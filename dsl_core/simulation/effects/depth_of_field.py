@@ -20,11 +20,9 @@ from dsl_core.simulation.effects.base import (
     Limits,
     PatternView,
     Signal,
-    with_response,
 )
 from dsl_core.simulation.effects.cost import PLAIN_MS, PLAIN_NS, slowness
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.rendering.renderer import Renderer
 from dsl_core.simulation.scenes.truth import Parts
 
 Floats = NDArray[np.float64]
@@ -55,15 +53,6 @@ class DepthOfField(ExtraEffect):
     name = "depth-of-field"
     summary = "defocus of camera and projector away from the scene's median depth"
     ns_per_pixel = 4.0
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        blurs = self.blurs(path)
-        return {
-            "apertures": f"{self.camera_aperture_mm:g} and {self.projector_aperture_mm:g} mm",
-            "largest circles": f"{blurs.camera_px.max() / _DISC:.2g} camera px,"
-            f" {blurs.projector_px.max() / _DISC:.2g} projector px",
-        }
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest change of a pattern's edge by the projector, and a pixel's light by the camera."""
@@ -102,13 +91,8 @@ class DepthOfField(ExtraEffect):
         sharp = path.rig.projector_response.blur_px
         views = []
         for level, weight in zip(levels, weights, strict=True):
-            blurred = with_response(path, blur_px=math.hypot(sharp, level))
-            views.append(
-                Renderer(
-                    blurred.rig, path.truth, film=path.film, device=path.device, orders=path.orders,
-                    shaded=path.shaded, parts=_parts_in(path, weight > 0),
-                )
-            )  # fmt: skip
+            blurred = path.with_value("rig.projector_response.blur_px", math.hypot(sharp, level))
+            views.append(blurred.renderer(_parts_in(path, weight > 0)))
         return LayeredView(tuple(views), tuple(weights))
 
     def step(self, path: LightPath) -> ImageStep:
@@ -186,7 +170,7 @@ class LayeredView:
 
 
 @dataclass(frozen=True)
-class _CameraStep:
+class _CameraStep(ImageStep):
     """Each layer's light is blurred by its own Gaussian; where layers meet, their shares are made one."""
 
     sigmas_px: tuple[float, ...]
@@ -212,10 +196,6 @@ class _CameraStep:
         """Share of its own light that every pixel keeps, at least."""
         own = [_centre(sigma) * w for sigma, w in zip(self.sigmas_px, self.weights, strict=True)]
         return float((sum(own) / self.shares).min())
-
-    def through(self, transmission: SpectralCurve | None) -> _CameraStep:
-        """See `ImageStep`."""
-        return self
 
 
 def _gaussian(plane: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:

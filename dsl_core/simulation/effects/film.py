@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from operator import attrgetter
 from types import MappingProxyType
 
 import numpy as np
@@ -26,17 +26,9 @@ class Orders(Effect):
     summary = "zero and first orders of the film"
     needed = True
 
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"film": f"{path.rig.film.lines_per_mm:g} lines/mm" if path.film else "none"}
-
     def bound(self, limits: Limits) -> EffectBound:
         """All light there is."""
         return limits.of_share(1.0, "they are what is measured")
-
-    def leave_out(self, path: LightPath) -> LightPath:
-        """Nothing is left without them."""
-        return path
 
 
 class SecondOrders(Effect):
@@ -45,11 +37,6 @@ class SecondOrders(Effect):
     name = "second-orders"
     summary = "second orders of the film"
     ns_per_pixel = 12.0
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        shares = [max(path.rig.efficiency[m].values, default=0.0) for m in SECOND if m in path.rig.efficiency]
-        return {"efficiency": f"at most {100 * max(shares, default=0.0):.2g} % of the zero order"}
 
     def bound(self, limits: Limits) -> EffectBound:
         """All their light if any of it comes from inside the projector's frame."""
@@ -91,40 +78,41 @@ def reaches(path: LightPath, orders: tuple[int, ...]) -> bool:
     return False
 
 
-@dataclass(frozen=True)
 class FilmShape(Effect):
-    """A deviation of the film; ``ideal`` are the values of its fields without it."""
-
-    name: str
-    summary: str
-    ideal: Mapping[str, float]
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {field: f"{getattr(path.rig.film, field):g}" for field in self.ideal}
+    """A deviation of the film from its ideal values."""
 
     def bound(self, limits: Limits) -> EffectBound:
         """Moved columns change all dispersed light, however little they move; never the zero order."""
-        film = limits.path.rig.film
-        if not limits.path.film or all(getattr(film, field) == value for field, value in self.ideal.items()):
+        path = limits.path
+        if not path.film or all(attrgetter(name)(path) == value for name, value in self.ideal.items()):
             return limits.of_dn(0.0, "the film is ideal in this respect, or there is none")
-        reflectance = limits.path.truth.materials.at(NM)
+        reflectance = path.truth.materials.at(NM)
         dispersed = limits.white(reflectance, (*FIRST, *SECOND))
-        share = dispersed / limits.from_orders(reflectance, limits.path.orders)
+        share = dispersed / limits.from_orders(reflectance, path.orders)
         return limits.of_share(float(share.max()), "it moves the columns of all dispersed light")
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        film = path.rig.film.model_copy(update=dict(self.ideal))
-        return replace(path, rig=path.rig.model_copy(update={"film": film}))
+
+class FilmBend(FilmShape):
+    """A film that is not flat."""
+
+    name = "film-bend"
+    summary = "bend of the film"
+    ideal = MappingProxyType({"rig.film.bend_per_mm": 0.0})
 
 
-FILM_BEND = FilmShape("film-bend", "bend of the film", MappingProxyType({"bend_per_mm": 0.0}))
-FILM_TILT = FilmShape(
-    "film-tilt",
-    "tilt and roll of the film",
-    MappingProxyType({"tilt_x_deg": 0.0, "tilt_y_deg": 0.0, "roll_deg": 0.0}),
-)
-FILM_PERIOD = FilmShape(
-    "film-period", "period other than 500 lines/mm", MappingProxyType({"lines_per_mm": 500.0})
-)
+class FilmTilt(FilmShape):
+    """A film that is not square to the projector's axis, or whose lines are not upright."""
+
+    name = "film-tilt"
+    summary = "tilt and roll of the film"
+    ideal = MappingProxyType(
+        {"rig.film.tilt_x_deg": 0.0, "rig.film.tilt_y_deg": 0.0, "rig.film.roll_deg": 0.0}
+    )
+
+
+class FilmPeriod(FilmShape):
+    """A film whose lines are closer together, or further apart, than it says."""
+
+    name = "film-period"
+    summary = "period other than 500 lines/mm"
+    ideal = MappingProxyType({"rig.film.lines_per_mm": 500.0})

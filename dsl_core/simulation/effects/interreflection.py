@@ -36,13 +36,6 @@ class Interreflection(ExtraEffect):
     summary = "light between surfaces"
     ns_per_pixel, ms_per_frame = 25.0, 10.0
 
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        factors = Patches.of(path.rig, path.truth).form_factors()
-        return {
-            "light from other surfaces": f"up to {100 * float(factors.sum(1).max()):.2g} % of all directions"
-        }
-
     def bound(self, limits: Limits) -> EffectBound:
         """The indirect light of a white pattern when nothing stands between surfaces."""
         most = float(limits.indirect.max())
@@ -96,10 +89,7 @@ def _light_on_samples(path: LightPath) -> Renderer:
         np.ones(len(pixels) * _BANDS),
     )
     truth = replace(path.truth, materials=Materials.of(bands), mixed=None)
-    return Renderer(
-        _flat_rig(path), truth, film=path.film, device=path.device, orders=path.orders, shaded=path.shaded,
-        parts=parts,
-    )  # fmt: skip
+    return replace(path, rig=_flat_rig(path), truth=truth).renderer(parts)
 
 
 @dataclass(frozen=True)
@@ -161,7 +151,7 @@ def _band_means(values: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class _InterreflectionStep:
+class _InterreflectionStep(ImageStep):
     path: LightPath
     exchange: Exchange
     samples: Renderer

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.model.geometry import Lens
-from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels, relative_gain
 from dsl_core.simulation.effects.base import (
     SLACK,
@@ -30,13 +30,6 @@ class Distortion(Effect):
 
     name = "distortion"
     summary = "distortion of the lenses"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {
-            "camera": f"k1 {path.rig.camera.distortion[0]:g}",
-            "projector": f"k1 {path.rig.projector.distortion[0]:g}",
-        }
 
     def bound(self, limits: Limits) -> EffectBound:
         """A moved edge changes a pixel from black to white however little it moves."""
@@ -66,11 +59,7 @@ class Vignetting(Effect):
 
     name = "vignetting"
     summary = "uneven gain of the camera"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        gain = relative_gain(path.rig)
-        return {"gain": f"{float(gain.min()):.3g} to {float(gain.max()):.3g}"}
+    ideal = MappingProxyType({"rig.flat_field": None})
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest deviation of the gain from one."""
@@ -79,10 +68,6 @@ class Vignetting(Effect):
         gain = relative_gain(limits.path.rig)
         most = float(np.abs(gain - 1).max())
         return limits.of_share(most / float(gain.min()), f"gains differ from one by up to {100 * most:.2g} %")
-
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return replace(path, rig=path.rig.model_copy(update={"flat_field": None}))
 
 
 @dataclass(frozen=True)
@@ -100,10 +85,6 @@ class Glare(ExtraEffect):
         """See `ExtraEffect`."""
         return self.share
 
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"share": f"{self.share:g} of the mean light"}
-
     def bound(self, limits: Limits) -> EffectBound:
         """Its share of the mean of the most light."""
         mosaic = bayer_channels(limits.path.rig.sensor.bayer, *limits.path.truth.depth_mm.shape).ravel()
@@ -117,7 +98,7 @@ class Glare(ExtraEffect):
 
 
 @dataclass(frozen=True)
-class _GlareStep:
+class _GlareStep(ImageStep):
     share: float
     mosaic: NDArray[np.int64]
 
@@ -129,7 +110,3 @@ class _GlareStep:
         if len(signal) == 3:
             return signal + np.array(veils, np.float32)[:, None, None]
         return np.asarray(signal + np.array(veils, np.float32)[self.mosaic])
-
-    def through(self, transmission: SpectralCurve | None) -> _GlareStep:
-        """See `ImageStep`."""
-        return self

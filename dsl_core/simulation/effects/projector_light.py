@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from dsl_core.optics.led_cycle import LEDS
-from dsl_core.simulation.effects.base import Effect, LightPath, Limits, with_response
+from dsl_core.simulation.effects.base import Effect, Limits
 from dsl_core.simulation.effects.tolerance import EffectBound
 
 #: A blur that no sample of the twin shows.
@@ -19,18 +19,11 @@ class Blur(Effect):
 
     name = "blur"
     summary = "blur of the projector"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"sigma": f"{path.rig.projector_response.blur_px:g} projector px"}
+    ideal = MappingProxyType({"rig.projector_response.blur_px": _SHARP_PX})
 
     def bound(self, limits: Limits) -> EffectBound:
         """At the edge of a line all of its light."""
         return limits.of_share(1.0, "edges of lines turn from soft to hard")
-
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_response(path, blur_px=_SHARP_PX)
 
 
 class Halo(Effect):
@@ -38,14 +31,7 @@ class Halo(Effect):
 
     name = "halo"
     summary = "halo of the zero order"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        response = path.rig.projector_response
-        return {
-            "peak": f"{response.halo_peak_per_px:.2g} per px",
-            "decay": f"{response.halo_decay_px:g} px",
-        }
+    ideal = MappingProxyType({"rig.projector_response.halo_peak_per_px": 0.0})
 
     def bound(self, limits: Limits) -> EffectBound:
         """Its share of white."""
@@ -56,20 +42,13 @@ class Halo(Effect):
             share, f"it contains {100 * limits.halo:.2g} % of the light of a white pattern"
         )
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_response(path, halo_peak_per_px=0.0)
-
 
 class BlackLevel(Effect):
     """Light of a projector that shows black."""
 
     name = "black-level"
     summary = "light of a dark projector"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"share": f"{path.rig.projector_response.black_fraction:g} of white"}
+    ideal = MappingProxyType({"rig.projector_response.black_fraction": 0.0})
 
     def bound(self, limits: Limits) -> EffectBound:
         """Its share of white over the longest exposure."""
@@ -77,20 +56,13 @@ class BlackLevel(Effect):
         reason = f"black is {100 * black:.2g} % of white" if black else "the projector has a perfect black"
         return limits.of_dn(black * limits.ceiling * limits.exposure_ms, reason)
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_response(path, black_fraction=0.0)
-
 
 class Gamma(Effect):
     """Radiance as a power of the drive level; without it, it is proportional."""
 
     name = "gamma"
     summary = "gamma of the projector"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"exponent": f"{path.rig.projector_response.gamma:g}"}
+    ideal = MappingProxyType({"rig.projector_response.gamma": 1.0})
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest difference of radiance up to the level of each setting."""
@@ -103,20 +75,13 @@ class Gamma(Effect):
         reason = "the projector is linear" if gamma == 1 else f"radiance rises with a power of {gamma:.3g}"
         return limits.of_dn(worst_ms * limits.ceiling, reason)
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_response(path, gamma=1.0)
-
 
 class LedCycle(Effect):
     """LEDs that flash one after the other, so that exposures catch more of one than of another."""
 
     name = "led-cycle"
     summary = "LEDs that flash in turn"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"period": "steady light" if path.led_cycle_ms is None else f"{path.led_cycle_ms:.4g} ms"}
+    ideal = MappingProxyType({"led_cycle_ms": None})
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest deviation of an LED's light in an exposure, whenever it starts."""
@@ -130,10 +95,6 @@ class LedCycle(Effect):
         )
         reason = "exposures are not whole numbers of cycles" if worst_ms else "exposures are whole cycles"
         return limits.of_dn(worst_ms * limits.ceiling, reason)
-
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return replace(path, led_cycle_ms=None)
 
 
 def largest_deviation(periods: float) -> float:

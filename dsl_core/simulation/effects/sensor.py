@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
-from dsl_core.simulation.effects.base import Effect, LightPath, Limits, with_sensor
+from dsl_core.simulation.effects.base import Effect, Limits
 from dsl_core.simulation.effects.tolerance import EffectBound
 
 #: Normal noise beyond so many standard deviations comes about once in 10^15 pixels, a million scans.
@@ -20,10 +20,7 @@ class Ambient(Effect):
 
     name = "ambient"
     summary = "ambient light"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"light": f"{path.ambient_dn_per_ms:g} DN/ms"}
+    ideal = MappingProxyType({"ambient_dn_per_ms": 0.0})
 
     def bound(self, limits: Limits) -> EffectBound:
         """That of the longest exposure."""
@@ -31,20 +28,13 @@ class Ambient(Effect):
         reason = f"the room adds {ambient:.2g} DN/ms" if ambient else "the room is dark"
         return limits.of_dn(ambient * limits.exposure_ms, reason)
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return replace(path, ambient_dn_per_ms=0.0)
-
 
 class Defocus(Effect):
     """A camera lens set wrongly: the same blur everywhere."""
 
     name = "defocus"
     summary = "camera out of focus"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"sigma": f"{path.defocus_px:g} px"}
+    ideal = MappingProxyType({"defocus_px": 0.0})
 
     def bound(self, limits: Limits) -> EffectBound:
         """Any pixel may turn from black to white."""
@@ -52,21 +42,14 @@ class Defocus(Effect):
             return limits.of_dn(0.0, "the camera is focused")
         return limits.of_share(1.0, "edges in the image turn from soft to hard")
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return replace(path, defocus_px=0.0)
-
 
 class ShotNoise(Effect):
     """Light comes in quanta."""
 
     name = "shot-noise"
     summary = "shot noise"
+    ideal = MappingProxyType({"rig.sensor.electrons_per_dn": _MANY_ELECTRONS})
     ns_per_pixel = 2.0
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"gain": f"{path.rig.sensor.electrons_per_dn:g} electrons/DN"}
 
     def bound(self, limits: Limits) -> EffectBound:
         """Eight standard deviations at the brightest signal that does not saturate."""
@@ -75,21 +58,14 @@ class ShotNoise(Effect):
         noise_dn = float(np.sqrt(signal / sensor.electrons_per_dn))
         return limits.of_dn(TAIL_SIGMAS * noise_dn, f"its standard deviation is up to {noise_dn:.2g} DN")
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_sensor(path, electrons_per_dn=_MANY_ELECTRONS)
-
 
 class ReadNoise(Effect):
     """Noise of the electronics."""
 
     name = "read-noise"
     summary = "read noise"
+    ideal = MappingProxyType({"rig.sensor.read_noise_dn": 0.0})
     ns_per_pixel = 2.0
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"std": f"{path.rig.sensor.read_noise_dn:g} DN"}
 
     def bound(self, limits: Limits) -> EffectBound:
         """Eight standard deviations."""
@@ -97,20 +73,13 @@ class ReadNoise(Effect):
         reason = f"its standard deviation is {noise_dn:.2g} DN" if noise_dn else "the sensor has none"
         return limits.of_dn(TAIL_SIGMAS * noise_dn, reason)
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_sensor(path, read_noise_dn=0.0)
-
 
 class Saturation(Effect):
     """Numbers end at full scale; without it, at what the container holds."""
 
     name = "saturation"
     summary = "saturation of the sensor"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"full scale": f"{path.rig.sensor.full_scale_dn} DN"}
+    ideal = MappingProxyType({"rig.sensor.bit_depth": _CONTAINER_BITS})
 
     def bound(self, limits: Limits) -> EffectBound:
         """What the brightest signal exceeds full scale by."""
@@ -122,10 +91,6 @@ class Saturation(Effect):
         )
         return EffectBound(excess, excess / limits.floor_dn, reason)
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return with_sensor(path, bit_depth=_CONTAINER_BITS)
-
 
 class Quantisation(Effect):
     """Frames hold whole numbers."""
@@ -134,14 +99,6 @@ class Quantisation(Effect):
     summary = "rounding to whole numbers"
     needed = True
 
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"bits": f"{path.rig.sensor.bit_depth}"}
-
     def bound(self, limits: Limits) -> EffectBound:
         """Half a count."""
         return limits.of_dn(0.5, "frames contain whole numbers")
-
-    def leave_out(self, path: LightPath) -> LightPath:
-        """A frame cannot hold anything else."""
-        return path

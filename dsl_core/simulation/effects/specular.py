@@ -20,7 +20,7 @@ from dsl_core.simulation.effects.base import (
     Signal,
 )
 from dsl_core.simulation.effects.tolerance import EffectBound
-from dsl_core.simulation.rendering.renderer import Renderer, surface_shading
+from dsl_core.simulation.rendering.renderer import surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
 from dsl_core.simulation.scenes.truth import Finish, Materials, Parts
 
@@ -38,14 +38,6 @@ class Specular(ExtraEffect):
     name = "specular"
     summary = "highlights of glossy surfaces"
     ns_per_pixel = 45.0
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        glossy = glossy_materials(path.truth.materials)
-        names = path.truth.materials.names
-        return {names[i]: f"gloss {f.gloss:g}, roughness {f.roughness:g}" for i, f in glossy.items()} or {
-            "materials": "all matt"
-        }
 
     def bound(self, limits: Limits) -> EffectBound:
         """The highlight of a white pattern."""
@@ -72,14 +64,7 @@ class Specular(ExtraEffect):
         """See `ExtraEffect`."""
         mirror = replace(path.truth, materials=Materials.of({"surface": np.ones(len(NM))}), mixed=None)
         parts = glossy_parts(path)
-        if not len(parts[0]):
-            return _SpecularStep(None)
-        return _SpecularStep(
-            Renderer(
-                path.rig, mirror, film=path.film, device=path.device, orders=path.orders, shaded=path.shaded,
-                parts=parts,
-            )
-        )  # fmt: skip
+        return _SpecularStep(replace(path, truth=mirror).renderer(parts) if len(parts[0]) else None)
 
 
 def glossy_materials(materials: Materials) -> dict[int, Finish]:
@@ -124,7 +109,7 @@ def highlight(finish: Finish, points_mm: Floats, normals: Floats, light_mm: Floa
 
 
 @dataclass(frozen=True)
-class _SpecularStep:
+class _SpecularStep(ImageStep):
     shine: PatternView | None
 
     def apply(self, signal: Signal, image: Image) -> Signal:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.effects.base import SLACK, ExtraEffect, Image, ImageStep, LightPath, Limits, Signal
 from dsl_core.simulation.effects.tolerance import EffectBound
 from dsl_core.simulation.scenes.truth import Finish, Materials
@@ -30,13 +29,6 @@ class Subsurface(ExtraEffect):
     name = "subsurface"
     summary = "light that spreads inside translucent materials"
     ns_per_pixel = 110.0
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        names, clear = path.truth.materials.names, translucent(path.truth.materials)
-        return {
-            names[i]: "d {:g}, {:g}, {:g} mm (R, G, B)".format(*f.spread_mm) for i, f in clear.items()
-        } or {"materials": "all opaque"}
 
     def bound(self, limits: Limits) -> EffectBound:
         """Light that leaves through other pixels than it entered, of the most there is."""
@@ -150,7 +142,7 @@ class _Region:
 
 
 @dataclass(frozen=True)
-class _SubsurfaceStep:
+class _SubsurfaceStep(ImageStep):
     regions: tuple[_Region, ...]
 
     def apply(self, signal: Signal, image: Image) -> Signal:
@@ -159,7 +151,3 @@ class _SubsurfaceStep:
         for region in self.regions:
             planes = [region.spread(plane, colour) for colour, plane in enumerate(planes)]
         return np.stack(planes)
-
-    def through(self, transmission: SpectralCurve | None) -> _SubsurfaceStep:
-        """See `ImageStep`."""
-        return self

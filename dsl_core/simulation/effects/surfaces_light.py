@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,10 +17,7 @@ class Shading(Effect):
 
     name = "shading"
     summary = "cosine of incidence and distance"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"reference distance": f"{path.rig.reference_distance_mm:g} mm"}
+    ideal = MappingProxyType({"shaded": False})
 
     def bound(self, limits: Limits) -> EffectBound:
         """The largest deviation from the light on a surface that faces the projector at 700 mm."""
@@ -31,20 +29,12 @@ class Shading(Effect):
         )
         return limits.of_light(SLACK * most * limits.brightest * limits.amplification, reason)
 
-    def leave_out(self, path: LightPath) -> LightPath:
-        """See `Effect`."""
-        return replace(path, shaded=False)
-
 
 class Shadow(Effect):
     """Points that something hides from the projector."""
 
     name = "shadow"
     summary = "cast shadow"
-
-    def parameters(self, path: LightPath) -> dict[str, str]:
-        """See `Effect`."""
-        return {"in shadow": f"{100 * float(self._hidden(path).mean()):.2g} % of the pixels"}
 
     def bound(self, limits: Limits) -> EffectBound:
         """The light on the brightest point that is hidden."""

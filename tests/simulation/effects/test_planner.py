@@ -53,8 +53,6 @@ def test_every_decision_is_told_in_a_sentence(plane: EffectPlan) -> None:
     assert why["interreflection"] == "No surface in view faces another."
     assert "allowed" in why["ambient"]
     assert "more than 1 DN" in why["halo"]
-    path = world_of("plane").everything()
-    assert all(decision.effect.parameters(path) for decision in plane.decisions)
     assert all(decision.effect.summary for decision in plane.decisions)
 
 
