@@ -13,8 +13,9 @@ from dsl_core.campaign.recipes import campaign_recipes
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, read_entry
 from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.io.records import write_record
 from dsl_core.io.rig_file import load_rig, save_rig
-from dsl_core.io.staging import write_record, write_text
+from dsl_core.io.staging import write_text
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.rig import Rig
 

@@ -59,7 +59,7 @@ def effects(
     )
     output.say(_left_out(made))
     output.say(_saved(made, captured.shot_count))
-    output.put(**describe(made, world.request.choice.text), frames=captured.shot_count)
+    output.put(**describe(made, world.request.choice.text).model_dump(), frames=captured.shot_count)
     output.finish()
 
 

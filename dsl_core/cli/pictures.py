@@ -50,7 +50,8 @@ class PictureOptions:
 def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, options: PictureOptions) -> None:
     """Calibrate from a folder of pose folders, print what was found and write the files requested."""
     from dsl_core.io.published.stereo import save_stereo, stereo_of
-    from dsl_core.io.staging import check_targets, write_record
+    from dsl_core.io.records import write_record
+    from dsl_core.io.staging import check_targets
     from dsl_core.workflows.pictures import calibrate_geometry
 
     files = [path for path in (options.target, options.xml) if path is not None]

@@ -17,7 +17,8 @@ from typing import Literal
 
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import make_folder, write_atomic
-from dsl_core.io.campaign_folder import now, read_record
+from dsl_core.io.campaign_folder import now
+from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.rig_file import load_rig
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -103,7 +104,7 @@ class CalibrationLibrary:
         entry = LibraryEntry(name=name, stored=now(), rig=rig, accepted=accepted, history=history)
         folder = self.home / name / "versions"
         make_folder(folder)
-        write_atomic(folder / f"{entry.stamp}.json", (entry.model_dump_json(indent=1) + "\n").encode())
+        replace_record(folder / f"{entry.stamp}.json", entry)
         self._set_current(name, entry.stamp)
         return entry
 

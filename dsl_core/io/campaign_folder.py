@@ -17,17 +17,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal, Self, TypeVar
+from typing import Literal, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME
-from dsl_core.io.atomic import make_folder, write_atomic
-from dsl_core.model.base import Record, problems_in_words
+from dsl_core.io.atomic import make_folder
+from dsl_core.io.records import read_record, replace_record
+from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
-
-R = TypeVar("R", bound=Record)
 
 
 class CampaignInfo(Record):
@@ -98,7 +97,7 @@ class CampaignFolder:
     def save(self) -> None:
         """Write what the campaign was begun with; raises `StoreError`."""
         make_folder(self.path)
-        _write(self.path / CAMPAIGN_NAME, self.info)
+        replace_record(self.path / CAMPAIGN_NAME, self.info)
 
     def with_settings(self, name: str, values: Mapping[str, str]) -> Self:
         """The campaign with these settings of a calibration, and no others of it; `save` writes them down."""
@@ -128,7 +127,7 @@ class CampaignFolder:
         """Keep a fit until it is accepted or discarded."""
         path = self._candidate_path(fitted.name)
         make_folder(path.parent)
-        _write(path, fitted)
+        replace_record(path, fitted)
 
     def accept(self, name: str) -> AcceptedCalibration:
         """Accept the candidate; the one it replaces goes into the history.
@@ -142,9 +141,9 @@ class CampaignFolder:
         if old is not None:
             folder = self.path / "history" / name
             make_folder(folder)
-            _write(folder / f"{old.accepted.replace(':', '')}.json", old)
+            replace_record(folder / f"{old.accepted.replace(':', '')}.json", old)
         fresh = candidate.model_copy(update={"accepted": now()})
-        _write(self.path / f"{name}.json", fresh)
+        replace_record(self.path / f"{name}.json", fresh)
         self.discard(name)
         return fresh
 
@@ -169,19 +168,6 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
-def read_record(path: Path, kind: type[R]) -> R:
-    """A record from its JSON file; raises `StoreError` that names the first field that is wrong."""
-    try:
-        return kind.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
-    except ValidationError as error:
-        raise StoreError(
-            f"{path} is damaged or from another version: {problems_in_words(error)}."
-            " Restore it from a copy, or delete it and calibrate again."
-        ) from error
-
-
 def _refuse_other_rig(path: Path, info: CampaignInfo, rig: str | None, options: Mapping[str, str]) -> None:
     same_options = not options or dict(options) == info.options
     if (rig in (None, info.rig)) and same_options:
@@ -191,7 +177,3 @@ def _refuse_other_rig(path: Path, info: CampaignInfo, rig: str | None, options: 
         f"The campaign {path} was begun with the rig {known}. Leave out --rig and --option, or begin a new"
         " campaign for another rig."
     )
-
-
-def _write(path: Path, record: Record) -> None:
-    write_atomic(path, (record.model_dump_json(indent=1) + "\n").encode())

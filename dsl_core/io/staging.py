@@ -13,7 +13,6 @@ from pathlib import Path
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.atomic import PARTIAL_SUFFIX, store_error, sync_folder
-from dsl_core.model.base import Record
 
 
 @contextmanager
@@ -54,11 +53,6 @@ def write_text(path: Path, text: str | Callable[[], str], *, overwrite: bool = F
     with staged([path], overwrite=overwrite) as (draft,):
         draft.write_bytes((text if isinstance(text, str) else text()).encode())
     return path
-
-
-def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path:
-    """Write a record as JSON, whole or not at all, and return its path; raises `StoreError`."""
-    return write_text(path, record.model_dump_json(indent=1) + "\n", overwrite=overwrite)
 
 
 def check_targets(targets: Sequence[Path], *, overwrite: bool, kind: FolderKind | None = None) -> None:

@@ -12,9 +12,15 @@ class Record(BaseModel):
 
 
 def problems_in_words(error: ValidationError, most: int = 1) -> str:
-    """The first fields of a record that are wrong, as ``name.of.field: reason``."""
+    """The first fields of a record that are wrong, as ``name.of.field: reason (given value)``."""
     problems = [
         f"{'.'.join(map(str, item['loc'])) or 'the file'}: {item['msg'].removeprefix('Value error, ')}"
+        f" (given {_short(item['input'])})"
         for item in error.errors()[:most]
     ]
     return "; ".join(problems)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

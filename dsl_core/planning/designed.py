@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.staging import write_record
+from dsl_core.io.records import write_record
 from dsl_core.model.base import Record
 from dsl_core.model.plan import Columns
 from dsl_core.resources import resource_path

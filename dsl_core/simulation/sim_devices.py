@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 
 import numpy as np
@@ -238,7 +237,7 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     devices.nominal, devices.filters = nominal, measured_transmissions(drawn)
     devices.place = TwinHand(world, drawn, chosen)
     if chosen.choice != USUAL_CHOICE:
-        devices.notes["effects"] = json.dumps(describe(world.effect_plan(), chosen.effects))
+        devices.notes["effects"] = describe(world.effect_plan(), chosen.effects).model_dump_json()
     if chosen.truth is not None:
         devices.calibration = None
     return devices

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from dsl_core.evaluation.rendered_effects import RenderedEffects
 from dsl_core.evaluation.report.scan_report import render_report, report_content
 from dsl_core.evaluation.summary import evaluate
+from dsl_core.model.rendered_effects import RenderedEffects
 
 NOTE = {
     "choice": "auto",

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 
-from dsl_core.evaluation.rendered_effects import RenderedEffects
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.fit import Fit
+from dsl_core.model.rendered_effects import RenderedEffects
 
 
 class Content(IntEnum):

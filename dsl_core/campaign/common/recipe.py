@@ -17,7 +17,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import store_error, write_atomic
-from dsl_core.io.campaign_folder import read_record
+from dsl_core.io.records import read_record
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure

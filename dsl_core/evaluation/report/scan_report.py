@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dsl_core.evaluation.cost import StageCost
-from dsl_core.evaluation.rendered_effects import RenderedEffects
 from dsl_core.evaluation.report.curves import (
     HEIGHT,
     WIDTH,
@@ -26,6 +25,7 @@ from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Goal, Verdict, verdicts
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
+from dsl_core.model.rendered_effects import RenderedEffects
 
 if TYPE_CHECKING:
     import xarray as xr

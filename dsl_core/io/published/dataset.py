@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
 from dsl_core.errors import StoreError
+from dsl_core.io.plan_file import load_plan
 from dsl_core.io.published.layout import (
     DEPTH_NAME,
     FOLDERS,
@@ -138,11 +138,13 @@ def open_dataset(
 
     Without a plan, that of ``plan.json`` is taken, otherwise the published one (640 x 360 projector, 318
     lines, 160 ms at level 0.2 and 320 ms at 0.8) with the size of the first scan-line image. Raises
-    `StoreError` when the folder holds no such image.
+    `StoreError` when the folder holds no such image, `PlanError` when its plan is not valid.
     """
     if not root.is_dir():
         raise StoreError(f"{root} is not a folder. Give the folder that contains ldr_exposure1.")
-    plan = plan or _stored_plan(root) or _published_plan(root)
+    if plan is None:
+        stored = root / PLAN_NAME
+        plan = load_plan(stored) if stored.is_file() else _published_plan(root)
     return PublishedScan(root, plan, bayer, bit_depth, survey(root, plan))
 
 
@@ -205,16 +207,6 @@ def _right_aligned(image: NDArray[np.generic], bit_depth: int) -> NDArray[np.uin
     if stored_bits >= bit_depth:
         return np.right_shift(values, np.uint16(stored_bits - bit_depth))
     return np.left_shift(values, np.uint16(bit_depth - stored_bits))
-
-
-def _stored_plan(root: Path) -> CapturePlan | None:
-    path = root / PLAN_NAME
-    if not path.is_file():
-        return None
-    try:
-        return CapturePlan.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
-        raise StoreError(f"{path} is not a capture plan ({error}). Correct it, or delete it.") from error
 
 
 def _published_plan(root: Path) -> CapturePlan:

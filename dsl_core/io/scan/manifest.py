@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 import dsl_core
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
@@ -16,7 +16,8 @@ from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import write_atomic
-from dsl_core.model.base import Record, problems_in_words
+from dsl_core.io.records import read_record
+from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -58,19 +59,11 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 def read_manifest(folder: Path) -> Manifest:
     """Load the manifest of a scan folder; raises `StoreError`."""
-    path = folder / MANIFEST_NAME
-    try:
-        return Manifest.model_validate_json(path.read_bytes())
-    except FileNotFoundError as error:
+    if not (folder / MANIFEST_NAME).exists():
         raise StoreError(
             f"{folder} is not a scan: it has no {MANIFEST_NAME}. Give the folder of a scan (NAME.dsl)."
-        ) from error
-    except OSError as error:
-        raise StoreError(f"{path} cannot be read ({error.strerror}). Check its permissions.") from error
-    except ValidationError as error:
-        raise StoreError(
-            f"{path} is damaged or from another version: {problems_in_words(error)}. Restore it from a copy."
-        ) from error
+        )
+    return read_record(folder / MANIFEST_NAME, Manifest, "Restore it from a copy.")
 
 
 def refuse_other_scan(folder: Path, stored: Manifest, given: Manifest) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from dsl_core.model.plan import CapturePlan, Setting
+from dsl_core.model.rendered_effects import RenderedEffect, RenderedEffects
 from dsl_core.simulation.effects.base import Effect, LightPath, Limits
 from dsl_core.simulation.effects.catalogue import EFFECTS, USUAL
 from dsl_core.simulation.effects.cost import PLAIN_MS, PLAIN_NS, slowness
@@ -67,28 +68,29 @@ class EffectPlan:
         return self.frame_s(self.names), self.frame_s([d.effect.name for d in self.decisions])
 
 
-def describe(plan: EffectPlan, choice: str) -> dict[str, object]:
-    """The plan as plain values, for files and other programs; seconds are of computing a frame."""
+def describe(plan: EffectPlan, choice: str) -> RenderedEffects:
+    """The plan for files and other programs; ``choice`` is how the effects were asked for."""
     rendered_s, all_s = plan.seconds
-    return {
-        "choice": choice,
-        "tolerance": str(plan.tolerance),
-        "left_out_bound": plan.left_out_bound,
-        "frame_s": rendered_s,
-        "frame_with_all_s": all_s,
-        "effects": [
-            {
-                "name": d.effect.name,
-                "what": d.effect.summary,
-                "on": d.on,
-                "bound_dn": d.bound.dn,
-                "bound_sigmas": d.bound.sigmas,
-                "cost_s": d.cost_s,
-                "why": d.why,
-            }
-            for d in plan.decisions
-        ],
-    }
+    effects = tuple(
+        RenderedEffect(
+            name=d.effect.name,
+            what=d.effect.summary,
+            on=d.on,
+            bound_dn=d.bound.dn,
+            bound_sigmas=d.bound.sigmas,
+            cost_s=d.cost_s,
+            why=d.why,
+        )
+        for d in plan.decisions
+    )
+    return RenderedEffects(
+        choice=choice,
+        tolerance=str(plan.tolerance),
+        left_out_bound=plan.left_out_bound,
+        frame_s=rendered_s,
+        frame_with_all_s=all_s,
+        effects=effects,
+    )
 
 
 def plan_effects(

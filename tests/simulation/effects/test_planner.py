@@ -113,7 +113,7 @@ def test_the_twin_renders_what_it_is_asked_to_and_notes_it() -> None:
     auto = open_twin({**options, "effects": "auto", "tolerance": "0.5sigma"})
     note = json.loads(auto.notes["effects"])
     plan = world_in(auto).effect_plan()
-    assert note == json.loads(json.dumps(describe(plan, "auto")))
+    assert note == json.loads(describe(plan, "auto").model_dump_json())
     assert note["tolerance"] == "0.5 sigma"
     assert {effect["name"] for effect in note["effects"] if effect["on"]} == plan.names
     assert {extra.name for extra in world_in(auto).path.extras} == plan.names - USUAL

@@ -1,0 +1,64 @@
+"""Records as JSON files: written whole or not at all, and read with a sentence about what is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import ValidationError
+
+from dsl_core.errors import DslError, StoreError
+from dsl_core.io.atomic import write_atomic
+from dsl_core.io.staging import write_text
+from dsl_core.model.base import Record, problems_in_words
+
+R = TypeVar("R", bound=Record)
+
+
+def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path:
+    """Write a record as JSON, whole or not at all, and return its path; raises `StoreError`."""
+    return write_text(path, record.model_dump_json(indent=1) + "\n", overwrite=overwrite)
+
+
+def replace_record(path: Path, record: Record) -> None:
+    """Write a record in place of an older one; raises `StoreError`."""
+    write_atomic(path, (record.model_dump_json(indent=1) + "\n").encode())
+
+
+def read_record(
+    path: Path,
+    kind: type[R],
+    remedy: str = "Restore it from a copy, or delete it and calibrate again.",
+    *,
+    called: str = "",
+    fault: str = "is damaged or from another version",
+    error: type[DslError] = StoreError,
+    most: int = 1,
+) -> R:
+    """A record from its JSON file.
+
+    Raises ``error`` that says how the file is ``called`` and what its ``fault`` is, names the first ``most``
+    fields that are wrong, and ends with a ``remedy``.
+    """
+    name = f"{called} {path}".strip()
+    try:
+        return kind.model_validate_json(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as failure:
+        raise error(f"{name} cannot be read ({failure}). {remedy}") from failure
+    except ValidationError as failure:
+        raise error(f"{name} {fault}: {_problems(failure, most)}. {remedy}") from failure
+
+
+def _problems(failure: ValidationError, most: int) -> str:
+    """What keeps a file from being a record; another version is named before its many unknown fields."""
+    found = failure.errors()
+    for item in found:
+        if item["loc"] == ("schema_version",):
+            supported = item.get("ctx", {}).get("expected", "another")
+            return f"it has schema version {item['input']!r}; this program supports version {supported}"
+    if found[0]["type"] == "json_invalid":
+        return f"the file is not JSON ({found[0]['ctx']['error']}); it may be cut off"
+    if not found[0]["loc"] and found[0]["type"] == "model_type":
+        return "the file does not contain a JSON object"
+    more = f"; and {len(found) - most} more" if len(found) > most else ""
+    return problems_in_words(failure, most) + more
