@@ -1,0 +1,59 @@
+"""Records come back from their files, and errors say what is wrong with a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dsl_core.errors import PlanError, StoreError
+from dsl_core.io.records import read_record, replace_record, write_record
+from dsl_core.model.plan import CapturePlan
+
+PLAN = CapturePlan(name="a plan")
+
+
+def test_records_come_back_and_are_replaced_only_when_told_to(tmp_path: Path) -> None:
+    path = write_record(tmp_path / "plan.json", PLAN)
+    assert read_record(path, CapturePlan) == PLAN
+    with pytest.raises(StoreError, match="already exists"):
+        write_record(path, PLAN)
+    other = CapturePlan(name="another")
+    replace_record(path, other)
+    assert read_record(path, CapturePlan) == other
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (
+            "{",
+            r"^The plan \S+plan\.json is wrong: the file is not JSON \(.*\); it may be cut off\. Repair it\.$",
+        ),
+        ("[]", r"is wrong: the file does not contain a JSON object\. Repair it\.$"),
+        ('{"schema_version": 7, "size": 3}', "it has schema version 7; this program supports version 1"),
+        ('{"name": 3}', r"name: .*string \(given 3\)\. Repair it"),
+        ('{"name": 3, "a": 1, "b": 2}', r"name: .*; a: .* \(given 1\); and 1 more\. Repair it"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, content: str, says: str) -> None:
+    (tmp_path / "plan.json").write_text(content)
+    with pytest.raises(PlanError, match=says):
+        read_record(
+            tmp_path / "plan.json",
+            CapturePlan,
+            "Repair it.",
+            called="The plan",
+            fault="is wrong",
+            error=PlanError,
+            most=2,
+        )
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe"])
+def test_what_cannot_be_read_is_not_called_damaged(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "plan.json"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(StoreError, match=r"plan\.json cannot be read"):
+        read_record(path, CapturePlan)
