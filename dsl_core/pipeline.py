@@ -13,22 +13,27 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dsl_core.capture.preflight import fit_plan
+from dsl_core.capture.preflight import fit_plan, require_possible
+from dsl_core.capture.runner import Runner, Status
+from dsl_core.capture.sink import Watch, WatchedSink
+from dsl_core.devices.base import DeviceRig
+from dsl_core.evaluation import summary
+from dsl_core.evaluation.cost import StageTimer
+from dsl_core.evaluation.report.scan_report import ReportContent, render_report
+from dsl_core.evaluation.summary import Evaluation, Truth
+from dsl_core.io.scan.folder import ScanWriter
+from dsl_core.io.staging import write_text
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
+from dsl_core.patterns.images import pattern_image
 from dsl_core.progress import CancelToken, NoProgress, Progress
+from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from dsl_core.capture.runner import Runner, Status
-    from dsl_core.capture.sink import Watch
-    from dsl_core.devices.base import DeviceRig
-    from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.evaluation.report.scan_report import ReportContent
-    from dsl_core.evaluation.summary import Evaluation, Truth
 
 __all__ = ["Options", "evaluate", "fit_plan", "open_scan", "reconstruct", "scan", "write_report"]
 
@@ -47,12 +52,6 @@ def open_scan(
 
     An interrupted scan resumes at its next missing frame.
     """
-    from dsl_core.capture.preflight import require_possible
-    from dsl_core.capture.runner import Runner
-    from dsl_core.capture.sink import WatchedSink
-    from dsl_core.io.scan.folder import ScanWriter
-    from dsl_core.patterns.images import pattern_image
-
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
         sink = WatchedSink(writer, watch) if watch else writer
@@ -79,9 +78,7 @@ def reconstruct(
     timer: StageTimer | None = None,
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
-    from dsl_core.evaluation.cost import StageTimer
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
-    from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
 
@@ -118,14 +115,9 @@ def reconstruct(
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:
     """Figures of a result against what is known of the scene."""
-    from dsl_core.evaluation import summary
-
     return summary.evaluate(result, truth)
 
 
 def write_report(content: ReportContent, path: Path, overwrite: bool = False) -> Path:
     """Write the report as one HTML page; raises `StoreError`."""
-    from dsl_core.evaluation.report.scan_report import render_report
-    from dsl_core.io.staging import write_text
-
     return write_text(path, lambda: render_report(content), overwrite=overwrite)

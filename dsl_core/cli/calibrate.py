@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,9 +14,7 @@ from dsl_core.cli.options import Force, Json, RigOptions, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.cli.pictures import BoardOptions, PictureOptions, calibrate_pictures
 from dsl_core.errors import CalibrationError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from dsl_core.evaluation.cost import StageTimer
 
 calibrate = typer.Typer(
     help="Calibrate a rig step by step; the folder of a campaign keeps all captures.", no_args_is_help=True
@@ -155,7 +154,6 @@ def all_(
     from dsl_core.campaign.guide import calibrate_all
     from dsl_core.campaign.products import write_products
     from dsl_core.campaign.recipes import load_recipe
-    from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.calibration_library import check_name
 
     output, timer, settings = Output(json), StageTimer(), _settings_by_name(set_)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +12,7 @@ from dsl_core.cli.guidance import answer, figures_json, print_figures
 from dsl_core.cli.options import Force, Json, OverrideCalibration, RigName, RigOptions, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError
+from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
     from dsl_core.io.calibration_library import LibraryLine
@@ -47,7 +49,6 @@ def show(
     """Show what a calibration contains: conditions, dates, figures with uncertainties."""
     from dsl_core.campaign.products import write_calibration_report
     from dsl_core.io.calibration_library import CalibrationLibrary
-    from dsl_core.io.staging import check_targets
 
     output, entry = Output(json), CalibrationLibrary().find(name)
     if report is not None:
@@ -78,8 +79,6 @@ def check(
     json: Json = False,
 ) -> None:
     """Check with one quick capture of a flat target whether the rig still matches its calibration."""
-    import tempfile
-
     from dsl_core.campaign.drift_check import PLACEMENT, measure_drift
     from dsl_core.devices.conditions import with_calibration
     from dsl_core.devices.registry import open_rig

@@ -10,6 +10,7 @@ import typer
 
 from dsl_core.cli.options import Force, Json, parse_numbers, parse_region
 from dsl_core.cli.output import Output
+from dsl_core.io.staging import check_targets, write_text
 
 if TYPE_CHECKING:
     from dsl_core.evaluation.report.series_page import Table
@@ -67,7 +68,6 @@ def depth_test(
     """Test depth with a flat target at several stage positions: how flat and how straight the planes are."""
     from dsl_core.evaluation.report.series_page import stage_page, stage_rows
     from dsl_core.evaluation.stage_test import stage_table, stage_test
-    from dsl_core.io.staging import check_targets, write_text
     from dsl_core.workflows.series import read_targets
 
     output = Output(json)
@@ -110,7 +110,6 @@ def sweep(
     """Compare scans of one scene: error against capture time, and which scans are worth theirs."""
     from dsl_core.evaluation.report.series_page import sweep_page, sweep_rows
     from dsl_core.evaluation.time_sweep import FIGURES, best_points
-    from dsl_core.io.staging import check_targets, write_text
     from dsl_core.workflows.series import read_sweep
 
     output = Output(json)

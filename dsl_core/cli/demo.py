@@ -10,12 +10,14 @@ import typer
 
 from dsl_core.cli.options import Effects, Json, Tolerance, parse_size, with_effects
 from dsl_core.cli.output import Output
+from dsl_core.cli.results import print_figures
 from dsl_core.errors import Cancelled
+from dsl_core.evaluation.cost import StageTimer
+from dsl_core.io import MANIFEST_NAME
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from dsl_core.evaluation.cost import StageTimer
     from dsl_core.model.plan import CapturePlan
 
 SCAN, RESULT, REPORT = "scan.dsl", "result.zarr", "report.html"
@@ -37,8 +39,6 @@ def demo(
     json: Json = False,
 ) -> None:
     """Scan, reconstruct and evaluate a Color Checker on the digital twin, and write a report."""
-    from dsl_core.evaluation.cost import StageTimer
-
     output, timer = Output(json), StageTimer()
     width, height = parse_size("--size", size)
     options = with_effects({"scene": scene, "size": f"{width}x{height}"}, effects, tolerance)
@@ -60,7 +60,6 @@ def demo(
 
 def _choose_folder(given: Path, options: dict[str, str]) -> Path:
     """The first of the name and its numbered variants that is free, or has this demo unfinished."""
-    from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.manifest import read_manifest
     from dsl_core.io.scan.origin import rig_notes
 
@@ -109,7 +108,6 @@ def _reconstruct(output: Output, timer: StageTimer, folder: Path) -> xr.Dataset:
 def _evaluate(output: Output, timer: StageTimer, folder: Path, result: xr.Dataset) -> dict[str, float]:
     """Figures, exports and the report."""
     from dsl_core import pipeline
-    from dsl_core.cli.results import print_figures
     from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import Goal, figures
     from dsl_core.io.export import export

@@ -11,13 +11,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dsl_core.evaluation.cost import StageCost
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     from rich.progress import Progress as RichBars
     from rich.progress import TaskID
 
-    from dsl_core.evaluation.cost import StageCost
 
 #: Without a terminal a line of progress is written this often, seconds.
 _LINE_EVERY_S = 5.0

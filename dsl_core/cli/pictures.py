@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from dsl_core.cli.options import parse_size
 from dsl_core.cli.output import Output
 from dsl_core.errors import CalibrationError
+from dsl_core.io.staging import check_targets
 
 if TYPE_CHECKING:
     from dsl_core.model.board import Charuco, Checkerboard
@@ -51,7 +52,6 @@ def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, option
     """Calibrate from a folder of pose folders, print what was found and write the files requested."""
     from dsl_core.io.published.stereo import save_stereo, stereo_of
     from dsl_core.io.records import write_record
-    from dsl_core.io.staging import check_targets
     from dsl_core.workflows.pictures import calibrate_geometry
 
     files = [path for path in (options.target, options.xml) if path is not None]

@@ -19,6 +19,9 @@ from dsl_core.cli.options import (
 )
 from dsl_core.cli.output import Output
 from dsl_core.errors import PlanError
+from dsl_core.evaluation.cost import StageTimer
+from dsl_core.io.staging import check_targets
+from dsl_core.reconstruction.torch_device import DEVICES, torch_device
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,13 +50,10 @@ def reconstruct(
     json: Json = False,
 ) -> None:
     """Turn frames into depth, points, normals, reflectance and their uncertainty."""
-    from dsl_core.evaluation.cost import StageTimer
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
-    from dsl_core.io.staging import check_targets
     from dsl_core.model.options import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
-    from dsl_core.reconstruction.torch_device import DEVICES, torch_device
     from dsl_core.workflows.scans import reconstruct_scan
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
@@ -93,7 +93,6 @@ def evaluate(
     from dsl_core.evaluation.report.scan_report import report_content
     from dsl_core.evaluation.verdict import deviations, figures
     from dsl_core.io.result.result_file import load_result
-    from dsl_core.io.staging import check_targets
     from dsl_core.workflows import scans
 
     output, report = Output(json), report or path.with_suffix(".html")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,18 +30,15 @@ from dsl_core.cli.options import (
 )
 from dsl_core.cli.output import Output
 from dsl_core.errors import Cancelled, StoreError
+from dsl_core.io import MANIFEST_NAME
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from dsl_core.devices.base import DeviceRig
     from dsl_core.model.plan import CapturePlan
 
 
 def rigs(json: Json = False) -> None:
     """List the installed rigs and their options."""
-    from dataclasses import asdict
-
     from dsl_core.devices.registry import list_rigs
 
     output, entries = Output(json), list_rigs()
@@ -117,7 +116,6 @@ def scan(
     """Capture a plan; every frame is saved to disk before the next is captured."""
     from dsl_core import pipeline
     from dsl_core.devices.registry import open_rig
-    from dsl_core.io import MANIFEST_NAME
     from dsl_core.io.scan.origin import rig_notes
 
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)

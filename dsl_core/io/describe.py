@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.campaign_folder import CampaignFolder
@@ -76,8 +78,6 @@ def _campaign(campaign: CampaignFolder) -> Facts:
 
 
 def _result(path: Path) -> Facts:
-    import numpy as np
-
     result = load_result(path)
     facts: Facts = {
         "kind": "result",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from dsl_core.model.base import Record
 
 
@@ -52,8 +54,6 @@ class Figure(Record):
 
 def _decimals(step: float) -> int:
     """Decimals that show two digits of a step."""
-    import math
-
     return 0 if step <= 0 else min(max(1 - math.floor(math.log10(step)), 0), 9)
 
 

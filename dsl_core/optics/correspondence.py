@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.errors import CalibrationError
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import CorrespondenceGrid, Rig
 from dsl_core.optics.column_residual import residual_columns
 from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import pixel_rays, project
@@ -251,8 +251,6 @@ class GridModel:
 def _upsampled(grid: object, order: int, width: int, height: int) -> NDArray[np.float32]:
     """Coefficients of every pixel, shape (3, wavelengths, pixels), by cubic splines over the grid."""
     from scipy.interpolate import make_interp_spline
-
-    from dsl_core.model.rig import CorrespondenceGrid
 
     assert isinstance(grid, CorrespondenceGrid)
     nodes = grid.array[grid.orders.index(order)]

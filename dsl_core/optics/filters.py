@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.optics.spectra import chain_response
 
 Floats = NDArray[np.float64]
 
@@ -22,8 +23,6 @@ def nominal_filter(centre_nm: float, fwhm_nm: float = 10.0, peak: float = 0.8) -
 
 def passed(rig: Rig, transmission: SpectralCurve) -> Floats:
     """Zero-order signal through a filter per nm at `FINE_NM`, white light, DN per ms, (3, wavelengths)."""
-    from dsl_core.optics.spectra import chain_response
-
     through = np.interp(FINE_NM, transmission.wavelengths_nm, transmission.values, 0.0, 0.0)
     return np.asarray(chain_response(rig, 0, FINE_NM).sum(1) * through)
 

@@ -5,17 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from dsl_core.capture.preflight import require_possible
+from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DslError, StoreError
+from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.published import (
+    PUBLISHED_SETTINGS,
+    FileRecord,
+    check_calibration,
+    check_dataset,
+    export_dataset,
+    holds_calibration,
+    load_calibration,
+    open_dataset,
+)
+from dsl_core.io.scan.check import require_complete
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.manifest import read_manifest
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.pipeline import scan
 from dsl_core.progress import Progress
 from dsl_core.workflows.scans import calibration_of
-
-if TYPE_CHECKING:
-    from dsl_core.io.published import FileRecord
 
 #: Note of a scan that says from which files it was made.
 _FINGERPRINT = "imported_fingerprint"
@@ -25,10 +38,6 @@ def export_scan(
     folder: Path, target: Path, overwrite: bool = False, progress: Progress | None = None
 ) -> list[Path]:
     """Write a complete scan in the published dataset layout and return the files; raises `StoreError`."""
-    from dsl_core.io.published import export_dataset
-    from dsl_core.io.scan.check import require_complete
-    from dsl_core.io.scan.folder import ScanReader
-
     reader = ScanReader(folder)
     require_complete(reader)
     sensor = calibration_of(reader).sensor
@@ -51,8 +60,6 @@ def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None
 
     ``base`` as for `import_scan` and `import_calibration`. Raises `StoreError` when there is no such folder.
     """
-    from dsl_core.io.published import check_calibration, holds_calibration
-
     if not root.is_dir():
         raise StoreError(f"{root} is not a folder. Choose the folder of a published dataset or calibration.")
     if not holds_calibration(root):
@@ -65,10 +72,6 @@ def look_at(root: Path, base: Rig, camera_size_px: tuple[int, int] | None = None
 
 
 def _look_at_scan(root: Path, base: Rig) -> FolderLook:
-    from dsl_core.capture.preflight import require_possible
-    from dsl_core.devices.replay import replay_rig
-    from dsl_core.io.published import PUBLISHED_SETTINGS, check_dataset, open_dataset
-
     try:
         source = open_dataset(root, bayer=base.sensor.bayer, bit_depth=base.sensor.bit_depth)
     except DslError as error:
@@ -100,9 +103,6 @@ def import_scan(
     An interrupted import resumes. Raises `StoreError` naming the first needed file that cannot be used,
     or when the target holds another scan; then nothing is written.
     """
-    from dsl_core.devices.replay import replay_rig
-    from dsl_core.io.published import open_dataset
-
     source = open_dataset(root, bayer=calibration.sensor.bayer, bit_depth=calibration.sensor.bit_depth)
     if target is not None:
         source.require_frames()
@@ -114,9 +114,6 @@ def import_scan(
 
 def _refuse_other_scan(target: Path, fingerprint: str, calibration: Rig, root: Path) -> None:
     """Raise `StoreError` when the target is a scan, but not of this dataset with this calibration."""
-    from dsl_core.io import MANIFEST_NAME
-    from dsl_core.io.scan.manifest import read_manifest
-
     if not (target / MANIFEST_NAME).exists():
         return
     stored = read_manifest(target)
@@ -134,7 +131,5 @@ def import_calibration(root: Path, base: Rig, camera_size_px: tuple[int, int] | 
 
     Without a size of the camera's images, that of the file is taken.
     """
-    from dsl_core.io.published import load_calibration
-
     size = (base.projector.width_px, base.projector.height_px)
     return load_calibration(root, size, camera_size_px).rig(base)

@@ -10,19 +10,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError, DecodeError, StoreError
+from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.io.scan.check import require_complete
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.io.scan.origin import calibration_digest, model_of_notes
+from dsl_core.model.plan import CapturePlan, Shot
 from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.demosaic import demosaic, demosaic_variance
+from dsl_core.optics.spectra import ORDERS
 from dsl_core.progress import NoProgress, Progress
-
-if TYPE_CHECKING:
-    from dsl_core.io.result.result_arrays import ResultArrays
-    from dsl_core.io.scan.folder import ScanReader
-    from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.reconstruction.merge import MergedScan
+from dsl_core.workflows.scans import calibration_of
 
 Floats = NDArray[np.float64]
 #: Half size of the neighbourhood that is read at once, so that nearby pixels need no second look at the disk.
@@ -55,9 +63,6 @@ def find_session(result: ResultArrays) -> Path:
 
 def session_of(path: Path, attributes: Mapping[Any, Any]) -> Path:
     """The scan next to a result with these attributes; raises `StoreError` when it is not there."""
-    from dsl_core.io import MANIFEST_NAME
-    from dsl_core.io.scan.manifest import read_manifest
-
     captured = attributes.get("captured")
     for folder in sorted(path.parent.glob("*.dsl")):
         if (folder / MANIFEST_NAME).is_file() and read_manifest(folder).created == captured:
@@ -105,10 +110,6 @@ class FrameBlock:
 
 def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress | None = None) -> FrameBlock:
     """Read the frames around a pixel (x, y) of a result's scan; raises `StoreError`, `CalibrationError`."""
-    from dsl_core.io.scan.check import require_complete
-    from dsl_core.io.scan.folder import ScanReader
-    from dsl_core.reconstruction.merge import MergedScan
-
     progress, reader = progress or NoProgress(), ScanReader(find_session(result))
     require_complete(reader)
     rig, plan = _calibration(reader, result), reader.plan
@@ -129,10 +130,6 @@ def read_block(result: ResultArrays, pixel: tuple[int, int], progress: Progress 
 
 def _calibration(reader: ScanReader, result: ResultArrays) -> Rig:
     """The calibration that a result was made with: the scan's own, or one of the library."""
-    from dsl_core.io.calibration_library import CalibrationLibrary
-    from dsl_core.io.scan.origin import calibration_digest, model_of_notes
-    from dsl_core.workflows.scans import calibration_of
-
     digest, _ = model_of_notes(result.attributes)
     own = reader.calibration
     # Results of older versions do not say; most were made with the scan's own calibration.
@@ -150,8 +147,6 @@ def _calibration(reader: ScanReader, result: ResultArrays) -> Rig:
 
 def intensity_graph(block: FrameBlock, result: ResultArrays, pixel: tuple[int, int]) -> IntensityGraph:
     """What a pixel (x, y) of a block saw; raises `DecodeError` when it is outside."""
-    from dsl_core.optics.demosaic import demosaic, demosaic_variance
-
     if not block.holds(pixel):
         raise DecodeError(f"Pixel {pixel[0]}, {pixel[1]} is outside the frames that were read. Read its own.")
     x, y = pixel[0] - block.origin[0], pixel[1] - block.origin[1]
@@ -179,11 +174,8 @@ def _expected(
     """The model's signals and where in the frames each order falls, as far as the result knows."""
     import torch
 
-    from dsl_core.io.scan.origin import model_of_notes
-    from dsl_core.model.spectral import WavelengthGrid
     from dsl_core.optics.correspondence import correspondence
     from dsl_core.optics.pixel_model import demosaic_blur_px
-    from dsl_core.optics.spectra import ORDERS
     from dsl_core.reconstruction.spectral.spectra import model_of_plan
 
     depth, column = (float(result.at(name, pixel)) for name in ("depth_mm", "column_px"))

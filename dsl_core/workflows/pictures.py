@@ -5,20 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.calibration.geometry.pose_series import observe_series
+from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
 from dsl_core.errors import CalibrationError
+from dsl_core.model.board import Board
+from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
 from dsl_core.model.plan import GrayCode
 from dsl_core.model.rig import BayerPattern
+from dsl_core.patterns.gray_code import bit_counts
 from dsl_core.progress import NoProgress, Progress
-
-if TYPE_CHECKING:
-    from dsl_core.model.board import Board
-    from dsl_core.model.calibration.geometry import GeometryCalibration
 
 SUFFIXES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm"}
 
@@ -37,10 +38,6 @@ def calibrate_geometry(
     Leaves out poses whose board or code cannot be read, and says so. Raises `CalibrationError` that
     names the picture that is missing, or the poses that are wrong when too few are left.
     """
-    from dsl_core.calibration.geometry.pose_series import observe_series
-    from dsl_core.calibration.geometry.solve import calibrate_geometry as calibrate
-    from dsl_core.patterns.gray_code import bit_counts
-
     bits, progress = bit_counts(GrayCode(), projector_size_px), progress or NoProgress()
     sizes: dict[str, tuple[int, int]] = {}
     folders = pose_folders(folder)

@@ -8,30 +8,33 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dsl_core.capture.movement import check_movement, pick_reference_shots
+from dsl_core.capture.runner import Status
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.conditions import conditions_of
+from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreError
+from dsl_core.evaluation.cost import StageTimer
+from dsl_core.evaluation.summary import Truth
+from dsl_core.io.scan.check import require_complete
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.manifest import Manifest, read_manifest
+from dsl_core.io.scan.origin import model_notes, rig_of_notes
+from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from dsl_core.capture.runner import Status
-    from dsl_core.devices.base import DeviceRig
-    from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.evaluation.summary import Truth
-    from dsl_core.io.scan.manifest import Manifest
-
 
 def reopen_rig(folder: Path) -> DeviceRig:
     """The rig that a scan was started with; raises `StoreError` when the scan does not say which."""
-    from dsl_core.devices.registry import open_rig
-    from dsl_core.io.scan.manifest import read_manifest
-    from dsl_core.io.scan.origin import rig_of_notes
-
     origin = rig_of_notes(read_manifest(folder).notes)
     if origin is None:
         raise StoreError(
@@ -53,10 +56,6 @@ def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tu
     The rig returned has the same devices and the scan's own calibration, whatever ``rig`` has, which stays as
     it is.
     """
-    from dsl_core.capture.movement import check_movement, pick_reference_shots
-    from dsl_core.io.scan.folder import ScanReader
-    from dsl_core.patterns.images import pattern_image
-
     reader = ScanReader(folder)
     rig = replace(rig, calibration=reader.calibration or rig.calibration)
     sound = reader.sound()  # a damaged frame is taken again, and tells nothing of the scene
@@ -81,11 +80,6 @@ def reconstruct_scan(
     Raises `CalibrationError` when the scan was taken with other settings than the calibration given, unless
     that is overridden.
     """
-    from dsl_core.evaluation.cost import StageTimer
-    from dsl_core.io.scan.check import require_complete
-    from dsl_core.io.scan.folder import ScanReader
-    from dsl_core.io.scan.origin import model_notes
-
     reader, timer = ScanReader(folder), timer or StageTimer()
     require_complete(reader)
     if calibration is not None and not override_calibration:
@@ -122,9 +116,6 @@ def _capture_seconds(manifest: Manifest) -> float:
 
 
 def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
-    from dsl_core.devices.conditions import conditions_of
-    from dsl_core.model.conditions import differences
-
     if rig.conditions is None or manifest.camera is None or manifest.projector is None:
         return
     found = differences(rig.conditions, conditions_of(manifest.camera, manifest.projector))
@@ -137,7 +128,6 @@ def _require_conditions(folder: Path, manifest: Manifest, rig: Rig) -> None:
 
 def twin_truth(rig: DeviceRig, grid: WavelengthGrid) -> Truth | None:
     """The ground truth of the twin's scene; None for a real rig."""
-    from dsl_core.evaluation.summary import Truth
     from dsl_core.simulation.sim_devices import SimCamera
 
     if not isinstance(rig.camera, SimCamera):
@@ -158,9 +148,6 @@ def truth_of(
     result: xr.Dataset, rig_name: str | None = None, options: Mapping[str, str] | None = None
 ) -> Truth:
     """Truth from the rig that took the scan, or the one named; raises `DecodeError` if there is none."""
-    from dsl_core.devices.registry import open_rig
-    from dsl_core.io.scan.origin import rig_of_notes
-
     origin = (rig_name, dict(options or {})) if rig_name else rig_of_notes(result.attrs)
     if origin is None:
         raise DecodeError(

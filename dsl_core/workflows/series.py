@@ -5,17 +5,26 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dsl_core.errors import DecodeError
+from dsl_core.evaluation.difference import compare_results, shared_bands
+from dsl_core.evaluation.seen_target import Region, SeenTarget, find_target
+from dsl_core.evaluation.summary import Truth, evaluate
+from dsl_core.evaluation.time_sweep import (
+    SweepPoint,
+    point_against_result,
+    point_against_truth,
+    require_sweep,
+)
+from dsl_core.io.result.result_arrays import load_arrays
+from dsl_core.io.result.result_file import load_result
+from dsl_core.io.scan.origin import rig_of_notes
+from dsl_core.model.plan import CapturePlan
 from dsl_core.progress import NoProgress, Progress
-
-if TYPE_CHECKING:
-    from dsl_core.evaluation.seen_target import Region, SeenTarget
-    from dsl_core.evaluation.summary import Truth
-    from dsl_core.evaluation.time_sweep import SweepPoint
+from dsl_core.workflows.scans import truth_of
 
 #: A number of mm in the name of a result, as in ``stage 695.2 mm.zarr``.
 _MM = re.compile(r"(?<![\d.])(\d+(?:\.\d+)?)\s?mm(?![a-z])", re.IGNORECASE)
@@ -31,8 +40,6 @@ def position_of(path: Path, attributes: Mapping[str, Any]) -> float | None:
     >>> position_of(Path("stage 695.2 mm.zarr"), {})
     695.2
     """
-    from dsl_core.io.scan.origin import rig_of_notes
-
     named = _MM.findall(path.stem)
     if len(named) == 1:
         return float(named[0])
@@ -48,8 +55,6 @@ def position_of(path: Path, attributes: Mapping[str, Any]) -> float | None:
 
 def seconds_of(attributes: Mapping[str, Any]) -> float | None:
     """What the capture took: exposures and, where the scan knows it, the projector's latency."""
-    from dsl_core.model.plan import CapturePlan
-
     if "capture_seconds" in attributes:
         return float(attributes["capture_seconds"])
     plan = attributes.get("capture_plan")
@@ -64,9 +69,6 @@ def read_target(path: Path, region: Region | None = None) -> tuple[SeenTarget, f
 
     Raises `DecodeError` when it shows none, `StoreError` when it cannot be read.
     """
-    from dsl_core.evaluation.seen_target import find_target
-    from dsl_core.io.result.result_file import load_result
-
     result = load_result(path)
     if "points_mm" not in result:
         raise DecodeError(f"{path.name} contains no points in space. Reconstruct its scan again.")
@@ -118,19 +120,12 @@ class TruthReference:
 
     def judge(self, path: Path, progress: Progress) -> SweepPoint:
         """Seconds and errors against the truth; raises `DecodeError` for another scene."""
-        from dsl_core.evaluation.summary import evaluate
-        from dsl_core.evaluation.time_sweep import point_against_truth
-        from dsl_core.io.result.result_file import load_result
-
         result = load_result(path)
         progress.report("compare with the truth", 0, 1)
         truth = self._truth(path, result)
         return point_against_truth(path.stem, _seconds(path, result.attrs), evaluate(result, truth))
 
     def _truth(self, path: Path, result: Any) -> Truth:
-        from dsl_core.io.scan.origin import rig_of_notes
-        from dsl_core.workflows.scans import truth_of
-
         bands = result["wavelength_nm"].values if "wavelength_nm" in result.coords else ()
         key = repr((rig_of_notes(result.attrs), tuple(bands)))
         if key not in self._known:
@@ -145,17 +140,11 @@ class ResultReference:
     """One result as the reference, such as that of the longest scan."""
 
     def __init__(self, path: Path, progress: Progress | None = None) -> None:
-        from dsl_core.io.result.result_arrays import load_arrays
-
         self.path, self.name = path, path.stem
         self._arrays = load_arrays(path, progress)
 
     def judge(self, path: Path, progress: Progress) -> SweepPoint:
         """Seconds and differences from the reference; raises `DecodeError` for the reference itself."""
-        from dsl_core.evaluation.difference import compare_results, shared_bands
-        from dsl_core.evaluation.time_sweep import point_against_result
-        from dsl_core.io.result.result_arrays import load_arrays
-
         if path.resolve() == self.path.resolve():
             raise DecodeError(f"{path.name} is what the others are compared with. Name other results.")
         mine, other = self._arrays, load_arrays(path, progress)
@@ -170,8 +159,6 @@ def read_sweep(
     paths: Sequence[Path], against: Path | None = None, progress: Progress | None = None
 ) -> tuple[list[SweepPoint], TruthReference | ResultReference]:
     """Points of results of one scene against its truth, or against one result."""
-    from dsl_core.evaluation.time_sweep import require_sweep
-
     progress = progress or NoProgress()
     reference = TruthReference() if against is None else ResultReference(against, progress)
     points = []

@@ -28,7 +28,7 @@ def test_records_come_back_and_are_replaced_only_when_told_to(tmp_path: Path) ->
     [
         (
             "{",
-            r"^The plan \S+plan\.json is wrong: the file is not JSON \(.*\); it may be cut off\. Repair it\.$",
+            r"^The plan \S+ is wrong: the file is not JSON \(.*\); it may be cut off\. Repair it\.$",
         ),
         ("[]", r"is wrong: the file does not contain a JSON object\. Repair it\.$"),
         ('{"schema_version": 7, "size": 3}', "it has schema version 7; this program supports version 1"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -84,8 +85,6 @@ def short_time(time: str) -> str:
     >>> short_time("2026-03-01T10:20:30.5+00:00")
     '2026-03-01 10:20 UTC'
     """
-    from datetime import UTC, datetime
-
     return datetime.fromisoformat(time).astimezone(UTC).strftime("%Y-%m-%d %H:%M UTC") if time else "never"
 
 

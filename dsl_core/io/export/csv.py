@@ -11,6 +11,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
@@ -95,8 +97,6 @@ def _number(spot: xr.Dataset, name: str, band: int | None = None) -> str:
     """Shortest text that reads back as the same float32; ``nan`` for what the result does not hold."""
     if name not in spot:
         return "nan"
-    import numpy as np
-
     values = spot[name].values
     # Not str(): colour-science sets NumPy's print options for the whole process, which cuts digits.
     return np.format_float_positional(np.float32(values if band is None else values[band]), trim="0")

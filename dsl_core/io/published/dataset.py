@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.plan_file import load_plan
 from dsl_core.io.published.layout import (
     DEPTH_NAME,
     FOLDERS,
@@ -33,6 +32,7 @@ from dsl_core.io.published.layout import (
     probe_png,
     survey,
 )
+from dsl_core.io.records import read_record
 from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, Setting, Shot
@@ -138,13 +138,17 @@ def open_dataset(
 
     Without a plan, that of ``plan.json`` is taken, otherwise the published one (640 x 360 projector, 318
     lines, 160 ms at level 0.2 and 320 ms at 0.8) with the size of the first scan-line image. Raises
-    `StoreError` when the folder holds no such image, `PlanError` when its plan is not valid.
+    `StoreError` when the folder holds no such image or its plan is damaged.
     """
     if not root.is_dir():
         raise StoreError(f"{root} is not a folder. Give the folder that contains ldr_exposure1.")
     if plan is None:
         stored = root / PLAN_NAME
-        plan = load_plan(stored) if stored.is_file() else _published_plan(root)
+        plan = (
+            read_record(stored, CapturePlan, "Correct it, or delete it.", fault="is not a capture plan")
+            if stored.is_file()
+            else _published_plan(root)
+        )
     return PublishedScan(root, plan, bayer, bit_depth, survey(root, plan))
 
 

@@ -6,10 +6,8 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from dsl_core.model.rig import Rig
+from dsl_core.model.rig import Rig
 
 _RIG, _OPTIONS = "scanned_with", "scanned_with_options"
 _CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"

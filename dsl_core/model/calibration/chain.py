@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydantic import Field
 
 from dsl_core.model.base import Record
@@ -57,8 +58,6 @@ def apply_chain(record: ChainCorrection, rig: Rig) -> Rig:
 
 def _times(curve: SpectralCurve, factor: SpectralCurve) -> SpectralCurve:
     """Product on the wavelengths of both; the curve's deviation is replaced by the factor's."""
-    import numpy as np
-
     nm = np.union1d(curve.wavelengths_nm, factor.wavelengths_nm)
     value = curve.at(nm)
     std = None
