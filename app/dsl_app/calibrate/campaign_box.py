@@ -13,10 +13,8 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
     QFrame,
-    QHBoxLayout,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,6 +23,7 @@ from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_button
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.controller import CalibrateController
@@ -52,18 +51,12 @@ class NewCampaignDialog(QDialog):
         self.begin.setToolTip("Create the folder and start the campaign")
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
-        row = QHBoxLayout()
-        row.addWidget(self.folder, 1)
-        row.addWidget(self.browse)
+        row = row_of((self.folder, 1), self.browse)
         form = QFormLayout()
         form.addRow("Name", self.name)
         form.addRow("In folder", row)
         form.addRow("Rig", label(rig, "muted"))
-        column = QVBoxLayout(self)
-        column.addLayout(form)
-        column.addWidget(self._text)
-        column.addStretch(1)
-        column.addWidget(buttons)
+        column_of(form, self._text, STRETCH, buttons, on=self)
         for field in (self.name, self.folder):
             field.textChanged.connect(lambda _: self._check())
         self.name.selectAll()
@@ -117,16 +110,16 @@ class CampaignBox(QFrame):
         self._connect()
 
     def _lay_out(self) -> None:
-        words = QVBoxLayout()
-        words.setSpacing(2)
-        words.addWidget(self._name)
-        words.addWidget(self._where)
-        words.addWidget(self._progress)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        row.addLayout(words, 1)
-        for button in (self.new, self.open, self.keep, self.cancel, self.everything):
-            row.addWidget(button, 0, Qt.AlignmentFlag.AlignTop)
+        words = column_of(self._name, self._where, self._progress, spacing=2)
+        row_of(
+            (words, 1),
+            *(
+                (button, 0, Qt.AlignmentFlag.AlignTop)
+                for button in (self.new, self.open, self.keep, self.cancel, self.everything)
+            ),
+            on=self,
+            margins=0,
+        )
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands

@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QGroupBox,
-    QHBoxLayout,
     QMessageBox,
     QSplitter,
     QTableWidgetItem,
@@ -29,6 +28,7 @@ from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
 
@@ -98,17 +98,9 @@ class LibraryPanel(QGroupBox):
         split.addWidget(self.details)
         split.setStretchFactor(0, 3)
         split.setStretchFactor(1, 2)
-        row = QHBoxLayout()
-        for button in (self.use, self.report, self.restore, self.check, self.export):
-            row.addWidget(button)
-        row.addStretch(1)
-        row.addWidget(self.import_)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 4, 0, 0)
-        column.addWidget(split, 1)
+        row = row_of(self.use, self.report, self.restore, self.check, self.export, STRETCH, self.import_)
         self.table.setMinimumHeight(110)
-        column.addLayout(row)
-        column.addWidget(self._note)
+        column_of((split, 1), row, self._note, on=self, margins=(0, 4, 0, 0))
 
     def _show_note(self, text: str) -> None:
         self._note.setText(text)

@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QSplitter,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -27,6 +26,7 @@ from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import Banner, label, set_role, show_button
+from dsl_app.shared.widgets.layouts import STRETCH, column_of
 from dsl_app.shared.widgets.page import PageWidget
 
 if TYPE_CHECKING:
@@ -60,12 +60,7 @@ class CalibratePage(PageWidget):
 
     def _lay_out(self) -> None:
         content = QWidget()
-        rows = QVBoxLayout(content)
-        rows.setContentsMargins(0, 0, 0, 0)
-        rows.setSpacing(4)
-        for row in self.rows.values():
-            rows.addWidget(row)
-        rows.addStretch(1)
+        column_of(*self.rows.values(), STRETCH, on=content, margins=0, spacing=4)
         area = QScrollArea()
         area.setWidget(content)
         area.setWidgetResizable(True)
@@ -79,10 +74,7 @@ class CalibratePage(PageWidget):
         split.setStretchFactor(0, 0)
         split.setStretchFactor(1, 1)
         split.setSizes([ROWS_PX, 300])
-        column = QVBoxLayout(self)
-        column.addWidget(self.banner)
-        column.addWidget(self.head)
-        column.addWidget(split, 1)
+        column_of(self.banner, self.head, (split, 1), on=self)
 
     def _connect(self) -> None:
         state = self._state

@@ -20,6 +20,7 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 
 if TYPE_CHECKING:
@@ -99,15 +100,8 @@ class ImportDialog(JobDialog):
         )
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.addWidget(self._folder, 1)
-        head.addWidget(self.other)
-        size = QHBoxLayout(self._size)
-        size.setContentsMargins(0, 0, 0, 0)
-        size.addWidget(self.width_px)
-        size.addWidget(label("×", "muted"))
-        size.addWidget(self.height_px)
-        size.addStretch(1)
+        head = row_of((self._folder, 1), self.other)
+        row_of(self.width_px, label("×", "muted"), self.height_px, STRETCH, on=self._size, margins=0)
         self._form = QFormLayout()
         self._form.addRow("Film, sensor, scales", _row(self.base, self.file))
         self._form.addRow("Camera's images", self._size)
@@ -206,7 +200,5 @@ def _breakable(path: str) -> str:
 
 
 def _row(field: QWidget, button: QPushButton) -> QHBoxLayout:
-    row = QHBoxLayout()
-    row.addWidget(field, 1)
-    row.addWidget(button)
+    row = row_of((field, 1), button)
     return row

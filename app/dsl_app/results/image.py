@@ -8,13 +8,14 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from dsl_app.results.layers import Layer, Layers
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, Tool
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step, colour_map
 
 #: Mouse moves are handled at most this often, Hz.
@@ -75,11 +76,7 @@ class ResultImage(QWidget):
         self.legend.setWordWrap(True)
         self.legend.setTextFormat(Qt.TextFormat.RichText)
         self.legend.setAccessibleName("Legend")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addWidget(self.canvas, 1)
-        column.addWidget(self.legend)
+        column_of((self.canvas, 1), self.legend, on=self, margins=0, spacing=4)
         self._mouse = pg.SignalProxy(
             self.canvas.scene().sigMouseMoved, rateLimit=CURSOR_HZ, slot=self._mouse_moved
         )

@@ -6,12 +6,13 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QDialog, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QDialog, QWidget
 
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS, calm_plot, theme_plots
 from dsl_core.workflows.inspection import IntensityGraph
 
@@ -63,10 +64,7 @@ class IntensityWindow(QDialog):
         self.faint.toggled.connect(lambda _: self._scale())
         self.text = label("", "muted")
         self.text.setWordWrap(True)
-        column = QVBoxLayout(self)
-        column.addWidget(self.plot, 1)
-        column.addWidget(self.faint)
-        column.addWidget(self.text)
+        column_of((self.plot, 1), self.faint, self.text, on=self)
         state.graph.follow(self._show)
 
     def _show(self, graph: IntensityGraph | None) -> None:

@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
-    QHBoxLayout,
     QStackedWidget,
     QTabWidget,
     QVBoxLayout,
@@ -36,6 +35,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import label, push_button, splitter
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.workflows.inspection import IntensityGraph
 
@@ -123,33 +123,22 @@ class ResultsPage(PageWidget):
         self.about.setSizePolicy(
             self.about.sizePolicy().Policy.Ignored, self.about.sizePolicy().verticalPolicy()
         )
-        head = QHBoxLayout()
-        head.addWidget(self.title)
-        head.addSpacing(10)
-        head.addWidget(self.about, 1)
-        for button in (self.reconstruct_again, self._inspect, self._open, self._export):
-            head.addWidget(button)
+        head = row_of(
+            self.title, 10, (self.about, 1), self.reconstruct_again, self._inspect, self._open, self._export
+        )
         greeting = QWidget()
         QVBoxLayout(greeting).addWidget(self.welcome, 0, Qt.AlignmentFlag.AlignCenter)
         self.stack = QStackedWidget()
         # In the order of `Content`.
         for content in (self.offer, self._content(), greeting):
             self.stack.addWidget(content)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(16, 10, 12, 8)
-        column.addLayout(head)
-        column.addWidget(self.warning)
-        column.addWidget(self.stack, 1)
+        column_of(head, self.warning, (self.stack, 1), on=self, margins=(16, 10, 12, 8))
 
     def _content(self) -> QWidget:
         self.pictures = splitter(Qt.Orientation.Horizontal, (self._image, 1), (self.cloud, 2))
         self.pictures.setObjectName("result-pictures")
         left = QWidget()
-        column = QVBoxLayout(left)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.bar)
-        column.addWidget(self.pictures, 1)
-        column.addWidget(self.pixel_info)
+        column_of(self.bar, (self.pictures, 1), self.pixel_info, on=left, margins=0)
         tabs = QTabWidget()
         tabs.setDocumentMode(True)
         tabs.tabBar().setDrawBase(False)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QVBoxLayout
+from PySide6.QtWidgets import QFrame
 
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.spectrum import Pixel, number_text
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.evaluation.marks import explain_pixel
 from dsl_core.io.result.result_arrays import ResultArrays
 
@@ -59,11 +60,7 @@ class PixelInfo(QFrame):
             each.setTextFormat(Qt.TextFormat.PlainText)
             each.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             each.setSizePolicy(each.sizePolicy().Policy.Ignored, each.sizePolicy().verticalPolicy())
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 2, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self.values)
-        column.addWidget(self.reasons)
+        column_of(self.values, self.reasons, on=self, margins=(0, 2, 0, 0), spacing=2)
         state.cursor.follow(lambda _: self._show())
         state.band.changed.connect(lambda _: self._show())
 

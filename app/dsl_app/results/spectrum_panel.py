@@ -6,11 +6,12 @@ from typing import Any
 
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import spread_of
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
@@ -39,9 +40,7 @@ class SpectrumPanel(QWidget):
         self.item.addItem(self.band_line, ignoreBounds=True)
         self.live = SpectrumCurve(self.item)
         self._curves: dict[int, tuple[Mark, SpectrumCurve]] = {}
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.plot)
+        column_of(self.plot, on=self, margins=0)
         self.band_line.sigPositionChanged.connect(self._band_dragged)
         state.result.follow(lambda _: self._new_result())
         state.cursor.follow(self._show_cursor)

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QSlider,
     QToolButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -22,6 +21,7 @@ from dsl_app.results.state import QualityMap, ResultsState, ResultView, Tool
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_app.shared.widgets.icons import icon
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import spread_of
 from dsl_core.optics.relighting import LIGHTS
 
@@ -136,18 +136,9 @@ class ViewBar(QWidget):
         return group
 
     def _lay_out(self) -> None:
-        top = QHBoxLayout()
-        top.setSpacing(4)
-        for button in self.views.values():
-            top.addWidget(button)
         line = QFrame()
         line.setFrameShape(QFrame.Shape.VLine)
-        top.addSpacing(6)
-        top.addWidget(line)
-        top.addSpacing(6)
-        for button in self.tools.values():
-            top.addWidget(button)
-        top.addStretch(1)
+        top = row_of(*self.views.values(), 6, line, 6, *self.tools.values(), STRETCH, spacing=4)
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")
         depth, colours = QWidget(), QWidget()
@@ -167,11 +158,7 @@ class ViewBar(QWidget):
             row.addStretch(1)
             # Both have the same height, so that the picture does not move between views.
             row.addStrut(self.light.sizeHint().height())
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addLayout(top)
-        for holder in self._rows:
-            column.addWidget(holder)
+        column_of(top, *self._rows, on=self, margins=0)
 
     def _connect(self) -> None:
         state = self._state

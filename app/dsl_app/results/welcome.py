@@ -7,10 +7,11 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from dsl_app.shared.settings import RecentFiles, entry_text
 from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.layouts import STRETCH, Stretch, column_of, row_of
 
 WIDTH_PX = 560
 HINT = (
@@ -41,18 +42,8 @@ class Welcome(QWidget):
         self._title = label("Recent", "heading")
         hint = label(HINT, "muted")
         hint.setWordWrap(True)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.choose)
-        buttons.addWidget(self.demo)
-        buttons.addStretch(1)
-        column = QVBoxLayout(self)
-        column.addWidget(label("No result is open", "title"))
-        column.addWidget(hint)
-        column.addSpacing(6)
-        column.addLayout(buttons)
-        column.addSpacing(14)
-        column.addWidget(self._title)
-        column.addWidget(self.files)
+        buttons = row_of(self.choose, self.demo, STRETCH)
+        column_of(label("No result is open", "title"), hint, 6, buttons, 14, self._title, self.files, on=self)
         self.setFixedWidth(WIDTH_PX)
         self._stop = recent.paths.follow(lambda _: self._fill())
 
@@ -98,13 +89,14 @@ class Offer(QWidget):
         self.otherwise = push_button(
             "With other parameters…", "Choose bands, solver, calibration and name first (Ctrl+R)"
         )
-        column = QVBoxLayout(self)
-        column.addStretch(1)
-        column.addWidget(self.message)
-        column.addSpacing(8)
-        for button in (self.reconstruct, self.otherwise):
-            column.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
-        column.addStretch(2)
+        column_of(
+            STRETCH,
+            self.message,
+            8,
+            *((button, 0, Qt.AlignmentFlag.AlignHCenter) for button in (self.reconstruct, self.otherwise)),
+            Stretch(2),
+            on=self,
+        )
 
     def show_offer(self, message: str, can_reconstruct: bool) -> None:
         """Show a message; the buttons only where a scan can be reconstructed."""

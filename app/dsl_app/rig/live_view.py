@@ -8,11 +8,12 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QPushButton, QWidget
 
 from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import Region, RegionBox, arrow_step, cut, moved_within
 from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, statistics
 from dsl_core.devices.base import CameraInfo
@@ -88,30 +89,13 @@ class LiveView(QWidget):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        over = QVBoxLayout(self.view.viewport())
-        over.setContentsMargins(16, 12, 16, 12)
-        over.addWidget(self._empty, 0, Qt.AlignmentFlag.AlignTop)
-        figures = QHBoxLayout()
-        figures.setSpacing(16)
-        figures.addWidget(self._saturated, 1)
-        figures.addWidget(self._focus, 0, Qt.AlignmentFlag.AlignTop)
-        switches = QHBoxLayout()
-        for box in (self.saturation, self.logarithmic, self.region_box, self.fit):
-            switches.addWidget(box)
-        switches.addStretch(1)
-        switches.setSpacing(6)
-        frames = QHBoxLayout()
-        frames.addWidget(self._rate)
-        frames.addStretch(1)
-        frames.addWidget(self._counts)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.view, 1)
-        column.addWidget(self._pixel)
-        column.addLayout(figures)
-        column.addLayout(frames)
-        column.addLayout(switches)
-        column.addWidget(self._histogram)
+        column_of(
+            (self._empty, 0, Qt.AlignmentFlag.AlignTop), on=self.view.viewport(), margins=(16, 12, 16, 12)
+        )
+        figures = row_of((self._saturated, 1), (self._focus, 0, Qt.AlignmentFlag.AlignTop), spacing=16)
+        switches = row_of(self.saturation, self.logarithmic, self.region_box, self.fit, STRETCH, spacing=6)
+        frames = row_of(self._rate, STRETCH, self._counts)
+        column_of((self.view, 1), self._pixel, figures, frames, switches, self._histogram, on=self, margins=0)
 
     def set_camera(self, camera: CameraInfo | None) -> None:
         """Show frames of this camera from now on."""

@@ -8,10 +8,8 @@ from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,6 +23,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, set_role
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.devices.base import DeviceRig
 
@@ -117,15 +116,8 @@ class RigPage(PageWidget):
         left, right = QWidget(), QWidget()
         for side, boxes in ((left, (devices, camera)), (right, (self.projector,))):
             side.setFixedWidth(SIDE_PX)
-            column = QVBoxLayout(side)
-            column.setContentsMargins(0, 0, 0, 0)
-            for box in boxes:
-                column.addWidget(box)
-            column.addStretch(1)
-        row = QHBoxLayout(self)
-        row.addWidget(left)
-        row.addWidget(self._live, 1)
-        row.addWidget(right)
+            column_of(*boxes, STRETCH, on=side, margins=0)
+        row_of(left, (self._live, 1), right, on=self)
 
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands

@@ -8,14 +8,13 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
     QPushButton,
     QSlider,
-    QVBoxLayout,
 )
 
 from dsl_app.rig.state import panel_view
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.devices.base import ProjectorInfo
 from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
 
@@ -63,9 +62,7 @@ class ProjectorPanel(QGroupBox):
         self._show_state()
 
     def _lay_out(self) -> None:
-        line = QHBoxLayout()
-        line.addWidget(self._slider, 1)
-        line.addWidget(self._loop)
+        line = row_of((self._slider, 1), self._loop)
         form = QFormLayout()
         form.addRow("Screen", self._screen)
         form.addRow("", self._identify)
@@ -73,9 +70,7 @@ class ProjectorPanel(QGroupBox):
         form.addRow("Intensity", self._level)
         form.addRow("Line column", self._column)
         form.addRow("", line)
-        column = QVBoxLayout(self)
-        column.addLayout(form)
-        column.addWidget(self._note)
+        column_of(form, self._note, on=self)
 
     def _connect(self) -> None:
         self._kind.currentIndexChanged.connect(self._ask)

@@ -10,10 +10,8 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QScrollArea,
     QTabWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -33,6 +31,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
@@ -104,13 +103,12 @@ class ScanPage(PageWidget):
             (self.effects, "&Effects", "Effects of light that the simulated rig renders"),
         ):
             self.middle.setTabToolTip(self.middle.addTab(tab, title), tip)
-        row = QHBoxLayout()
-        row.addWidget(_side(LEFT_PX, self.plan))
-        row.addWidget(self.middle, 1)
-        row.addWidget(_side(RIGHT_PX, self.calibration, self.target, self.run))
-        column = QVBoxLayout(self)
-        column.addWidget(self.banner)
-        column.addLayout(row, 1)
+        row = row_of(
+            _side(LEFT_PX, self.plan),
+            (self.middle, 1),
+            _side(RIGHT_PX, self.calibration, self.target, self.run),
+        )
+        column_of(self.banner, (row, 1), on=self)
 
     def _connect(self) -> None:
         state, controller = self._state, self._controller
@@ -244,11 +242,7 @@ class ScanPage(PageWidget):
 
 def _side(width_px: int, *boxes: QWidget) -> QScrollArea:
     content = QWidget()
-    column = QVBoxLayout(content)
-    column.setContentsMargins(0, 0, 4, 0)
-    for box in boxes:
-        column.addWidget(box)
-    column.addStretch(1)
+    column_of(*boxes, STRETCH, on=content, margins=(0, 0, 4, 0))
     area = QScrollArea()
     area.setWidget(content)
     area.setWidgetResizable(True)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QPushButton, QWidget
 
 from dsl_app.scan.state import preset_of
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import row_of
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
 from dsl_core.model.presets import CODE_CHOICES, PRESETS, code_of, name_of, whole_cycles
 
@@ -78,9 +79,7 @@ class PlanEditor(QGroupBox):
                 form.addRow(widget)
         form.addRow(label("Settings", "heading"))
         form.addRow(self.settings)
-        files = QHBoxLayout()
-        files.addWidget(self.open)
-        files.addWidget(self.save)
+        files = row_of(self.open, self.save)
         form.addRow(files)
 
     def _connect(self) -> None:

@@ -9,11 +9,9 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
     QLineEdit,
     QProgressBar,
     QPushButton,
-    QVBoxLayout,
 )
 
 from dsl_app.scan.controller import ScanController
@@ -21,6 +19,7 @@ from dsl_app.scan.controls import progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.widgets.forms import ChoiceBox, label, set_role
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
 from dsl_core.model.plan import Columns
 
@@ -36,9 +35,7 @@ class CalibrationBox(QGroupBox):
         self.override.setToolTip("Scan with this calibration despite the differences listed below")
         self._remark = label("", "warn")
         self._remark.setWordWrap(True)
-        column = QVBoxLayout(self)
-        for widget in (self.choice, self.override, self._remark):
-            column.addWidget(widget)
+        column_of(self.choice, self.override, self._remark, on=self)
         self.choice.activated.connect(self._choose)
         self.override.toggled.connect(controller.plans.set_override)
         self.stops = [
@@ -82,9 +79,7 @@ class TargetBox(QGroupBox):
         self._where.setWordWrap(True)
         self._frames, self._time, self._disk = label("–"), label("–"), label("–")
         self._split = label("", "muted")
-        row = QHBoxLayout()
-        row.addWidget(self.name, 1)
-        row.addWidget(self.folder)
+        row = row_of((self.name, 1), self.folder)
         form = QFormLayout(self)
         form.addRow(row)
         form.addRow(self._where)
@@ -172,18 +167,21 @@ class RunBox(QGroupBox):
         ]
 
     def _lay_out(self) -> None:
-        buttons = QHBoxLayout()
-        for button in (self.pause, self.cancel):
-            buttons.addWidget(button)
-        column = QVBoxLayout(self)
-        column.addWidget(self.then)
-        column.addWidget(self.drift)
-        column.addWidget(self.start)
-        column.addLayout(buttons)
-        column.addWidget(self.renew)
-        column.addWidget(self.again)
-        for widget in (self._phase, self._bar, self._what, self._time, self._text):
-            column.addWidget(widget)
+        buttons = row_of(self.pause, self.cancel)
+        column_of(
+            self.then,
+            self.drift,
+            self.start,
+            buttons,
+            self.renew,
+            self.again,
+            self._phase,
+            self._bar,
+            self._what,
+            self._time,
+            self._text,
+            on=self,
+        )
 
     def toggle_pause(self) -> None:
         """Pause, or continue."""

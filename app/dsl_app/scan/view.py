@@ -8,13 +8,14 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QWidget
 
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import LivePicture, ScanState
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_core.capture.preview import BlockGraph
@@ -50,11 +51,7 @@ class FramePicture(QWidget):
         self._mark.hide()
         self._text = label(HINT, "muted")
         self._text.setWordWrap(True)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addWidget(self.view, 1)
-        column.addWidget(self._text)
+        column_of((self.view, 1), self._text, on=self, margins=0, spacing=4)
         self._mouse = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=30, slot=self._hover)
 
     def show_picture(self, shown: LivePicture | None, plan: CapturePlan) -> None:
@@ -153,11 +150,7 @@ class GraphPlot(QWidget):
         self._curves: list[Any] = []
         self.plot.setXRange(0, PUBLISHED_COLUMNS, padding=0.02)
         self.plot.setYRange(0, 1000, padding=0.02)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addWidget(self._title)
-        column.addWidget(self.plot, 1)
+        column_of(self._title, (self.plot, 1), on=self, margins=0, spacing=4)
 
     def show_graph(self, graph: BlockGraph | None) -> None:
         """Draw a graph, as far as captured."""

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QMenu, QProgressBar, QPushButton, QWidget
+from PySide6.QtWidgets import QLabel, QMenu, QProgressBar, QPushButton, QWidget
 
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.notify import describe_seconds
+from dsl_app.shared.widgets.layouts import row_of
 
 
 class JobStrip(QWidget):
@@ -31,10 +32,7 @@ class JobStrip(QWidget):
         self._choices = QMenu(self)
         self._choices.setAccessibleName("Job to cancel")
         self._choices.aboutToShow.connect(self._list_choices)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 4, 0)
-        for widget in (self._text, self._bar, self._cancel):
-            row.addWidget(widget)
+        row_of(self._text, self._bar, self._cancel, on=self, margins=(0, 0, 4, 0))
         runner.changed.connect(self._show)
         self._show()
 

@@ -8,16 +8,15 @@ from collections import deque
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import (
     QApplication,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from dsl_app.shared.widgets.forms import ChoiceBox
+from dsl_app.shared.widgets.layouts import column_of, row_of
 
 MOST_LINES = 5000
 LEVELS = (("Everything", logging.DEBUG), ("Information", logging.INFO), ("Warnings", logging.WARNING))
@@ -65,12 +64,8 @@ class LogPanel(QWidget):
         self.view.setAccessibleName("Log")
         self.view.setToolTip("What the program did and what went wrong, the latest at the bottom")
         self.view.setPlaceholderText("No messages yet.")
-        row = QHBoxLayout()
-        for widget in (QLabel("Show"), self._level, self._filter, copy):
-            row.addWidget(widget)
-        column = QVBoxLayout(self)
-        column.addLayout(row)
-        column.addWidget(self.view)
+        row = row_of(QLabel("Show"), self._level, self._filter, copy)
+        column_of(row, self.view, on=self)
         self._level.currentIndexChanged.connect(self._refill)
         self._filter.textChanged.connect(self._refill)
         copy.clicked.connect(lambda: QApplication.clipboard().setText(self.view.toPlainText()))

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QMessageBox, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QMessageBox, QPushButton, QVBoxLayout, QWidget
 
 from dsl_app.shared.notify import Level
+from dsl_app.shared.widgets.layouts import row_of
 
 #: How long a message is shown, ms; an error stays until it is closed.
 STAY_MS = {"info": 5000, "warning": 9000}
@@ -33,15 +34,12 @@ class Toast(QFrame):
         self.setProperty("level", level)
         self.setAccessibleName(f"{level}: {text}")
         self.level, self.text = level, text
-        row = QHBoxLayout(self)
-        row.setContentsMargins(12, 8, 8, 8)
         label = QLabel(text)
         label.setWordWrap(True)
         label.setTextFormat(Qt.TextFormat.PlainText)
         label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        row.addWidget(label, 1)
         buttons = QVBoxLayout()
-        row.addLayout(buttons)
+        row_of((label, 1), buttons, on=self, margins=(12, 8, 8, 8))
         for name, do in (offers or {}).items():
             offer = QPushButton(name)
             offer.setToolTip(text)

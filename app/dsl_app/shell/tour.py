@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QPushButton, QWidget
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 CARD_PX, GAP_PX, MARGIN_PX = 360, 14, 6
 SHADE = QColor(0, 0, 0, 130)
@@ -114,17 +115,8 @@ class Tour(QWidget):
         card = QFrame(self)
         card.setProperty("role", "card")
         card.setFixedWidth(CARD_PX)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.skip)
-        buttons.addStretch(1)
-        buttons.addWidget(self.back)
-        buttons.addWidget(self.next)
-        column = QVBoxLayout(card)
-        column.setContentsMargins(14, 12, 14, 12)
-        for widget in (self._count, self._title, self._text):
-            column.addWidget(widget)
-        column.addSpacing(6)
-        column.addLayout(buttons)
+        buttons = row_of(self.skip, STRETCH, self.back, self.next)
+        column_of(self._count, self._title, self._text, 6, buttons, on=card, margins=(14, 12, 14, 12))
         return card
 
     @property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtWidgets import QVBoxLayout
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import (
@@ -16,6 +15,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.calibration.orders.efficiency import STANDS_OUT
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample
 from dsl_core.model.spectral import SpectralCurve
@@ -55,11 +55,9 @@ class BandpassEvidence(Evidence[BandpassCalibration]):
         self._parts = (self.table, self.efficiency, self.response)
         charts = side_by_side(self.efficiency, self.response)
         charts.setContentsMargins(0, 6, 0, 0)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.warnings)
-        column.addWidget(stacked(self.table, charts, (180, 260)), 1)
-        column.addWidget(self.seconds)
+        column_of(
+            self.warnings, (stacked(self.table, charts, (180, 260)), 1), self.seconds, on=self, margins=0
+        )
 
     def _draw_record(self, record: BandpassCalibration) -> None:
         self.table.fill([_row(each, record.warnings) for each in record.filters])

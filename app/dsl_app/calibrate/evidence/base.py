@@ -8,10 +8,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
-from PySide6.QtWidgets import QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.model.base import Record
 
 if TYPE_CHECKING:
@@ -79,9 +80,7 @@ class PlainEvidence(Evidence[Record]):
     def __init__(self) -> None:
         super().__init__(Record)
         self.words = label("", "muted", wraps=True)
-        column = QVBoxLayout(self)
-        column.addWidget(self.words)
-        column.addStretch(1)
+        column_of(self.words, STRETCH, on=self)
 
     def show_fit(self, fit: Fit) -> None:
         """Say that the figures are all there is."""
@@ -114,10 +113,7 @@ def make_evidence(name: str) -> Evidence[Any]:
 def side_by_side(*widgets: QWidget) -> QWidget:
     """Widgets in a row that share the room equally."""
     made = QWidget()
-    row = QHBoxLayout(made)
-    row.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        row.addWidget(widget, 1)
+    row_of(*((widget, 1) for widget in widgets), on=made, margins=0)
     return made
 
 

@@ -10,9 +10,10 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QHelpEvent, QKeyEvent, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QToolTip, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QToolTip, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.calibration.colour.patches import INNER, apply_homography, grid_corners
 from dsl_core.optics.charts import CHART_SHAPE
 
@@ -77,9 +78,7 @@ class ChartPicture(QWidget):
         for corner in self.corners:
             corner.setZValue(10)
             corner.sigPositionChanged.connect(self._moved)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.canvas)
+        column_of(self.canvas, on=self, margins=0)
 
     @property
     def corners_px(self) -> Floats:

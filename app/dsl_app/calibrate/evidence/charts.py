@@ -13,12 +13,13 @@ import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QShowEvent
-from PySide6.QtWidgets import QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedLayout, QWidget
 
 from dsl_app.shared.spectrum import Spectrum
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS, calm_plot, theme_plots
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 from dsl_core.model.spectral import SpectralCurve
@@ -63,12 +64,7 @@ class ChartBox(QWidget):
         self.sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._stack = QStackedLayout()
         self._stack.addWidget(self.sentence)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self.title)
-        column.addWidget(self.legend)
-        column.addLayout(self._stack, 1)
+        column_of(self.title, self.legend, (self._stack, 1), on=self, margins=0, spacing=2)
 
     def hasHeightForWidth(self) -> bool:
         """Boxes next to and below each other share the room equally, however long their legends are."""

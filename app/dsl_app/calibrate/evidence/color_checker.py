@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.chart_picture import ChartPicture, Swatches, corners_in
@@ -28,6 +28,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.calibration.colour.color_checker import WORST_PERCENT
 from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
@@ -96,9 +97,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         self.tabs.addTab(self._chart_tab(), "Chart")
         self.tabs.addTab(self._patches_tab(), "Patches")
         self.tabs.addTab(self._curves_tab(), "Curves")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.tabs)
+        column_of(self.tabs, on=self, margins=0)
         self.chart.moved.connect(self._corner_moved)
         self.again.clicked.connect(self._ask)
         self.back.clicked.connect(self._put_back)
@@ -108,17 +107,9 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         right.addWidget(label("Measured next to expected", "heading"))
         right.addWidget(label("Numbers: held-out residual, % of white", "muted"))
         right.addWidget(self.swatches, 1)
-        row = QHBoxLayout()
-        row.addWidget(self.chart, 3)
-        row.addLayout(right, 2)
-        foot = QHBoxLayout()
-        foot.addWidget(self.words, 1)
-        foot.addWidget(self.back)
-        foot.addWidget(self.again)
-        column = QVBoxLayout(tab)
-        column.setContentsMargins(0, 8, 0, 0)
-        column.addLayout(row, 1)
-        column.addLayout(foot)
+        row = row_of((self.chart, 3), (right, 2))
+        foot = row_of((self.words, 1), self.back, self.again)
+        column_of((row, 1), foot, on=tab, margins=(0, 8, 0, 0))
         return tab
 
     def _patches_tab(self) -> QWidget:

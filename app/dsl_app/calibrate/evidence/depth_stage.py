@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QTabWidget, QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side
 from dsl_app.calibrate.evidence.charts import (
@@ -29,6 +29,7 @@ from dsl_app.calibrate.evidence.charts import (
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_PLANE_MM, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
@@ -114,10 +115,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         self.tabs.addTab(_tab(side_by_side(self.planes, self.steps), self.film), "Planes and film")
         self.tabs.addTab(_tab(side_by_side(self.held_out, self.shifts)), "First orders")
         self.tabs.addTab(_tab(side_by_side(self.curve, self.difference)), "Columns over depth")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.warnings)
-        column.addWidget(self.tabs, 1)
+        column_of(self.warnings, (self.tabs, 1), on=self, margins=0)
 
     def _begin(self, record: DepthStageCalibration, session: CalibrationSession) -> None:
         rig = session.bench.rig
@@ -259,9 +257,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
 def _tab(charts: QWidget, below: QWidget | None = None) -> QWidget:
     """A tab of charts, with something below them."""
     tab = QWidget()
-    column = QVBoxLayout(tab)
-    column.setContentsMargins(0, 8, 0, 0)
-    column.addWidget(charts, 3)
+    column = column_of((charts, 3), on=tab, margins=(0, 8, 0, 0))
     if below is not None:
         column.addWidget(below, 2)
     return tab

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGraphicsRectItem, QHBoxLayout, QTableWidgetItem, QVBoxLayout
+from PySide6.QtWidgets import QGraphicsRectItem, QTableWidgetItem
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import (
@@ -22,6 +22,7 @@ from dsl_app.calibrate.evidence.charts import (
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
 from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
 
@@ -77,13 +78,8 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         self._parts = (self.coverage, self.errors, self.table)
         charts = side_by_side(self.coverage, self.errors)
         charts.setContentsMargins(0, 0, 0, 6)
-        foot = QHBoxLayout()
-        foot.addWidget(self.diagnosis, 1)
-        foot.addWidget(self.again, 0, Qt.AlignmentFlag.AlignTop)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(stacked(charts, self.table, (260, 200)), 1)
-        column.addLayout(foot)
+        foot = row_of((self.diagnosis, 1), (self.again, 0, Qt.AlignmentFlag.AlignTop))
+        column_of((stacked(charts, self.table, (260, 200)), 1), foot, on=self, margins=0)
 
     def _begin(self, record: GeometryCalibration, session: CalibrationSession) -> None:
         self._keys = {step.title: step.key for step in session.steps}

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import (
@@ -18,6 +18,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 
 HEADS = (
@@ -68,14 +69,14 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         charts = side_by_side(self.emission, self.field)
         charts.setContentsMargins(0, 0, 0, 6)
         below = QWidget()
-        column = QVBoxLayout(below)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(label("Signals of white at unit shading, DN/ms", "heading"))
-        column.addWidget(self.table, 1)
-        column.addWidget(self.words)
-        whole = QVBoxLayout(self)
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.addWidget(stacked(charts, below, (330, 170)))
+        column_of(
+            label("Signals of white at unit shading, DN/ms", "heading"),
+            (self.table, 1),
+            self.words,
+            on=below,
+            margins=0,
+        )
+        column_of(stacked(charts, below, (330, 170)), on=self, margins=0)
 
     def _theme_bar(self) -> None:
         for side in ("left", "right") if self.bar is not None else ():

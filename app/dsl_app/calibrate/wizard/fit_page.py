@@ -6,7 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QCheckBox, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QSplitter, QWidget
 
 from dsl_app.calibrate.evidence.base import Evidence, make_evidence
 from dsl_app.calibrate.figures_table import FiguresTable
@@ -16,6 +16,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.campaign.session import CalibrationSession
 
 
@@ -39,11 +40,7 @@ class FitPage(QWidget):
         self._split = QSplitter(Qt.Orientation.Vertical)
         self._split.setChildrenCollapsible(False)
         self._split.addWidget(self.figures)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(8, 0, 0, 0)
-        column.addWidget(self.verdict)
-        column.addWidget(self._split, 1)
-        column.addWidget(self.allow)
+        column_of(self.verdict, (self._split, 1), self.allow, on=self, margins=(8, 0, 0, 0))
         self.stops = [
             state.fit.follow(self._show_fit),
             state.misfit.follow(self._show_misfit),

@@ -15,13 +15,13 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLineEdit,
     QScrollArea,
-    QVBoxLayout,
     QWidget,
 )
 
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.model.board import Board, Charuco, Checkerboard
 
 F = TypeVar("F", bound=QWidget)
@@ -54,11 +54,7 @@ class SettingsPage(QWidget):
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(8, 0, 0, 0)
-        column.addWidget(self._intro)
-        column.addWidget(self._trouble)
-        column.addWidget(area, 1)
+        column_of(self._intro, self._trouble, (area, 1), on=self, margins=(8, 0, 0, 0))
         self.say("")
 
     def say(self, trouble: str) -> None:
@@ -148,11 +144,13 @@ class BoardEdit(QWidget):
         self.square = NumberBox("Side of a square", 1, 999, 20, "mm", 3, "Measured over many printed squares")
         self.marker = NumberBox("Side of a marker", 1, 999, 15, "mm", 3, "Measured on the printed board")
         self._marker_label = label("marker", "muted")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.kind)
-        column.addLayout(_row(self.columns, label("×", "muted"), self.rows))
-        column.addLayout(_row(label("square", "muted"), self.square, self._marker_label, self.marker))
+        column_of(
+            self.kind,
+            _row(self.columns, label("×", "muted"), self.rows),
+            _row(label("square", "muted"), self.square, self._marker_label, self.marker),
+            on=self,
+            margins=0,
+        )
         self.kind.activated.connect(lambda _: self._tell())
         for box in (self.columns, self.rows, self.square, self.marker):
             box.setKeyboardTracking(False)
@@ -199,10 +197,7 @@ class BoardEdit(QWidget):
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = QHBoxLayout()
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
+    row = row_of(*widgets, STRETCH)
     return row
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSplitter, QWidget
 
 from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
@@ -13,6 +13,7 @@ from dsl_app.calibrate.wizard.state import Seen, WizardState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.capture.preview import MANY_SATURATED
 
 TABLE_PX = 166
@@ -41,22 +42,14 @@ class StepPage(QWidget):
 
     def _lay_out(self) -> None:
         left = QWidget()
-        words = QVBoxLayout(left)
-        words.setContentsMargins(0, 0, 0, 0)
-        words.addWidget(self.drawing, 1)
-        words.addWidget(self.instruction)
+        column_of((self.drawing, 1), self.instruction, on=left, margins=0)
         split = QSplitter(Qt.Orientation.Horizontal)
         split.setChildrenCollapsible(False)
         split.addWidget(left)
         split.addWidget(self.picture)
         split.setStretchFactor(0, 1)
         split.setStretchFactor(1, 1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(8, 0, 0, 0)
-        column.addWidget(self.title)
-        column.addWidget(split, 1)
-        column.addWidget(self.verdict)
-        column.addWidget(self.figures)
+        column_of(self.title, (split, 1), self.verdict, self.figures, on=self, margins=(8, 0, 0, 0))
 
     def _show(self) -> None:
         shown = step_display(self._state)
@@ -88,10 +81,7 @@ class LiveFrameView(QWidget):
         self._item = pg.ImageItem(axisOrder="row-major")
         self._box.addItem(self._item)
         self._text = label(NO_PICTURE, "muted")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.view, 1)
-        column.addWidget(self._text)
+        column_of((self.view, 1), self._text, on=self, margins=0)
 
     def show_seen(self, seen: Seen | None) -> None:
         """Show a frame; None clears it."""

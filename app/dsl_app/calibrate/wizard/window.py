@@ -10,14 +10,12 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QListWidget,
     QListWidgetItem,
     QMessageBox,
     QProgressBar,
     QPushButton,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -30,6 +28,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import Banner, label, push_button, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.wizard.controller import WizardController
@@ -69,13 +68,8 @@ class CalibrationWizard(QDialog):
     def _lay_out(self) -> None:
         for page in (self.settings, self.step, self.fit):
             self.stack.addWidget(page)
-        row = QHBoxLayout()
-        row.addWidget(self.steps)
-        row.addWidget(self.stack, 1)
-        column = QVBoxLayout(self)
-        column.addWidget(self.banner)
-        column.addLayout(row, 1)
-        column.addWidget(self.buttons)
+        row = row_of(self.steps, (self.stack, 1))
+        column_of(self.banner, (row, 1), self.buttons, on=self)
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands
@@ -226,19 +220,10 @@ class WizardButtons(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        work = QHBoxLayout()
-        work.addWidget(self._text, 1)
-        work.addWidget(self._bar)
-        row = QHBoxLayout()
-        row.addWidget(self.leave)
-        row.addStretch(1)
+        work = row_of((self._text, 1), self._bar)
         early = (self.back, self.check, self.discard, self.all, self.stop)
-        for button in (*early, self.capture, self.fit, self.accept, self.next):
-            row.addWidget(button)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addLayout(work)
-        column.addLayout(row)
+        row = row_of(self.leave, STRETCH, *early, self.capture, self.fit, self.accept, self.next)
+        column_of(work, row, on=self, margins=0)
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands

@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QSplitter, QWidget
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.pictures import PairControls, PairPictures
@@ -18,6 +18,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark, splitter
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
@@ -62,27 +63,21 @@ class PairPanel(QWidget):
         return made
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.addWidget(self.names[0])
-        head.addWidget(self.open_first)
-        head.addSpacing(24)
-        head.addWidget(self.names[1])
-        for button in (self.open_second, self.truth):
-            head.addWidget(button)
-        head.addStretch(1)
-        for button in (self.swap, self.report):
-            head.addWidget(button)
+        head = row_of(
+            self.names[0],
+            self.open_first,
+            24,
+            self.names[1],
+            self.open_second,
+            self.truth,
+            STRETCH,
+            self.swap,
+            self.report,
+        )
         above = QWidget()
-        upper = QVBoxLayout(above)
-        upper.setContentsMargins(0, 0, 0, 0)
-        upper.addWidget(self._pictures, 1)
-        upper.addWidget(self.bar)
+        column_of((self._pictures, 1), self.bar, on=above, margins=0)
         self.parts = splitter(Qt.Orientation.Vertical, (above, 5), (self._figures, 4))
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 8, 0, 0)
-        column.addLayout(head)
-        column.addWidget(self.hint)
-        column.addWidget(self.parts, 1)
+        column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:
         state, control = self._state, self._control

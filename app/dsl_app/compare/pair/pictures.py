@@ -9,7 +9,7 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QSlider, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QSlider, QWidget
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, cursor_text
@@ -17,6 +17,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, label
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import (
     DEPTH,
     DIFFERENCE,
@@ -69,9 +70,7 @@ class PairPictures(QWidget):
             if i:
                 self.boxes[i].setXLink(self.boxes[0])
                 self.boxes[i].setYLink(self.boxes[0])
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self.canvas)
+        column_of(self.canvas, on=self, margins=0)
 
     # Mouse and keys --------------------------------------------------------------------------------
 
@@ -205,12 +204,7 @@ class PairControls(QWidget):
         self.band.setFixedWidth(BAND_PX)
         self.nm, self.readout = label("", "muted"), label("", "muted")
         self.readout.setAccessibleName("Values under the cursor")
-        row = QHBoxLayout(self)
-        row.setContentsMargins(0, 0, 0, 0)
-        for widget in (self.shown, self.band, self.nm):
-            row.addWidget(widget)
-        row.addStretch(1)
-        row.addWidget(self.readout)
+        row_of(self.shown, self.band, self.nm, STRETCH, self.readout, on=self, margins=0)
         self.shown.activated.connect(lambda _: self._choose_shown())
         self.band.valueChanged.connect(control.set_band)
         self.stops: list[Callable[[], None]] = [

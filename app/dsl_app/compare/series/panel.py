@@ -10,9 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QFileDialog,
-    QHBoxLayout,
     QHeaderView,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -26,6 +24,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark, splitter
 from dsl_app.shared.widgets.help_window import set_help
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
 
@@ -73,19 +72,11 @@ class SeriesPanel(QWidget):
         return self._picture.content
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        for widget in (self.kind, self.add, self.remove, self.against, self.figure):
-            head.addWidget(widget)
-        head.addStretch(1)
-        head.addWidget(self.report)
+        head = row_of(self.kind, self.add, self.remove, self.against, self.figure, STRETCH, self.report)
         above = splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.figures, 2))
         below = splitter(Qt.Orientation.Horizontal, (self._plot, 3), (self._picture, 2))
         self.parts = splitter(Qt.Orientation.Vertical, (above, 2), (below, 3))
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 8, 0, 0)
-        column.addLayout(head)
-        column.addWidget(self.hint)
-        column.addWidget(self.parts, 1)
+        column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:
         state, control = self._state, self._control

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.pictures import DIFFERENCE, RegionBox, colour_map, spread_of
 
 
@@ -50,14 +51,8 @@ class SeriesPicture(QWidget):
         self.canvas.addItem(self.bar, 0, 1)
         self.box.addItem(self.image)
         self.box.addItem(self.rectangle, ignoreBounds=True)
-        head = QHBoxLayout()
-        head.addWidget(self.title, 1)
-        head.addWidget(self.part)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addLayout(head)
-        column.addWidget(self.canvas, 1)
+        head = row_of((self.title, 1), self.part)
+        column_of(head, (self.canvas, 1), on=self, margins=0, spacing=2)
 
     @property
     def _shape(self) -> tuple[int, int] | None:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks
 from dsl_core.evaluation.stage_test import StageLine, StageTest
 from dsl_core.evaluation.time_sweep import SweepPoint, best_points
@@ -37,11 +38,7 @@ class SeriesPlot(QWidget):
         self.plot.setMouseEnabled(False, False)
         self.legend = label("", "muted")
         self.legend.setWordWrap(True)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(2)
-        column.addWidget(self.legend)
-        column.addWidget(self.plot, 1)
+        column_of(self.legend, (self.plot, 1), on=self, margins=0, spacing=2)
         self.stops = [
             value.changed.connect(lambda _: self.draw())
             for value in (state.rows, state.test, state.kind, state.figure)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QShowEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QWidget
 
 from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
 from dsl_app.results.layers import Layers, rgb_of, within
@@ -15,6 +15,7 @@ from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.evaluation.marks import inside_outline, nearest_on_screen, on_screen
 from dsl_core.io.result.result_arrays import ResultArrays
 
@@ -44,16 +45,12 @@ class CloudPanel(QWidget):
         self._projected: NDArray[np.float64] | None = None
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
-        self._box = QVBoxLayout(self)
-        self._box.setContentsMargins(0, 0, 0, 0)
         self._hint = label("", "muted")
         self._reset = QPushButton("Reset view")
         self._reset.setToolTip("Look from the position of the camera")
         self._reset.clicked.connect(lambda: None if self.view is None else self.view.reset())
-        row = QHBoxLayout()
-        row.addWidget(self._hint, 1)
-        row.addWidget(self._reset)
-        self._box.addLayout(row)
+        row = row_of((self._hint, 1), self._reset)
+        self._box = column_of(row, on=self, margins=0)
         state.result.changed.connect(lambda _: self._new_result())
         for value in (state.cloud_by, state.band, state.quality, state.picture, state.search):
             value.changed.connect(lambda _: self._later.start())

@@ -18,11 +18,12 @@ from PySide6.QtGui import (
     QResizeEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from dsl_app.results.cloud.points import Points
 from dsl_app.results.cloud.render_window import Colours, MouseButton, Rendering, graphics_work
 from dsl_app.results.cloud.renderer import CloudRenderer
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step
 
 #: One notch of a mouse wheel, in Qt's unit.
@@ -239,10 +240,7 @@ class StaticCloud(CloudView):
         self._text.setProperty("role", "muted")
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._picture.setAccessibleName("Picture of the point cloud")
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(self._picture, 1)
-        column.addWidget(self._text)
+        column_of((self._picture, 1), self._text, on=self, margins=0)
         self._background = "#000000"
 
     def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:

@@ -10,17 +10,16 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QFormLayout,
-    QHBoxLayout,
     QLabel,
     QLineEdit,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from dsl_app.results.export.controller import FORMATS, ExportController
 from dsl_app.shared.widgets.forms import push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.io.result.result_arrays import ResultArrays
 
 
@@ -65,21 +64,11 @@ class ExportDialog(QDialog):
         self.formats["ply"].setChecked(True)
 
     def _lay_out(self, browse: QPushButton) -> None:
-        row = QHBoxLayout()
-        row.addWidget(self.folder, 1)
-        row.addWidget(browse)
+        row = row_of((self.folder, 1), browse)
         form = QFormLayout()
         form.addRow("Folder", row)
         form.addRow("Name", self.name)
-        column = QVBoxLayout(self)
-        column.addLayout(form)
-        for box in self.formats.values():
-            column.addWidget(box)
-        column.addSpacing(6)
-        column.addWidget(self.replace)
-        column.addWidget(self.text)
-        column.addStretch(1)
-        column.addWidget(self.buttons)
+        column_of(form, *self.formats.values(), 6, self.replace, self.text, STRETCH, self.buttons, on=self)
 
     @property
     def targets(self) -> dict[str, Path]:

@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QLineEdit,
     QListWidget,
     QListWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -18,6 +17,7 @@ from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Library
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.io.spectra.reference_file import Reference
 
 ENTRY = Qt.ItemDataRole.UserRole
@@ -53,9 +53,7 @@ class LibraryDialog(QDialog):
         self.add = self.buttons.addButton("Add", QDialogButtonBox.ButtonRole.AcceptRole)
         self.add.setToolTip("Compare with the selected spectra")
         self.buttons.button(QDialogButtonBox.StandardButton.Cancel).setToolTip("Add none (Escape)")
-        column = QVBoxLayout(self)
-        for widget in (self.filter, self.list, self.text, self.buttons):
-            column.addWidget(widget)
+        column_of(self.filter, self.list, self.text, self.buttons, on=self)
         self.filter.textChanged.connect(lambda _: self._show())
         self.list.itemSelectionChanged.connect(self._show)
         self.list.itemDoubleClicked.connect(lambda _: self.accept())

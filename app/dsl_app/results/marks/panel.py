@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QHeaderView,
     QLabel,
     QScrollArea,
@@ -25,6 +24,7 @@ from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
@@ -90,10 +90,7 @@ class MarksPanel(QWidget):
         column_box.addWidget(self.tree, 1)
         # Two rows, as the smallest window is too narrow for one.
         for buttons in ((self.reference, self.remove), (self.copy, self.export)):
-            row = QHBoxLayout()
-            for button in buttons:
-                row.addWidget(button)
-            row.addStretch(1)
+            row = row_of(*buttons, STRETCH)
             column_box.addLayout(row)
         column_box.addWidget(self.below, 1)
         self._connect()

@@ -20,6 +20,7 @@ from dsl_app.results.reconstruct_again.state import OWN, ReconstructionRequest, 
 from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.layouts import row_of
 from dsl_core.model.options import MODELS, SOLVERS, SpectralChoice
 
 LOW_NM, HIGH_NM = 380.0, 780.0
@@ -183,7 +184,5 @@ def _choices(name: str, tip: str, choices: tuple[SpectralChoice, ...]) -> Choice
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = QHBoxLayout()
-    for widget in widgets:
-        row.addWidget(widget, 0 if isinstance(widget, QLabel | QPushButton) else 1)
+    row = row_of(*((widget, 0 if isinstance(widget, QLabel | QPushButton) else 1) for widget in widgets))
     return row

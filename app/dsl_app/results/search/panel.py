@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QFormLayout, QHBoxLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
 
 from dsl_app.results.search.controller import SearchController
 from dsl_app.results.state import ResultsState, Search, SearchMode
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, push_button
+from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 HINT = "Select a pin, region or reference, or point at a pixel; then search the whole picture for it."
 
@@ -31,10 +32,7 @@ class SearchPanel(QWidget):
         self.text = QLabel(HINT)
         self.text.setProperty("role", "muted")
         self.text.setWordWrap(True)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.start)
-        buttons.addWidget(self.clear)
-        buttons.addStretch(1)
+        buttons = row_of(self.start, self.clear, STRETCH)
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)
         form.addRow("Search for", self.mode)

@@ -7,10 +7,8 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
-    QHBoxLayout,
     QPushButton,
     QTableWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -18,6 +16,7 @@ from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
@@ -69,17 +68,8 @@ class EffectsPanel(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout()
-        for widget in (self.choice, self._within, self.tolerance, self.unit):
-            row.addWidget(widget)
-        row.addStretch(1)
-        row.addWidget(self.apply)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
-        column.addLayout(row)
-        column.addWidget(self.table, 1)
-        column.addWidget(self._summary)
-        column.addWidget(self._saved)
+        row = row_of(self.choice, self._within, self.tolerance, self.unit, STRETCH, self.apply)
+        column_of(row, (self.table, 1), self._summary, self._saved, on=self, margins=(0, 6, 0, 0))
 
     def _connect(self) -> None:
         state = self._state

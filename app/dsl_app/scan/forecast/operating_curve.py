@@ -9,12 +9,13 @@ from typing import Any
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.scan.forecast.figures import CURVES, ForecastFigure
 from dsl_app.scan.forecast.state import ForecastPoint
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks, time_ticks
 
 #: Presets that are always labelled; other points only while chosen or pointed at.
@@ -64,14 +65,8 @@ class OperatingCurve(QWidget):
         self.marker.sigPositionChangeFinished.connect(self._dropped)
 
     def _lay_out(self) -> None:
-        self.head = head = QHBoxLayout()
-        head.addWidget(self.figure)
-        head.addStretch(1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.setSpacing(4)
-        column.addLayout(head)
-        column.addWidget(self.plot, 1)
+        self.head = head = row_of(self.figure, STRETCH)
+        column_of(head, (self.plot, 1), on=self, margins=0, spacing=4)
 
     # Show ------------------------------------------------------------------------------------------
 

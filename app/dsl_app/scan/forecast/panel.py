@@ -8,10 +8,8 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QFrame,
-    QHBoxLayout,
     QHeaderView,
     QPushButton,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -22,6 +20,7 @@ from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
 #: Interval at which new predictions are fetched, ms.
@@ -70,18 +69,17 @@ class ForecastPanel(QWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        wish = QHBoxLayout()
-        for widget in (self.wish, self.budget, self.error, self.ask):
-            wish.addWidget(widget)
-        wish.addStretch(1)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 0)
-        column.setSpacing(5)
-        column.addWidget(self.curve, 1)
-        column.addWidget(self._note)
-        column.addLayout(wish)
-        column.addWidget(self._answer)
-        column.addWidget(self.table)
+        wish = row_of(self.wish, self.budget, self.error, self.ask, STRETCH)
+        column_of(
+            (self.curve, 1),
+            self._note,
+            wish,
+            self._answer,
+            self.table,
+            on=self,
+            margins=(0, 6, 0, 0),
+            spacing=5,
+        )
 
     def _connect(self) -> None:
         state = self._state

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.layouts import column_of
 
 
 def text_window(title: str, content: QWidget, parent: QWidget, width: int, height: int) -> QDialog:
@@ -30,9 +31,7 @@ def text_window(title: str, content: QWidget, parent: QWidget, width: int, heigh
     buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
     buttons.button(QDialogButtonBox.StandardButton.Close).setToolTip("Close this window (Escape)")
     buttons.rejected.connect(window.reject)
-    column = QVBoxLayout(window)
-    column.addWidget(content, 1)
-    column.addWidget(buttons)
+    column_of((content, 1), buttons, on=window)
     return window
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, TypeVar
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import (
+    QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QFrame,
-    QHBoxLayout,
     QLabel,
     QPushButton,
     QSpinBox,
@@ -20,7 +22,11 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.shared.button_state import ButtonState
+from dsl_app.shared.widgets.layouts import row_of
 
+W = TypeVar("W", bound=QWidget)
+#: A function or signal that a click calls.
+Clicked = Callable[..., object] | SignalInstance | None
 _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
@@ -60,8 +66,7 @@ class NumberBox(CalmWheel, QDoubleSpinBox):
         self.setValue(value)
         self.setKeyboardTracking(False)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(name)
-        self.setToolTip(tip or name)
+        named(self, name, tip or name)
         if unit:
             self.setSuffix(f" {unit}")
 
@@ -74,20 +79,24 @@ class WholeBox(CalmWheel, QSpinBox):
         self.setRange(low, high)
         self.setValue(value)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(name)
-        self.setToolTip(tip or name)
+        named(self, name, tip or name)
         if unit:
             self.setSuffix(f" {unit}")
 
 
 class ChoiceBox(CalmWheel, QComboBox):
-    """A choice of a list."""
+    """A choice of a list of texts, each with the data that it stands for."""
 
-    def __init__(self, name: str, tip: str = "") -> None:
+    def __init__(self, name: str, tip: str = "", choices: Iterable[tuple[str, object]] = ()) -> None:
         super().__init__()
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(name)
-        self.setToolTip(tip or name)
+        named(self, name, tip or name)
+        for text, data in choices:
+            self.addItem(text, data)
+
+    def choose(self, data: object) -> None:
+        """Show the entry of some data as the chosen one."""
+        self.setCurrentIndex(self.findData(data))
 
     def be_narrow(self, least_px: int = 80) -> None:
         """Let the box be narrower than its longest entry, which its list still shows whole."""
@@ -127,11 +136,41 @@ def show_remark(line: QLabel, text: str) -> None:
     line.setVisible(bool(text))
 
 
-def push_button(text: str, tip: str) -> QPushButton:
-    """A button with its tooltip."""
+def push_button(text: str, tip: str, do: Clicked = None, role: str = "") -> QPushButton:
+    """A button with its tooltip, what a click does, and its role of the style sheet."""
     made = QPushButton(text)
     made.setToolTip(tip)
+    if do is not None:
+        made.clicked.connect(do)
+    if role:
+        made.setProperty("role", role)
     return made
+
+
+def check_box(text: str, tip: str) -> QCheckBox:
+    """A check box with its tooltip."""
+    made = QCheckBox(text)
+    made.setToolTip(tip)
+    return made
+
+
+def named(widget: W, name: str, tip: str = "") -> W:
+    """A widget with the name that screen readers tell, and its tooltip."""
+    widget.setAccessibleName(name)
+    if tip:
+        widget.setToolTip(tip)
+    return widget
+
+
+@contextmanager
+def quiet(*objects: QObject) -> Iterator[None]:
+    """Change objects without their signals."""
+    before = [(each, each.blockSignals(True)) for each in objects]
+    try:
+        yield
+    finally:
+        for each, was_blocked in before:
+            each.blockSignals(was_blocked)
 
 
 def show_button(button: QPushButton, state: ButtonState) -> None:
@@ -174,10 +213,7 @@ class Banner(QFrame):
         self._text.setTextFormat(Qt.TextFormat.PlainText)
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.action = QPushButton(action)
-        self._row = QHBoxLayout(self)
-        self._row.setContentsMargins(12, 8, 8, 8)
-        self._row.addWidget(self._text, 1)
-        self._row.addWidget(self.action)
+        self._row = row_of((self._text, 1), self.action, on=self, margins=(12, 8, 8, 8))
         self.say("")
 
     def add_button(self, text: str) -> QPushButton:

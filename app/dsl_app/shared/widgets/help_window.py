@@ -9,16 +9,15 @@ from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QKeySequence, QShortcut, QTextBlock, QTextCursor
 from PySide6.QtWidgets import (
     QDialog,
-    QHBoxLayout,
     QListWidget,
     QListWidgetItem,
     QPushButton,
     QSplitter,
     QTextBrowser,
-    QVBoxLayout,
     QWidget,
 )
 
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
 
@@ -111,20 +110,14 @@ class HelpWindow(QDialog):
             button.setEnabled(False)
 
     def _lay_out(self) -> None:
-        head = QHBoxLayout()
-        head.addWidget(self.back)
-        head.addWidget(self.forward)
-        head.addStretch(1)
-        head.addWidget(self.close_button)
+        head = row_of(self.back, self.forward, STRETCH, self.close_button)
         parts = QSplitter(Qt.Orientation.Horizontal)
         parts.setChildrenCollapsible(False)
         parts.addWidget(self.pages)
         parts.addWidget(self.text)
         parts.setSizes([270, 690])
         parts.setStretchFactor(1, 1)
-        column = QVBoxLayout(self)
-        column.addLayout(head)
-        column.addWidget(parts, 1)
+        column_of(head, (parts, 1), on=self)
 
     @property
     def page(self) -> str:

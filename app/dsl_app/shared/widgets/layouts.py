@@ -1,0 +1,104 @@
+"""Rows and columns of widgets in one expression: parts in their order, with stretch and gaps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QScrollArea, QTabWidget, QVBoxLayout, QWidget
+
+B = TypeVar("B", bound=QBoxLayout)
+Margins = int | tuple[int, int, int, int]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Empty room that takes its share of what is left."""
+
+    share: int = 1
+
+
+#: What pushes the parts before it and those after it apart.
+STRETCH = Stretch()
+Item = QWidget | QLayout
+#: A widget or layout, alone or with its stretch and alignment; a gap in pixels; or empty room.
+Part = Item | tuple[Item, int] | tuple[QWidget, int, Qt.AlignmentFlag] | int | Stretch
+
+
+def row_of(
+    *parts: Part, on: QWidget | None = None, margins: Margins | None = None, spacing: int | None = None
+) -> QHBoxLayout:
+    """Parts from left to right; ``on`` is the widget that they are laid out on."""
+    return _filled(QHBoxLayout(), parts, on, margins, spacing)
+
+
+def column_of(
+    *parts: Part, on: QWidget | None = None, margins: Margins | None = None, spacing: int | None = None
+) -> QVBoxLayout:
+    """Parts from top to bottom; ``on`` is the widget that they are laid out on."""
+    return _filled(QVBoxLayout(), parts, on, margins, spacing)
+
+
+def boxed(layout: QLayout) -> QWidget:
+    """A widget with a layout, where a widget is needed."""
+    made = QWidget()
+    made.setLayout(layout)
+    return made
+
+
+def _filled(
+    box: B, parts: tuple[Part, ...], on: QWidget | None, margins: Margins | None, spacing: int | None
+) -> B:
+    if on is not None:
+        on.setLayout(box)
+    if margins is not None:
+        left, top, right, bottom = (margins,) * 4 if isinstance(margins, int) else margins
+        box.setContentsMargins(left, top, right, bottom)
+    if spacing is not None:
+        box.setSpacing(spacing)
+    for part in parts:
+        _add(box, part)
+    return box
+
+
+def _add(box: QBoxLayout, part: Part) -> None:
+    match part:
+        case int():
+            box.addSpacing(part)
+        case Stretch():
+            box.addStretch(part.share)
+        case (item, stretch):
+            _add_item(box, item, stretch)
+        case (widget, stretch, side):
+            box.addWidget(widget, stretch, side)
+        case item:
+            _add_item(box, item)
+
+
+def _add_item(box: QBoxLayout, item: Item, stretch: int = 0) -> None:
+    if isinstance(item, QWidget):
+        box.addWidget(item, stretch)
+    else:
+        box.addLayout(item, stretch)
+
+
+def scrolled(content: QWidget) -> QScrollArea:
+    """Content that scrolls up and down where it is higher than its room, without a frame."""
+    area = QScrollArea()
+    area.setWidget(content)
+    area.setWidgetResizable(True)
+    area.setFrameShape(QScrollArea.Shape.NoFrame)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    return area
+
+
+def tabs_of(name: str, *tabs: tuple[QWidget, str, str]) -> QTabWidget:
+    """Tabs from their widgets, titles and tooltips; ``name`` is told to screen readers."""
+    made = QTabWidget()
+    made.setDocumentMode(True)
+    made.tabBar().setDrawBase(False)
+    made.tabBar().setAccessibleName(name)
+    for widget, title, tip in tabs:
+        made.setTabToolTip(made.addTab(widget, title), tip)
+    return made
