@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QFrame,
     QLineEdit,
-    QPushButton,
     QWidget,
 )
 
@@ -42,9 +41,7 @@ class NewCampaignDialog(QDialog):
         self.folder = QLineEdit(str(home))
         self.folder.setAccessibleName("Folder of campaigns")
         self.folder.setToolTip("Folder that will contain the campaign's own folder")
-        self.browse = QPushButton("Choose…")
-        self.browse.setToolTip("Choose the folder of campaigns")
-        self.browse.clicked.connect(self._browse)
+        self.browse = push_button("Choose…", "Choose the folder of campaigns", self._browse)
         self._text = label("", "warn", wraps=True)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.begin = buttons.addButton("Begin", QDialogButtonBox.ButtonRole.AcceptRole)
@@ -95,7 +92,7 @@ class CampaignBox(QFrame):
         self._name, self._where = label("", "title"), label("", "muted", wraps=True)
         self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.new = push_button("&New campaign…", "Start a campaign for the chosen rig in a new folder")
-        self.open = push_button("&Open campaign…", "Continue an existing campaign")
+        self.open = push_button("&Open campaign…", "Continue an existing campaign", self._ask_open)
         self.everything = push_button(
             "Calibrate &everything",
             "Run all calibrations in order, without questions, on a rig that places targets itself",
@@ -124,7 +121,6 @@ class CampaignBox(QFrame):
     def _connect(self) -> None:
         state, commands = self._state, self._commands
         self.new.clicked.connect(lambda: self.ask_new())
-        self.open.clicked.connect(self._ask_open)
         self.everything.clicked.connect(commands.run_everything)
         self.cancel.clicked.connect(commands.cancel_everything)
         self.keep.clicked.connect(commands.keep)

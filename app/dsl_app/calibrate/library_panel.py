@@ -62,14 +62,14 @@ class LibraryPanel(QGroupBox):
         self.use = push_button("&Use for scans", "Scan with this calibration from now on")
         self.report = push_button("Show &report", "Open its report in the browser")
         self.restore = push_button(
-            "Ma&ke current", "Make this older version the current one; no version is lost"
+            "Ma&ke current", "Make this older version the current one; no version is lost", self._restore
         )
         self.check = push_button(
             "Check for &drift…",
             "Check with one quick capture of a flat target whether the rig still matches its calibration",
         )
-        self.export = push_button("E&xport…", "Export it for another computer or program")
-        self.import_ = push_button("&Import…", "Import a calibration's file into the library")
+        self.export = push_button("E&xport…", "Export it for another computer or program", self._export)
+        self.import_ = push_button("&Import…", "Import a calibration's file into the library", self._import)
         self._lay_out()
         self._connect()
 
@@ -77,10 +77,7 @@ class LibraryPanel(QGroupBox):
         state = self._state
         self.use.clicked.connect(lambda: self._commands.use(self.key))
         self.report.clicked.connect(lambda: self._commands.report(self.key))
-        self.restore.clicked.connect(self._restore)
         self.check.clicked.connect(self._check)
-        self.export.clicked.connect(self._export)
-        self.import_.clicked.connect(self._import)
         self.table.itemSelectionChanged.connect(self._select)
         self.table.itemActivated.connect(lambda _: self.report.click())
         self.stops: list[Callable[[], None]] = [

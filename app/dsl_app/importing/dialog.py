@@ -59,7 +59,7 @@ class ImportDialog(JobDialog):
 
     def _make_folder(self) -> None:
         self._folder = label("", "muted")
-        self.other = push_button("&Another folder…", "Choose another folder to import")
+        self.other = push_button("&Another folder…", "Choose another folder to import", self._choose_folder)
         self._summary = label("")
         self.table = ReadTable(
             "Files of the folder",
@@ -77,7 +77,7 @@ class ImportDialog(JobDialog):
         self.base.addItem("The published rig", PUBLISHED)
         for name in self._state.library.value:
             self.base.addItem(name, name)
-        self.file = push_button("&File…", "Choose a calibration file (.json)")
+        self.file = push_button("&File…", "Choose a calibration file (.json)", self._choose_file)
         self._size = QWidget()
         self.width_px, self.height_px = (
             WholeBox(f"{what} of the camera's images", 0, _LARGEST_PX, 0, "px",
@@ -94,7 +94,7 @@ class ImportDialog(JobDialog):
         self.home = QLineEdit(str(request.target.parent))
         self.home.setAccessibleName("Folder to save in")
         self.home.setToolTip("Folder of the imported scan or calibration; the source folder is not changed")
-        self.browse = push_button("&Choose…", "Choose the folder to save in")
+        self.browse = push_button("&Choose…", "Choose the folder to save in", self._choose_home)
         self.name_buttons(
             "Import", "Import the folder, completely or not at all", "Close without importing (Escape)"
         )
@@ -115,10 +115,7 @@ class ImportDialog(JobDialog):
 
     def _connect(self) -> None:
         commands = self._commands
-        self.other.clicked.connect(self._choose_folder)
         self.base.activated.connect(lambda index: commands.change(base=self.base.itemData(index)))
-        self.file.clicked.connect(self._choose_file)
-        self.browse.clicked.connect(self._choose_home)
         for field in (self.name, self.home):
             field.textEdited.connect(lambda _: self._rename())
         for box in (self.width_px, self.height_px):
@@ -200,5 +197,4 @@ def _breakable(path: str) -> str:
 
 
 def _row(field: QWidget, button: QPushButton) -> QHBoxLayout:
-    row = row_of((field, 1), button)
-    return row
+    return row_of((field, 1), button)

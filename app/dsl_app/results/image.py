@@ -15,6 +15,7 @@ from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, Tool
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step, colour_map
 
@@ -72,10 +73,9 @@ class ResultImage(QWidget):
         self.pins.setZValue(30)
         self.bar = pg.ColorBarItem(interactive=False, width=14, colorMap=colour_map("viridis"))
         self.canvas.addItem(self.bar, 0, 1)
-        self.legend = QLabel()
+        self.legend = named(QLabel(), "Legend")
         self.legend.setWordWrap(True)
         self.legend.setTextFormat(Qt.TextFormat.RichText)
-        self.legend.setAccessibleName("Legend")
         column_of((self.canvas, 1), self.legend, on=self, margins=0, spacing=4)
         self._mouse = pg.SignalProxy(
             self.canvas.scene().sigMouseMoved, rateLimit=CURSOR_HZ, slot=self._mouse_moved

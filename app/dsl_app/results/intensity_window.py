@@ -6,11 +6,11 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QDialog, QWidget
+from PySide6.QtWidgets import QDialog, QWidget
 
 from dsl_app.results.state import ResultsState
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import check_box, label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS, calm_plot, theme_plots
@@ -56,14 +56,13 @@ class IntensityWindow(QDialog):
         self.model = [
             self.item.plot(pen=pg.mkPen(colour, width=1.4), name=f"{name} model") for name, colour in channels
         ]
-        self.faint = QCheckBox("Scale to the first orders")
-        self.faint.setToolTip(
-            "The zero order is far brighter and extends beyond the plot; clear this to show all of it"
+        self.faint = check_box(
+            "Scale to the first orders",
+            "The zero order is far brighter and extends beyond the plot; clear this to show all of it",
         )
         self.faint.setChecked(True)
         self.faint.toggled.connect(lambda _: self._scale())
-        self.text = label("", "muted")
-        self.text.setWordWrap(True)
+        self.text = label("", "muted", wraps=True)
         column_of((self.plot, 1), self.faint, self.text, on=self)
         state.graph.follow(self._show)
 

@@ -51,9 +51,8 @@ class PixelInfo(QFrame):
         self._state = state
         self.values = label(HINT)
         self.values.setAccessibleName("Pixel under the cursor")
-        self.reasons = label("", "muted")
+        self.reasons = label("", "muted", wraps=True)
         self.reasons.setAccessibleName("Why this pixel is limited")
-        self.reasons.setWordWrap(True)
         self.reasons.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.reasons.setMinimumHeight(2 * self.reasons.fontMetrics().lineSpacing() + 2)
         for each in (self.values, self.reasons):

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QWidget
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import spread_of
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
@@ -66,9 +67,8 @@ class SpectrumPanel(QWidget):
         result = self._state.result.value
         self.band_line.setVisible(result is not None and result.has_spectra)
         if result is not None and result.has_spectra:
-            self.band_line.blockSignals(True)
-            self.band_line.setPos(result.wavelengths_nm[self._state.band.value])
-            self.band_line.blockSignals(False)
+            with quiet(self.band_line):
+                self.band_line.setPos(result.wavelengths_nm[self._state.band.value])
 
     def _band_dragged(self) -> None:
         result = self._state.result.value

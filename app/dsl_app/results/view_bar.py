@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import (
     QButtonGroup,
-    QCheckBox,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -19,7 +18,7 @@ from PySide6.QtWidgets import (
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import QualityMap, ResultsState, ResultView, Tool
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, quiet
 from dsl_app.shared.widgets.icons import icon
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import spread_of
@@ -82,10 +81,10 @@ class ViewBar(QWidget):
         self.light = ChoiceBox("Light", "The light source that colours are computed for")
         for key, text in LIGHTS.items():
             self.light.addItem(text, key)
-        self.adapted = QCheckBox("Adapted eyes")
-        self.adapted.setToolTip(
+        self.adapted = check_box(
+            "Adapted eyes",
             "White stays white under any light; if not ticked, colours look as they do to eyes adapted to"
-            " daylight"
+            " daylight",
         )
         self.quality = ChoiceBox("Quality", "What the quality view shows")
         for each in QualityMap:
@@ -102,11 +101,10 @@ class ViewBar(QWidget):
             # Narrow, as the colour choice is in the same row; arrow keys replace the buttons.
             box.setButtonSymbols(NumberBox.ButtonSymbols.NoButtons)
             box.setFixedWidth(box.fontMetrics().horizontalAdvance("00000.0 mm") + 16)
-        self.automatic = QCheckBox("Auto")
-        self.automatic.setAccessibleName("Automatic depth limits")
-        self.automatic.setToolTip(
-            "Show all depths; the colours cover nearly all pixels, outliers get the end colours"
+        self.automatic = check_box(
+            "Auto", "Show all depths; the colours cover nearly all pixels, outliers get the end colours"
         )
+        self.automatic.setAccessibleName("Automatic depth limits")
         for choice in (self.light, self.quality):
             # They may be narrower than their longest entry; the list that opens is not.
             choice.setMinimumWidth(CHOICE_PX)
@@ -121,9 +119,7 @@ class ViewBar(QWidget):
             button.setIconSize(QSize(ICON_PX, ICON_PX))
 
     def _button(self, name: str, tip: str) -> QToolButton:
-        button = QToolButton()
-        button.setToolTip(tip)
-        button.setAccessibleName(name)
+        button = named(QToolButton(), name, tip)
         button.setProperty("role", "choice")
         button.setCheckable(True)
         button.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -209,9 +205,8 @@ class ViewBar(QWidget):
         if limits is None and result is not None:
             limits = spread_of(result["depth_mm"])
         for box, value in zip((self.near, self.far), limits or (), strict=False):
-            box.blockSignals(True)
-            box.setValue(value)
-            box.blockSignals(False)
+            with quiet(box):
+                box.setValue(value)
 
     def _new_result(self) -> None:
         self._show_limits()

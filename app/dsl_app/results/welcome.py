@@ -10,7 +10,7 @@ from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
 
 from dsl_app.shared.settings import RecentFiles, entry_text
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.forms import label, named, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, Stretch, column_of, row_of
 
 WIDTH_PX = 560
@@ -30,18 +30,14 @@ class Welcome(QWidget):
         self._recent, self._open_path = recent, open_path
         self.choose = push_button("Open…", "Choose the folder of a result or of a finished scan")
         self.choose.setProperty("role", "primary")
-        self.demo = push_button("Show the demo", "Open a finished scan of the simulated rig")
-        self.demo.clicked.connect(lambda: demo())
-        self.files = QListWidget()
-        self.files.setAccessibleName("Recent files")
-        self.files.setToolTip("Double-click or press Enter to open")
+        self.demo = push_button("Show the demo", "Open a finished scan of the simulated rig", lambda: demo())
+        self.files = named(QListWidget(), "Recent files", "Double-click or press Enter to open")
         self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.files.setTextElideMode(Qt.TextElideMode.ElideMiddle)
         self.files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.files.itemActivated.connect(self._open)
         self._title = label("Recent", "heading")
-        hint = label(HINT, "muted")
-        hint.setWordWrap(True)
+        hint = label(HINT, "muted", wraps=True)
         buttons = row_of(self.choose, self.demo, STRETCH)
         column_of(label("No result is open", "title"), hint, 6, buttons, 14, self._title, self.files, on=self)
         self.setFixedWidth(WIDTH_PX)
@@ -79,8 +75,7 @@ class Offer(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.message = label("", "muted")
-        self.message.setWordWrap(True)
+        self.message = label("", "muted", wraps=True)
         self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.reconstruct = push_button(
             "Reconstruct", "Compute depth and spectra from the frames; the result is saved next to the scan"

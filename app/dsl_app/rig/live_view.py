@@ -8,11 +8,11 @@ import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QCheckBox, QPushButton, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import Region, RegionBox, arrow_step, cut, moved_within
 from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, statistics
@@ -61,11 +61,8 @@ class LiveView(QWidget):
         self.region_box = QCheckBox("Region")
         self.region_box.setToolTip("Limit histogram, figures and auto exposure to a rectangle; drag it")
         self.region_box.toggled.connect(self._show_region)
-        self.fit = QPushButton("Fit")
-        self.fit.setToolTip("Show the whole picture (F)")
-        self.fit.clicked.connect(self.show_all)
-        self.logarithmic = QCheckBox("Logarithmic")
-        self.logarithmic.setToolTip("Show the histogram's counts on a logarithmic scale")
+        self.fit = push_button("Fit", "Show the whole picture (F)", self.show_all)
+        self.logarithmic = check_box("Logarithmic", "Show the histogram's counts on a logarithmic scale")
         self.logarithmic.toggled.connect(self._repaint)
         self._histogram = pg.PlotWidget()
         self._histogram.setFixedHeight(130)
@@ -80,12 +77,10 @@ class LiveView(QWidget):
         self._curves = [self._histogram.plot(pen=pg.mkPen(colour, width=1)) for colour in _COLOURS]
         self._rate = label("", "muted")
         self._counts = label("", "muted")
-        self._saturated = label("")
-        self._saturated.setWordWrap(True)
+        self._saturated = label("", wraps=True)
         self._focus = label("", "muted")
         self._pixel = label("Point at the picture to read raw counts.", "muted")
-        self._empty = label(NO_RIG, "muted")
-        self._empty.setWordWrap(True)
+        self._empty = label(NO_RIG, "muted", wraps=True)
         self._lay_out()
 
     def _lay_out(self) -> None:

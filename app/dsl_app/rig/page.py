@@ -21,7 +21,7 @@ from dsl_app.rig.state import rig_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, set_role
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, set_role
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
@@ -55,13 +55,10 @@ class RigPage(PageWidget):
         self._options.setAccessibleName("Options of the rig")
         self._options.setPlaceholderText("scene=color-checker size=445x290")
         self._options.setToolTip("Options as key=value, separated by spaces; see the help on this page (F1)")
-        self._connect_button = QPushButton("Connect")
-        self._connect_button.setProperty("role", "primary")
-        self._connect_button.setToolTip("Open or close the devices of this rig")
+        self._connect_button = push_button("Connect", "Open or close the devices of this rig", role="primary")
         self._light = label("")
-        self._trouble = label("")
+        self._trouble = label("", wraps=True)
         self._trouble.setProperty("role", "bad")
-        self._trouble.setWordWrap(True)
         self._camera_text, self._projector_text = label("–"), label("–")
         self._live_button = QPushButton("Start live view")
         self._live_button.setToolTip("Show the camera's picture until something else needs the camera")
@@ -72,13 +69,13 @@ class RigPage(PageWidget):
         self._exposure = NumberBox(
             "Exposure", low, high, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
         )
-        self.auto = QPushButton("&Auto exposure")
-        self.auto.setToolTip(
+        self.auto = push_button(
+            "&Auto exposure",
             "Find the longest exposure, in whole LED cycles, that saturates nothing important; if a region is"
-            " shown, only that counts"
+            " shown, only that counts",
+            self._expose,
         )
-        self._cycles = label("", "muted")
-        self._cycles.setWordWrap(True)
+        self._cycles = label("", "muted", wraps=True)
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
         self._timer.timeout.connect(live.fetch_frame)
@@ -124,7 +121,6 @@ class RigPage(PageWidget):
         self._connect_button.clicked.connect(self._toggle_link)
         self._live_button.clicked.connect(self._toggle_live)
         self._exposure.valueChanged.connect(commands.set_exposure)
-        self.auto.clicked.connect(self._expose)
         self.projector.requested.connect(commands.show)
         self._stops += [
             state.choice.follow(self._show_choice),
@@ -184,10 +180,9 @@ class RigPage(PageWidget):
 
     def _show_exposure(self, exposure_ms: float) -> None:
         # The box shows two decimals; the state keeps the exact value.
-        self._exposure.blockSignals(True)
-        self._exposure.setValue(exposure_ms)
-        self._exposure.setSingleStep(self._state.cycle_ms or 1.0)
-        self._exposure.blockSignals(False)
+        with quiet(self._exposure):
+            self._exposure.setValue(exposure_ms)
+            self._exposure.setSingleStep(self._state.cycle_ms or 1.0)
         self._show()
 
     def _switch_timer(self, is_live: bool) -> None:

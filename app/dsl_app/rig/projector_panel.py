@@ -5,15 +5,13 @@ from __future__ import annotations
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import (
-    QCheckBox,
     QFormLayout,
     QGroupBox,
-    QPushButton,
     QSlider,
 )
 
 from dsl_app.rig.state import panel_view
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.devices.base import ProjectorInfo
 from dsl_core.patterns.trial_pictures import KINDS, LINE_PX, PictureKind
@@ -37,8 +35,7 @@ class ProjectorPanel(QGroupBox):
         self._screen = ChoiceBox("Projector screen", "The projector's screen; never the one with this window")
         # Names of screens are longer than the box.
         self._screen.view().setMinimumWidth(260)
-        self._identify = QPushButton("Identify screens")
-        self._identify.setToolTip("Show each screen's name on it for three seconds")
+        self._identify = push_button("Identify screens", "Show each screen's name on it for three seconds")
         self._kind = ChoiceBox("Picture", "What the projector shows")
         for kind in KINDS:
             self._kind.addItem(kind.capitalize(), kind)
@@ -48,12 +45,10 @@ class ProjectorPanel(QGroupBox):
         self._slider = QSlider(Qt.Orientation.Horizontal)
         self._slider.setAccessibleName("Line column")
         self._slider.setToolTip("Move the line across the projector's columns")
-        self._loop = QCheckBox("Loop")
-        self._loop.setToolTip("Sweep the line across the frame")
+        self._loop = check_box("Loop", "Sweep the line across the frame")
         self._timer = QTimer(self)
         self._timer.setInterval(LOOP_MS)
-        self._note = label("", "muted")
-        self._note.setWordWrap(True)
+        self._note = label("", "muted", wraps=True)
         self._info: ProjectorInfo | None = None
         self._user = ""
         self._lay_out()
@@ -111,16 +106,15 @@ class ProjectorPanel(QGroupBox):
 
     def refresh_screens(self, chosen: str, lost: str = "") -> None:
         """List the current screens, and select the chosen one, or the one that is ``lost``."""
-        self._screen.blockSignals(True)
-        self._screen.clear()
-        self._screen.addItem(NO_SCREEN, "")
-        for screen in QGuiApplication.screens():
-            self._screen.addItem(_describe(screen), screen.name())
-        if lost:
-            self._screen.addItem(f"{lost} (disconnected)", LOST)
-        index = self._screen.findData(LOST if lost else chosen)
-        self._screen.setCurrentIndex(max(index, 0))
-        self._screen.blockSignals(False)
+        with quiet(self._screen):
+            self._screen.clear()
+            self._screen.addItem(NO_SCREEN, "")
+            for screen in QGuiApplication.screens():
+                self._screen.addItem(_describe(screen), screen.name())
+            if lost:
+                self._screen.addItem(f"{lost} (disconnected)", LOST)
+            index = self._screen.findData(LOST if lost else chosen)
+            self._screen.setCurrentIndex(max(index, 0))
 
     def _ask(self) -> None:
         kind: PictureKind = self._kind.currentData()

@@ -6,7 +6,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QPushButton, QWidget
 
 from dsl_app.scan.state import preset_of
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import row_of
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, NoCode, ScanLines, Setting
@@ -39,8 +39,7 @@ class PlanEditor(QGroupBox):
         for each in PRESETS:
             self.preset.addItem(each.title, each.key)
         self.preset.addItem(OWN, "")
-        self._purpose = label("", "muted")
-        self._purpose.setWordWrap(True)
+        self._purpose = label("", "muted", wraps=True)
         self.code = ChoiceBox("Binary code", "Finds the projector column and row that light each pixel")
         for choice in CODE_CHOICES:
             self.code.addItem(choice.title, choice.name)
@@ -135,9 +134,8 @@ class PlanEditor(QGroupBox):
         if isinstance(lines, LineComb):
             values.append((self.period, lines.period_px))
         for box, value in values:
-            box.blockSignals(True)
-            box.setValue(value)
-            box.blockSignals(False)
+            with quiet(box):
+                box.setValue(value)
         self.period.setSingleStep(lines.step_px)
 
     def _edited(self) -> None:
@@ -191,9 +189,8 @@ class SettingRows(QWidget):
             cycles = whole_cycles(setting.exposure_ms, period_ms)
             exposure.setToolTip(f"{cycles} LED cycles of {period_ms:.2f} ms. {_EXPOSURE_TIP}")
             for box, value in ((exposure, setting.exposure_ms), (level, setting.level)):
-                box.blockSignals(True)
-                box.setValue(value)
-                box.blockSignals(False)
+                with quiet(box):
+                    box.setValue(value)
 
     def _build(self) -> None:
         while (item := self._grid.takeAt(0)) is not None:
@@ -218,10 +215,9 @@ class SettingRows(QWidget):
             f"Level of setting {i + 1}", 0.01, 1, 1, decimals=2, tip="Drive level of lit columns, 0 to 1"
         )
         level.setSingleStep(0.05)
-        remove = QPushButton("×")
+        remove = push_button("×", "Remove this setting from the plan")
         remove.setFixedWidth(28)
         remove.setAccessibleName(f"Remove setting {i + 1}")
-        remove.setToolTip("Remove this setting from the plan")
         remove.setEnabled(len(self._settings) > 1)
         remove.clicked.connect(lambda: self._remove(i))
         exposure.valueChanged.connect(lambda _: self._edited(i))

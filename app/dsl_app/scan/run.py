@@ -18,7 +18,7 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
-from dsl_app.shared.widgets.forms import ChoiceBox, label, set_role
+from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
 from dsl_core.model.plan import Columns
@@ -33,8 +33,7 @@ class CalibrationBox(QGroupBox):
         self.choice = ChoiceBox("Calibration in use", "The rig's own calibration, or one from the library")
         self.override = QCheckBox("Use despite different settings")
         self.override.setToolTip("Scan with this calibration despite the differences listed below")
-        self._remark = label("", "warn")
-        self._remark.setWordWrap(True)
+        self._remark = label("", "warn", wraps=True)
         column_of(self.choice, self.override, self._remark, on=self)
         self.choice.activated.connect(self._choose)
         self.override.toggled.connect(controller.plans.set_override)
@@ -70,13 +69,9 @@ class TargetBox(QGroupBox):
     def __init__(self, state: ScanState, controller: ScanController) -> None:
         super().__init__("Save in")
         self._state, self._controller = state, controller
-        self.name = QLineEdit()
-        self.name.setAccessibleName("Name of the scan")
-        self.name.setToolTip("Name of the scan's folder, NAME.dsl")
-        self.folder = QPushButton("Folder…")
-        self.folder.setToolTip("Choose the folder in which scans are saved")
-        self._where = label("", "muted")
-        self._where.setWordWrap(True)
+        self.name = named(QLineEdit(), "Name of the scan", "Name of the scan's folder, NAME.dsl")
+        self.folder = push_button("Folder…", "Choose the folder in which scans are saved", self._browse)
+        self._where = label("", "muted", wraps=True)
         self._frames, self._time, self._disk = label("–"), label("–"), label("–")
         self._split = label("", "muted")
         row = row_of((self.name, 1), self.folder)
@@ -87,7 +82,6 @@ class TargetBox(QGroupBox):
             form.addRow(title, widget)
         form.addRow("", self._split)
         self.name.editingFinished.connect(self._rename)
-        self.folder.clicked.connect(self._browse)
         self.stops = [state.target.follow(self._show_target), state.facts.follow(self._show_facts)]
 
     def _rename(self) -> None:
@@ -128,29 +122,23 @@ class RunBox(QGroupBox):
         self.start = QPushButton("&Start scan")
         self.start.setProperty("role", "primary")
         self.start.setToolTip("Capture all frames of the plan; each is saved before the next is captured")
-        self.pause = QPushButton("&Pause")
-        self.pause.setToolTip("Pause before the next frame; nothing is lost")
-        self.cancel = QPushButton("&Cancel")
-        self.cancel.setToolTip("Stop after the current frame; the scan can be resumed later")
-        self.renew = QPushButton("Plan a &new scan")
-        self.renew.setToolTip("Keep the interrupted scan on disk and plan another")
+        self.pause = push_button("&Pause", "Pause before the next frame; nothing is lost", self.toggle_pause)
+        self.cancel = push_button("&Cancel", "Stop after the current frame; the scan can be resumed later")
+        self.renew = push_button("Plan a &new scan", "Keep the interrupted scan on disk and plan another")
         self.again = QPushButton("Reconstruct a&gain…")
         self.again.setToolTip("Reconstruct the finished scan with other parameters, without scanning again")
-        self.drift = QCheckBox("Check for movement first")
-        self.drift.setToolTip(
+        self.drift = check_box(
+            "Check for movement first",
             "Capture two old frames again and compare before resuming. Without this check, a scan whose scene"
-            " or light has changed is resumed and its frames do not fit together"
+            " or light has changed is resumed and its frames do not fit together",
         )
         self.then = QCheckBox("Reconstruct at the end")
         self.then.setToolTip("Reconstruct and open the result as soon as all frames are saved")
         self._phase, self._what, self._time = label(""), label("", "muted"), label("", "muted")
-        self._bar = QProgressBar()
-        self._bar.setAccessibleName("Progress of the scan")
-        self._text = label("", "muted")
-        self._text.setWordWrap(True)
+        self._bar = named(QProgressBar(), "Progress of the scan")
+        self._text = label("", "muted", wraps=True)
         self._lay_out()
         self.start.clicked.connect(controller.start)
-        self.pause.clicked.connect(self.toggle_pause)
         self.cancel.clicked.connect(controller.cancel)
         self.renew.clicked.connect(controller.plan_new_scan)
         self.then.toggled.connect(state.then_reconstruct.set)

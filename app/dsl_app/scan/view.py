@@ -49,8 +49,7 @@ class FramePicture(QWidget):
         self.box.addItem(self._image)
         self.box.addItem(self._mark, ignoreBounds=True)
         self._mark.hide()
-        self._text = label(HINT, "muted")
-        self._text.setWordWrap(True)
+        self._text = label(HINT, "muted", wraps=True)
         column_of((self.view, 1), self._text, on=self, margins=0, spacing=4)
         self._mouse = pg.SignalProxy(self.view.scene().sigMouseMoved, rateLimit=30, slot=self._hover)
 

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtWidgets import QLabel, QMenu, QProgressBar, QPushButton, QWidget
+from PySide6.QtWidgets import QLabel, QMenu, QProgressBar, QWidget
 
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.notify import describe_seconds
+from dsl_app.shared.widgets.forms import named, push_button
 from dsl_app.shared.widgets.layouts import row_of
 
 
@@ -21,16 +22,12 @@ class JobStrip(QWidget):
         super().__init__(parent)
         self._runner = runner
         self._shown: Job[Any] | None = None
-        self._text = QLabel()
-        self._text.setAccessibleName("Running job")
-        self._bar = QProgressBar()
+        self._text = named(QLabel(), "Running job")
+        self._bar = named(QProgressBar(), "Progress of the running job")
         self._bar.setFixedWidth(180)
-        self._bar.setAccessibleName("Progress of the running job")
-        self._cancel = QPushButton("Cancel")
-        self._cancel.setToolTip("Stop this job at the next safe point; finished parts are kept")
+        self._cancel = push_button("Cancel", "Stop this job at the next safe point; finished parts are kept")
         self._cancel.clicked.connect(self._stop_shown)
-        self._choices = QMenu(self)
-        self._choices.setAccessibleName("Job to cancel")
+        self._choices = named(QMenu(self), "Job to cancel")
         self._choices.aboutToShow.connect(self._list_choices)
         row_of(self._text, self._bar, self._cancel, on=self, margins=(0, 0, 4, 0))
         runner.changed.connect(self._show)

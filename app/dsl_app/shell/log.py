@@ -11,11 +11,10 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QPlainTextEdit,
-    QPushButton,
     QWidget,
 )
 
-from dsl_app.shared.widgets.forms import ChoiceBox
+from dsl_app.shared.widgets.forms import ChoiceBox, named, push_button
 from dsl_app.shared.widgets.layouts import column_of, row_of
 
 MOST_LINES = 5000
@@ -50,13 +49,10 @@ class LogPanel(QWidget):
         for name, level in LEVELS:
             self._level.addItem(name, level)
         self._level.setCurrentIndex(1)
-        self._filter = QLineEdit()
+        self._filter = named(QLineEdit(), "Filter by text", "Show only messages that contain this text")
         self._filter.setPlaceholderText("Filter by text")
         self._filter.setClearButtonEnabled(True)
-        self._filter.setAccessibleName("Filter by text")
-        self._filter.setToolTip("Show only messages that contain this text")
-        copy = QPushButton("Copy")
-        copy.setToolTip("Copy the shown lines to the clipboard")
+        copy = push_button("Copy", "Copy the shown lines to the clipboard")
         self.view = QPlainTextEdit()
         self.view.setObjectName("log")
         self.view.setReadOnly(True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import QFrame, QLabel, QMessageBox, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QLabel, QMessageBox, QVBoxLayout, QWidget
 
 from dsl_app.shared.notify import Level
+from dsl_app.shared.widgets.forms import push_button
 from dsl_app.shared.widgets.layouts import row_of
 
 #: How long a message is shown, ms; an error stays until it is closed.
@@ -41,8 +42,7 @@ class Toast(QFrame):
         buttons = QVBoxLayout()
         row_of((label, 1), buttons, on=self, margins=(12, 8, 8, 8))
         for name, do in (offers or {}).items():
-            offer = QPushButton(name)
-            offer.setToolTip(text)
+            offer = push_button(name, text)
             offer.clicked.connect(self.dismiss)
             offer.clicked.connect(lambda _checked=False, do=do: do())
             buttons.addWidget(offer)
@@ -53,8 +53,7 @@ class Toast(QFrame):
 
     @staticmethod
     def _add_flat(column: QVBoxLayout, text: str, tip: str, do: Callable[[], object]) -> None:
-        button = QPushButton(text)
-        button.setToolTip(tip)
+        button = push_button(text, tip)
         button.setFlat(True)
         button.clicked.connect(lambda _checked=False: do())
         column.addWidget(button)

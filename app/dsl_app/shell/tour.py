@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent
 from PySide6.QtWidgets import QFrame, QPushButton, QWidget
 
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 CARD_PX, GAP_PX, MARGIN_PX = 360, 14, 6
@@ -235,8 +235,7 @@ def next_to(hole: QRect, width: int, height: int, room: QRect) -> QPoint:
 
 
 def _button(text: str, tip: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
+    button = push_button(text, tip)
     # Enter presses the one that has the focus, as in a dialog.
     button.setAutoDefault(True)
     return button

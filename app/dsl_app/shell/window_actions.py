@@ -18,6 +18,7 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QLabel, QTextBrowser, QWidge
 from dsl_app.shared.settings import Settings
 from dsl_app.shared.widgets.dialogs import command_window, text_window
 from dsl_app.shared.widgets.figure_file import FORMATS, save_figure
+from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.help_window import help_of, help_window
 from dsl_app.shell.actions import ACTIONS, Action
 from dsl_app.shell.paged_window import PagedWindow
@@ -162,9 +163,7 @@ def shortcuts_window(actions: Iterable[Action], parent: QWidget) -> QDialog:
         for action in actions
         if action.shortcut
     ]
-    browser = QTextBrowser()
-    browser.setAccessibleName("Keyboard shortcuts")
-    browser.setToolTip("Every action that has a shortcut")
+    browser = named(QTextBrowser(), "Keyboard shortcuts", "Every action that has a shortcut")
     browser.setMarkdown("\n".join(["| Action | Shortcut | What it does |", "|---|---|---|", *rows]))
     return text_window("Keyboard shortcuts", browser, parent, 720, 620)
 

@@ -13,6 +13,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QHelpEvent, QKeyEvent, QPainter
 from PySide6.QtWidgets import QToolTip, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.calibration.colour.patches import INNER, apply_homography, grid_corners
 from dsl_core.optics.charts import CHART_SHAPE
@@ -88,9 +89,8 @@ class ChartPicture(QWidget):
     def show_corners(self, corners_px: Floats) -> None:
         """Put the corners somewhere without telling that they moved."""
         for corner, (x, y) in zip(self.corners, corners_px, strict=True):
-            corner.blockSignals(True)
-            corner.setPos(float(x), float(y))
-            corner.blockSignals(False)
+            with quiet(corner):
+                corner.setPos(float(x), float(y))
         self._outline()
 
     def show_picture(self, picture: NDArray[np.uint8]) -> None:

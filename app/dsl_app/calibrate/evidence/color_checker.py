@@ -27,7 +27,7 @@ from dsl_app.calibrate.evidence.charts import (
     range_from_zero,
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
-from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.calibration.colour.color_checker import WORST_PERCENT
@@ -89,9 +89,8 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         self._reader = BackgroundReader(self)
         boxes = (self.residuals, self.response, self.emission)
         self._parts = (self.chart, self.swatches, self.table, *boxes)
-        self.tabs = QTabWidget()
+        self.tabs = named(QTabWidget(), "Evidence of the Color Checker")
         self.tabs.setDocumentMode(True)
-        self.tabs.setAccessibleName("Evidence of the Color Checker")
         self.again.setAccessibleName("Fit with these corners")
         self.back.setAccessibleName("Reset corners")
         self.tabs.addTab(self._chart_tab(), "Chart")

@@ -28,7 +28,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import label, named
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_PLANE_MM, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
@@ -108,9 +108,8 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         self._reader = BackgroundReader(self)
         boxes = (self.planes, self.steps, self.held_out, self.shifts, self.curve, self.difference)
         self._parts = (*boxes, self.film)
-        self.tabs = QTabWidget()
+        self.tabs = named(QTabWidget(), "Evidence of the depth stage")
         self.tabs.setDocumentMode(True)
-        self.tabs.setAccessibleName("Evidence of the depth stage")
         self.film.setMinimumHeight(FILM_PX)
         self.tabs.addTab(_tab(side_by_side(self.planes, self.steps), self.film), "Planes and film")
         self.tabs.addTab(_tab(side_by_side(self.held_out, self.shifts)), "First orders")

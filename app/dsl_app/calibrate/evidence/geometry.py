@@ -21,7 +21,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label, push_button, set_role
+from dsl_app.shared.widgets.forms import label, push_button, quiet, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
 from dsl_core.model.calibration.geometry import GeometryCalibration, PoseQuality
@@ -89,9 +89,8 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         # Colours are changes of items too, and are not ticks.
-        self.table.blockSignals(True)
-        super().apply_theme(theme)
-        self.table.blockSignals(False)
+        with quiet(self.table):
+            super().apply_theme(theme)
 
     # Poses to leave out ----------------------------------------------------------------------------
 
@@ -99,14 +98,13 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         rows = {pose.name: _row(pose) for pose in record.poses}
         rows |= {each.name: [each.name, *[""] * 7, Cell(each.reason, "warn")] for each in record.left_out}
         order = [*(name for name in self._keys if name in rows), *(n for n in rows if n not in self._keys)]
-        self.table.blockSignals(True)
-        self.table.fill([rows[name] for name in order])
-        unreadable = {each.name for each in record.left_out if not each.by_hand}
-        for item in self._names():
-            if item.text() in self._keys and item.text() not in unreadable:
-                ticked = item.text() not in self._unticked
-                item.setCheckState(Qt.CheckState.Checked if ticked else Qt.CheckState.Unchecked)
-        self.table.blockSignals(False)
+        with quiet(self.table):
+            self.table.fill([rows[name] for name in order])
+            unreadable = {each.name for each in record.left_out if not each.by_hand}
+            for item in self._names():
+                if item.text() in self._keys and item.text() not in unreadable:
+                    ticked = item.text() not in self._unticked
+                    item.setCheckState(Qt.CheckState.Checked if ticked else Qt.CheckState.Unchecked)
         self._ticked()
 
     def _names(self) -> list[QTableWidgetItem]:

@@ -15,7 +15,7 @@ from dsl_app.calibrate.wizard.state import Fit, WizardState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
-from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.forms import label, quiet, set_role
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.campaign.session import CalibrationSession
 
@@ -57,9 +57,8 @@ class FitPage(QWidget):
         set_role(self.verdict, shown.role)
         self.figures.setVisible(shown.has_fit)
         self.allow.setVisible(shown.can_allow)
-        self.allow.blockSignals(True)
-        self.allow.setChecked(shown.is_allowed)
-        self.allow.blockSignals(False)
+        with quiet(self.allow):
+            self.allow.setChecked(shown.is_allowed)
         if self._evidence is not None:
             self._evidence.setEnabled(shown.can_edit)
 

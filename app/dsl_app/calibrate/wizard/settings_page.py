@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.model.board import Board, Charuco, Checkerboard
 
@@ -163,17 +163,14 @@ class BoardEdit(QWidget):
         except ValidationError:
             return
         boxes = (self.kind, self.columns, self.rows, self.square, self.marker)
-        for box in boxes:
-            box.blockSignals(True)
-        board = self._board
-        self.kind.setCurrentIndex(self.kind.findData(board.kind))
-        self.columns.setValue(board.columns)
-        self.rows.setValue(board.rows)
-        self.square.setValue(board.square_mm)
-        if isinstance(board, Charuco):
-            self.marker.setValue(board.marker_mm)
-        for box in boxes:
-            box.blockSignals(False)
+        with quiet(*boxes):
+            board = self._board
+            self.kind.setCurrentIndex(self.kind.findData(board.kind))
+            self.columns.setValue(board.columns)
+            self.rows.setValue(board.rows)
+            self.square.setValue(board.square_mm)
+            if isinstance(board, Charuco):
+                self.marker.setValue(board.marker_mm)
         self._show_marker(isinstance(board, Charuco))
 
     def _show_marker(self, on: bool) -> None:
@@ -197,8 +194,7 @@ class BoardEdit(QWidget):
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = row_of(*widgets, STRETCH)
-    return row
+    return row_of(*widgets, STRETCH)
 
 
 def _text_of(values: dict[str, object]) -> str:

@@ -26,7 +26,7 @@ from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.calibrate.wizard.step_page import StepPage
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import Banner, label, push_button, show_button
+from dsl_app.shared.widgets.forms import Banner, label, named, push_button, quiet, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
@@ -166,23 +166,21 @@ class PageList(QListWidget):
         """Show the state of every step; the current page stays."""
         self._lines = lines
         row = self.currentRow()
-        self.blockSignals(True)
-        self.clear()
-        colours = {"good": self._theme.good, "bad": self._theme.bad}
-        for line in lines:
-            item = QListWidgetItem(line.text)
-            item.setForeground(QColor(colours.get(line.role, self._theme.text)))
-            item.setToolTip(line.tip)
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, line.accessible_text)
-            self.addItem(item)
-        self.setCurrentRow(max(row, 0))
-        self.blockSignals(False)
+        with quiet(self):
+            self.clear()
+            colours = {"good": self._theme.good, "bad": self._theme.bad}
+            for line in lines:
+                item = QListWidgetItem(line.text)
+                item.setForeground(QColor(colours.get(line.role, self._theme.text)))
+                item.setToolTip(line.tip)
+                item.setData(Qt.ItemDataRole.AccessibleTextRole, line.accessible_text)
+                self.addItem(item)
+            self.setCurrentRow(max(row, 0))
 
     def mark(self, page: int) -> None:
         """Show a page as the current one."""
-        self.blockSignals(True)
-        self.setCurrentRow(page)
-        self.blockSignals(False)
+        with quiet(self):
+            self.setCurrentRow(page)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
@@ -209,8 +207,7 @@ class WizardButtons(QWidget):
         self.accept = _button("&Accept", "Make this fit the campaign's calibration and write the rig")
         self._text = label("", "muted")
         self._text.setAccessibleName("Current activity")
-        self._bar = QProgressBar()
-        self._bar.setAccessibleName("Progress")
+        self._bar = named(QProgressBar(), "Progress")
         self._bar.setFixedWidth(BAR_PX)
         # The page above must not jump when work begins.
         policy = self._bar.sizePolicy()

@@ -30,12 +30,12 @@ class PairPanel(QWidget):
         super().__init__()
         self._state, self._control = state, control
         self.names = [label("", "heading"), label("", "heading")]
-        self.open_first = push_button("Open &A…", "Choose a result as A")
+        self.open_first = push_button("Open &A…", "Choose a result as A", lambda: self._choose(second=False))
         self.open_second = push_button("Open &B…", "Choose a result to compare A with")
         self.truth = push_button(
             "&Truth as B", "Use the ground truth of A's scene as B; only for scans of the simulated rig"
         )
-        self.swap = push_button("&Swap", "Swap A and B")
+        self.swap = push_button("&Swap", "Swap A and B", control.swap)
         self.report = push_button(
             "Write &report…", "Save figures and pictures of A against the ground truth as an HTML page"
         )
@@ -81,10 +81,8 @@ class PairPanel(QWidget):
 
     def _connect(self) -> None:
         state, control = self._state, self._control
-        self.open_first.clicked.connect(lambda: self._choose(second=False))
         self.open_second.clicked.connect(lambda: self._choose(second=True))
         self.truth.clicked.connect(control.use_truth)
-        self.swap.clicked.connect(control.swap)
         self.report.clicked.connect(self._choose_report)
         self._stops = [
             *self.bar.stops,

@@ -16,7 +16,7 @@ from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, cursor_tex
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import (
     DEPTH,
@@ -230,9 +230,8 @@ class PairControls(QWidget):
         self.band.setVisible(in_band)
         self.nm.setVisible(in_band)
         if pair is not None and pair.bands:
-            self.band.blockSignals(True)
-            self.band.setValue(state.band.value)
-            self.band.blockSignals(False)
+            with quiet(self.band):
+                self.band.setValue(state.band.value)
             self.nm.setText(f"{pair.nm(state.band.value):g} nm")
         self._show_readout()
 

@@ -40,7 +40,7 @@ class SeriesPanel(QWidget):
             self.kind.addItem(kind.value, kind)
         self.add = push_button("&Add results…", "Choose a result, or a folder that contains several")
         self.remove = push_button(
-            "Re&move", "Remove the selected result from the series (Delete); can be undone"
+            "Re&move", "Remove the selected result from the series (Delete); can be undone", self._remove
         )
         self.against = ChoiceBox("Compare with", "What the scans are compared with")
         self.figure = ChoiceBox("Error", "The error that the plot shows")
@@ -82,7 +82,6 @@ class SeriesPanel(QWidget):
         state, control = self._state, self._control
         self.kind.activated.connect(lambda _: control.ask(self.kind.currentData()))
         self.add.clicked.connect(self.choose)
-        self.remove.clicked.connect(self._remove)
         delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.table)
         delete.setContext(Qt.ShortcutContext.WidgetShortcut)
         delete.activated.connect(self._remove)

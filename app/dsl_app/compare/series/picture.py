@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.pictures import DIFFERENCE, RegionBox, colour_map, spread_of
 
@@ -23,9 +23,10 @@ class SeriesPicture(QWidget):
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
         self.title = label("", "heading")
-        self.part = QPushButton("Re&gion")
+        self.part = push_button(
+            "Re&gion", "Use only the pixels in a rectangle, which you can drag on the picture", self._switch
+        )
         self.part.setCheckable(True)
-        self.part.setToolTip("Use only the pixels in a rectangle, which you can drag on the picture")
         self.canvas = pg.GraphicsLayoutWidget()
         self.canvas.setAccessibleName("Residuals of the plane")
         self.canvas.setToolTip(
@@ -38,7 +39,6 @@ class SeriesPicture(QWidget):
         self.rectangle = RegionBox(1)
         self.rectangle.hide()
         self._lay_out()
-        self.part.clicked.connect(self._switch)
         self.rectangle.sigRegionChangeFinished.connect(self._dragged)
         self.stops = [
             value.changed.connect(lambda _: self.show_row())
@@ -82,17 +82,15 @@ class SeriesPicture(QWidget):
             self._place(region)
 
     def _place(self, region: tuple[int, int, int, int]) -> None:
-        self.rectangle.blockSignals(True)
-        self.rectangle.setPos(region[0], region[1])
-        self.rectangle.setSize((region[2], region[3]))
-        self.rectangle.blockSignals(False)
+        with quiet(self.rectangle):
+            self.rectangle.setPos(region[0], region[1])
+            self.rectangle.setSize((region[2], region[3]))
 
     def _switch(self, wanted: bool) -> None:
         shape = self._shape
         if wanted and shape is not None:
-            self.rectangle.blockSignals(True)
-            self.rectangle.put_in_middle(shape[1], shape[0])
-            self.rectangle.blockSignals(False)
+            with quiet(self.rectangle):
+                self.rectangle.put_in_middle(shape[1], shape[0])
             self._control.set_region(self.rectangle.region(shape[1], shape[0]))
         else:
             self._control.set_region(None)

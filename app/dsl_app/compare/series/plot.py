@@ -36,8 +36,7 @@ class SeriesPlot(QWidget):
             "", "", left_width=60,
         )  # fmt: skip
         self.plot.setMouseEnabled(False, False)
-        self.legend = label("", "muted")
-        self.legend.setWordWrap(True)
+        self.legend = label("", "muted", wraps=True)
         column_of(self.legend, (self.plot, 1), on=self, margins=0, spacing=2)
         self.stops = [
             value.changed.connect(lambda _: self.draw())

@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.evaluation.time_sweep import FIGURES, best_points
 
@@ -57,20 +58,19 @@ class SeriesTable(ReadTable):
         """Show all rows; the selection stays."""
         kind = self._state.kind.value
         heads = STAGE_HEADS if kind is SeriesKind.STAGE else SWEEP_HEADS
-        self.blockSignals(True)
-        self.setColumnCount(len(heads))
-        self.setHorizontalHeaderLabels(heads)
-        for column, head in enumerate(heads):
-            item = self.horizontalHeaderItem(column)
-            if item is not None:
-                item.setToolTip(TIPS.get(head, ""))
-        self.show_rows([self._items(texts) for texts in row_texts(self._state)])
-        rows = self._state.rows.value
-        at = next((i for i, row in enumerate(rows) if row.path == self._state.selected.value), None)
-        self.clearSelection()
-        if at is not None:
-            self.selectRow(at)
-        self.blockSignals(False)
+        with quiet(self):
+            self.setColumnCount(len(heads))
+            self.setHorizontalHeaderLabels(heads)
+            for column, head in enumerate(heads):
+                item = self.horizontalHeaderItem(column)
+                if item is not None:
+                    item.setToolTip(TIPS.get(head, ""))
+            self.show_rows([self._items(texts) for texts in row_texts(self._state)])
+            rows = self._state.rows.value
+            at = next((i for i, row in enumerate(rows) if row.path == self._state.selected.value), None)
+            self.clearSelection()
+            if at is not None:
+                self.selectRow(at)
 
     def _items(self, texts: RowTexts) -> list[QTableWidgetItem]:
         items = [cell(texts.name), *map(_number, texts.numbers)]

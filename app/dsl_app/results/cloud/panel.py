@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QMouseEvent, QShowEvent
-from PySide6.QtWidgets import QPushButton, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
 from dsl_app.results.layers import Layers, rgb_of, within
@@ -14,7 +14,7 @@ from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.evaluation.marks import inside_outline, nearest_on_screen, on_screen
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -46,8 +46,7 @@ class CloudPanel(QWidget):
         self._lasso: list[tuple[float, float]] = []
         self._press: tuple[float, float] | None = None
         self._hint = label("", "muted")
-        self._reset = QPushButton("Reset view")
-        self._reset.setToolTip("Look from the position of the camera")
+        self._reset = push_button("Reset view", "Look from the position of the camera")
         self._reset.clicked.connect(lambda: None if self.view is None else self.view.reset())
         row = row_of((self._hint, 1), self._reset)
         self._box = column_of(row, on=self, margins=0)

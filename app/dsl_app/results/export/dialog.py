@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.results.export.controller import FORMATS, ExportController
-from dsl_app.shared.widgets.forms import push_button, set_role
+from dsl_app.shared.widgets.forms import check_box, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -32,9 +32,7 @@ class ExportDialog(QDialog):
         self.setWindowTitle("Export")
         self.resize(560, 360)
         add_help_key(self, "exporting")
-        self.folder = QLineEdit(str(result.path.parent))
-        self.folder.setAccessibleName("Folder")
-        self.folder.setToolTip("Where to write the files")
+        self.folder = named(QLineEdit(str(result.path.parent)), "Folder", "Where to write the files")
         self.name = QLineEdit(result.path.stem)
         self.name.setAccessibleName("Name without suffix")
         self.name.setToolTip("Each format adds its own suffix")
@@ -47,8 +45,7 @@ class ExportDialog(QDialog):
             box.setEnabled(not refusal)
             box.setToolTip(refusal or form.about)
             box.toggled.connect(lambda _: self._check())
-        self.replace = QCheckBox("Replace existing files")
-        self.replace.setToolTip("If not ticked, existing files are never replaced")
+        self.replace = check_box("Replace existing files", "If not ticked, existing files are never replaced")
         self.replace.toggled.connect(lambda _: self._check())
         self.text = QLabel()
         self.text.setWordWrap(True)

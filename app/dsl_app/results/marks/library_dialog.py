@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Library
-from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.forms import label, named
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.io.spectra.reference_file import Reference
@@ -37,9 +37,7 @@ class LibraryDialog(QDialog):
         self.filter.setPlaceholderText("Filter by words in the name")
         self.filter.setToolTip("Lists only spectra whose names contain all of these words")
         self.filter.setClearButtonEnabled(True)
-        self.list = QListWidget()
-        self.list.setAccessibleName("Spectra")
-        self.list.setToolTip("Select one or more; double-click adds one at once")
+        self.list = named(QListWidget(), "Spectra", "Select one or more; double-click adds one at once")
         self.list.setUniformItemSizes(True)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         for reference in library.content.references:
@@ -47,8 +45,7 @@ class LibraryDialog(QDialog):
             item = QListWidgetItem(f"{reference.name}   {nm[0]:g}–{nm[-1]:g} nm")
             item.setData(ENTRY, reference.name)
             self.list.addItem(item)
-        self.text = label("", "muted")
-        self.text.setWordWrap(True)
+        self.text = label("", "muted", wraps=True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.add = self.buttons.addButton("Add", QDialogButtonBox.ButtonRole.AcceptRole)
         self.add.setToolTip("Compare with the selected spectra")

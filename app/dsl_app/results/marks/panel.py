@@ -23,7 +23,7 @@ from dsl_app.results.marks.comparison import comparison_html
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.forms import label, named, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 KEY = Qt.ItemDataRole.UserRole
@@ -60,10 +60,8 @@ class MarksPanel(QWidget):
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         for column in (1, 2):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
-        self.hint = label(EMPTY, "muted")
-        self.hint.setWordWrap(True)
-        self.figures = QLabel()
-        self.figures.setAccessibleName("Comparison with references")
+        self.hint = label(EMPTY, "muted", wraps=True)
+        self.figures = named(QLabel(), "Comparison with references")
         self.figures.setTextFormat(Qt.TextFormat.RichText)
         self.figures.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.figures.setAlignment(Qt.AlignmentFlag.AlignTop)

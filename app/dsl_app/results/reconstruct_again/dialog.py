@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 from dsl_app.results.reconstruct_again.controller import ReconstructionController
 from dsl_app.results.reconstruct_again.state import OWN, ReconstructionRequest, ReconstructionState
 from dsl_app.shared.widgets.dialogs import JobDialog
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import row_of
 from dsl_core.model.options import MODELS, SOLVERS, SpectralChoice
@@ -69,19 +69,19 @@ class ReconstructionDialog(JobDialog):
         )  # fmt: skip
         self.model = _choices("Correspondence", "Where each wavelength falls", MODELS)
         self.solver = _choices("Solver", "How spectra are computed from the frames", SOLVERS)
-        self.refine = QCheckBox("Subpixel columns")
-        self.refine.setToolTip(
-            "Refine depth with the lines; if not ticked, depth is quicker, but in whole columns"
+        self.refine = check_box(
+            "Subpixel columns",
+            "Refine depth with the lines; if not ticked, depth is quicker, but in whole columns",
         )
         self.calibration = ChoiceBox("Calibration", "The scan's own, one from the library, or a file")
         own = self._source.calibration
         self.calibration.addItem(f"The scan's own: {own}" if own else "The scan has none", OWN)
         for name in self._source.library:
             self.calibration.addItem(name, name)
-        self.file = push_button("&File…", "Choose a calibration file (.json)")
-        self.override = QCheckBox("Ignore different settings")
-        self.override.setToolTip(
-            "Use the calibration even if its camera or projector settings differ from those of the scan"
+        self.file = push_button("&File…", "Choose a calibration file (.json)", self._choose_file)
+        self.override = check_box(
+            "Ignore different settings",
+            "Use the calibration even if its camera or projector settings differ from those of the scan",
         )
         self.device = ChoiceBox("Compute on", "A graphics card is faster; it is offered if torch finds one")
         for key, text in DEVICES:
@@ -140,7 +140,6 @@ class ReconstructionDialog(JobDialog):
                 lambda index, choice=choice, field=field: change(**{field: choice.itemData(index)})
             )
         self.name.textChanged.connect(lambda text: change(name=text.strip()))
-        self.file.clicked.connect(self._choose_file)
 
     # Show ------------------------------------------------------------------------------------------
 
@@ -184,5 +183,4 @@ def _choices(name: str, tip: str, choices: tuple[SpectralChoice, ...]) -> Choice
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:
-    row = row_of(*((widget, 0 if isinstance(widget, QLabel | QPushButton) else 1) for widget in widgets))
-    return row
+    return row_of(*((widget, 0 if isinstance(widget, QLabel | QPushButton) else 1) for widget in widgets))

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
@@ -130,22 +130,18 @@ class EffectsPanel(QWidget):
         named = [wanted.value for wanted in EffectChoice]
         kind = self._state.in_use.value if self._state.in_use.value in named else EffectChoice.CHOSEN.value
         tolerance = self._state.tolerance.value
-        for box in (self.choice, self.tolerance, self.unit):
-            box.blockSignals(True)
-        self.choice.setCurrentIndex(self.choice.findData(kind))
-        self.tolerance.setValue(tolerance.value)
-        self.unit.setCurrentIndex(self.unit.findData(tolerance.unit))
-        for box in (self.choice, self.tolerance, self.unit):
-            box.blockSignals(False)
+        with quiet(self.choice, self.tolerance, self.unit):
+            self.choice.setCurrentIndex(self.choice.findData(kind))
+            self.tolerance.setValue(tolerance.value)
+            self.unit.setCurrentIndex(self.unit.findData(tolerance.unit))
         if self.isVisible():
             self._controller.look_again()
         self._show_state()
 
     def _show(self, view: EffectsView | None) -> None:
         rows = () if view is None else view.rows
-        self.table.blockSignals(True)
-        self.table.show_rows([self._cells(row) for row in rows])
-        self.table.blockSignals(False)
+        with quiet(self.table):
+            self.table.show_rows([self._cells(row) for row in rows])
         self._show_state()
 
     def _cells(self, row: EffectRow) -> tuple[QTableWidgetItem, ...]:

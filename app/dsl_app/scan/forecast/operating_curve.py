@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QWidget
 from dsl_app.scan.forecast.figures import CURVES, ForecastFigure
 from dsl_app.scan.forecast.state import ForecastPoint
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import ChoiceBox
+from dsl_app.shared.widgets.forms import ChoiceBox, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks, time_ticks
 
@@ -189,9 +189,8 @@ class OperatingCurve(QWidget):
         self._labels[point.key] = text
 
     def _place_marker(self, at: tuple[float, float]) -> None:
-        self.marker.blockSignals(True)
-        self.marker.setPos(*at)
-        self.marker.blockSignals(False)
+        with quiet(self.marker):
+            self.marker.setPos(*at)
 
     # Choose ----------------------------------------------------------------------------------------
 

@@ -13,12 +13,11 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QLabel,
     QPlainTextEdit,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
 
-from dsl_app.shared.widgets.forms import label, set_role
+from dsl_app.shared.widgets.forms import label, named, push_button, set_role
 from dsl_app.shared.widgets.layouts import column_of
 
 
@@ -37,14 +36,11 @@ def text_window(title: str, content: QWidget, parent: QWidget, width: int, heigh
 
 def command_window(command: str, parent: QWidget) -> QDialog:
     """A command line to copy."""
-    text = QPlainTextEdit(command)
+    text = named(QPlainTextEdit(command), "Command line", "Run this in a terminal to do the same")
     text.setReadOnly(True)
     text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
-    text.setAccessibleName("Command line")
-    text.setToolTip("Run this in a terminal to do the same")
     window = text_window("Command line", text, parent, 640, 220)
-    copy = QPushButton("Copy")
-    copy.setToolTip("Copy the command")
+    copy = push_button("Copy", "Copy the command")
     copy.clicked.connect(lambda: QApplication.clipboard().setText(command))
     box = window.findChild(QDialogButtonBox)
     assert isinstance(box, QDialogButtonBox)

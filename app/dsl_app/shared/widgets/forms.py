@@ -122,8 +122,7 @@ def label(text: str, role: str = "", parent: QWidget | None = None, wraps: bool 
 
 def remark_line() -> QLabel:
     """A label for the current status; hidden, it still takes up one line, so that nothing below it moves."""
-    made = label(" ", "muted")
-    made.setWordWrap(True)
+    made = label(" ", "muted", wraps=True)
     policy = made.sizePolicy()
     policy.setRetainSizeWhenHidden(True)
     made.setSizePolicy(policy)

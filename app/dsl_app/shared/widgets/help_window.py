@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from dsl_app.shared.widgets.forms import named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
@@ -82,13 +83,9 @@ class HelpWindow(QDialog):
         self.setWindowTitle("Help")
         # A window's frame needs some of a small screen.
         self.resize(QSize(960, 720).boundedTo(self.screen().availableSize() * 0.92))
-        self.pages = QListWidget()
-        self.pages.setAccessibleName("Help pages")
-        self.pages.setToolTip("All pages of the help")
+        self.pages = named(QListWidget(), "Help pages", "All pages of the help")
         self.pages.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.text = QTextBrowser()
-        self.text.setAccessibleName("Help")
-        self.text.setToolTip("Links open other pages (Alt+Left goes back)")
+        self.text = named(QTextBrowser(), "Help", "Links open other pages (Alt+Left goes back)")
         self.text.setOpenExternalLinks(True)
         self.text.document().setDocumentMargin(14)
         self.back = _button("&Back", "Previous page (Alt+Left)", "Alt+Left")
@@ -144,9 +141,8 @@ class HelpWindow(QDialog):
         for i in range(self.pages.count()):
             item = self.pages.item(i)
             if item.data(Qt.ItemDataRole.UserRole) == name:
-                self.pages.blockSignals(True)
-                self.pages.setCurrentItem(item)
-                self.pages.blockSignals(False)
+                with quiet(self.pages):
+                    self.pages.setCurrentItem(item)
                 self.setWindowTitle(f"Help – {item.text()}")
         if url.fragment():
             self._scroll_to(url.fragment())
@@ -185,8 +181,7 @@ def slug(heading: str) -> str:
 
 
 def _button(text: str, tip: str, keys: str) -> QPushButton:
-    button = QPushButton(text)
-    button.setToolTip(tip)
+    button = push_button(text, tip)
     button.setAutoDefault(False)
     if keys:
         button.setShortcut(QKeySequence(keys))

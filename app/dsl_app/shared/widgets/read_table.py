@@ -15,6 +15,8 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
+from dsl_app.shared.widgets.forms import quiet
+
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
@@ -85,11 +87,10 @@ class ReadTable(QTableWidget):
     def show_rows(self, rows: Sequence[Sequence[QTableWidgetItem]]) -> None:
         """Show other rows; columns and rows are resized once, not after every item."""
         self.setRowCount(len(rows))
-        self.model().blockSignals(True)
-        for number, row in enumerate(rows):
-            for column, item in enumerate(row):
-                self.setItem(number, column, item)
-        self.model().blockSignals(False)
+        with quiet(self.model()):
+            for number, row in enumerate(rows):
+                for column, item in enumerate(row):
+                    self.setItem(number, column, item)
         self.model().layoutChanged.emit()
         if self._wrapped is not None:
             self._fit_wrapped()
