@@ -24,7 +24,6 @@ from dsl_app.calibrate.presentation import row_display
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import Banner, label, set_role, show_button
 from dsl_app.shared.widgets.layouts import STRETCH, column_of
 from dsl_app.shared.widgets.page import PageWidget
@@ -81,9 +80,7 @@ class CalibratePage(PageWidget):
         self.banner.action.clicked.connect(self._commands.connect_rig)
         for row in self.rows.values():
             row.run_requested.connect(self.run)
-        self._stops: list[Callable[[], None]] = [
-            *self.head.stops,
-            *self.library.stops,
+        self.stops: list[Callable[[], None]] = [
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
             *follow_any(self._show_rows, state.rows, state.opening, state.everything),
@@ -132,15 +129,10 @@ class CalibratePage(PageWidget):
         """The commands that calibrate everything of this campaign, or one after the other."""
         return "\n".join(self._commands.command_line(name) for name in ("", *self.rows))
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self.library.apply_theme(theme)
-
     def release(self) -> None:
         """Stop what runs; everything captured is kept."""
+        super().release()
         self._timer.stop()
-        for stop in self._stops:
-            stop()
         self._commands.close()
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QTabWidget, QVBoxLayout
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.panel import PairPanel
@@ -14,8 +13,8 @@ from dsl_app.compare.pair.state import PairState
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.panel import SeriesPanel
 from dsl_app.compare.series.state import SeriesState
-from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
+from dsl_app.shared.widgets.layouts import column_of, tabs_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 
 
@@ -34,16 +33,12 @@ class ComparePage(PageWidget):
         self.setAcceptDrops(True)
         self.pair = PairPanel(state, control)
         self._series = Deferred(lambda: SeriesPanel(series_state, series_control))
-        self.tabs = QTabWidget()
-        self.tabs.setDocumentMode(True)
-        self.tabs.tabBar().setDrawBase(False)
-        self.tabs.tabBar().setAccessibleName("Two results or a series")
-        for tab, title, tip in (
+        self.tabs = tabs_of(
+            "Two results or a series",
             (self.pair, "T&wo results", "Compare two results, or one with its ground truth, pixel by pixel"),
             (self._series, "S&eries", "Depth over stage positions, or accuracy over time"),
-        ):
-            self.tabs.setTabToolTip(self.tabs.addTab(tab, title), tip)
-        QVBoxLayout(self).addWidget(self.tabs)
+        )
+        column_of(self.tabs, on=self)
 
     @property
     def series(self) -> SeriesPanel:
@@ -96,14 +91,3 @@ class ComparePage(PageWidget):
     def command_line(self) -> str:
         """The command that does what the visible tab shows."""
         return (self._series_control if self._shows_series else self._control).command_line()
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Apply the colours of a theme."""
-        self.pair.apply_theme(theme)
-        self._series.apply_theme(theme)
-
-    def release(self) -> None:
-        """Stop following the states."""
-        self.pair.release()
-        if self._series.made is not None:
-            self._series.made.release()

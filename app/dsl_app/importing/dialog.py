@@ -16,6 +16,7 @@ from PySide6.QtWidgets import (
 )
 
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
@@ -50,8 +51,7 @@ class ImportDialog(JobDialog):
         self.stops = [
             state.found.follow(self._show_found),
             state.request.follow(self._show_request),
-            state.busy.follow(lambda _: self._judge()),
-            state.trouble.follow(lambda _: self._judge()),
+            *follow_any(self._judge, state.busy, state.trouble),
         ]
         self.name.setFocus()
 

@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from dsl_app.results.layers import Layer, Layers
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, Tool
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import named
@@ -88,15 +89,8 @@ class ResultImage(QWidget):
     def _follow(self) -> None:
         state = self._state
         state.result.follow(self._new_result)
-        for value in (
-            state.view,
-            state.cloud_by,
-            state.band,
-            state.quality,
-            state.picture,
-            state.depth_limits,
-        ):
-            value.changed.connect(lambda _: self.paint())
+        painted = (state.view, state.cloud_by, state.band, state.quality, state.picture, state.depth_limits)
+        follow_any(self.paint, *painted)
         state.cursor.follow(self._show_cursor)
         state.marks.follow(self._show_marks)
         state.search.follow(lambda _: self._show_search())

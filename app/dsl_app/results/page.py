@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QStackedWidget,
-    QTabWidget,
     QVBoxLayout,
     QWidget,
 )
@@ -29,13 +28,14 @@ from dsl_app.results.state import Library, ResultsState, ResultView
 from dsl_app.results.summary import summarise
 from dsl_app.results.view_bar import ViewBar
 from dsl_app.results.welcome import Offer, Welcome
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import label, push_button, splitter
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import column_of, row_of
+from dsl_app.shared.widgets.layouts import column_of, row_of, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.workflows.inspection import IntensityGraph
 
@@ -73,7 +73,6 @@ class ResultsPage(PageWidget):
         self.search = SearchPanel(state, control.search)
         set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
-        self._panels = (self.bar, self._image, self.cloud, self._spectra, self.marks)
         self.title, self.about = label("Results", "title"), label("", "muted")
         self.warning = label("", "warn", wraps=True)
         self.reconstruct_again = push_button(
@@ -139,11 +138,7 @@ class ResultsPage(PageWidget):
         self.pictures.setObjectName("result-pictures")
         left = QWidget()
         column_of(self.bar, (self.pictures, 1), self.pixel_info, on=left, margins=0)
-        tabs = QTabWidget()
-        tabs.setDocumentMode(True)
-        tabs.tabBar().setDrawBase(False)
-        tabs.addTab(self.marks, "Pins, regions, references")
-        tabs.addTab(self.search, "Search")
+        tabs = tabs_of("", (self.marks, "Pins, regions, references", ""), (self.search, "Search", ""))
         right = splitter(Qt.Orientation.Vertical, (self._spectra, 3), (tabs, 2))
         content = splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2))
         right.setSizes([400, 340])
@@ -162,12 +157,10 @@ class ResultsPage(PageWidget):
         self.cloud.pointed.connect(control.point_at)
         self.cloud.pinned.connect(control.marks.pin)
         self.cloud.outlined.connect(control.marks.add_pixels)
-        for value in (state.result, state.offer, state.busy):
-            value.changed.connect(lambda _: self._show_summary())
+        follow_any(self._show_summary, state.result, state.offer, state.busy)
         state.graph.changed.connect(self._show_graph)
         state.library.changed.connect(self._ask_library)
         state.view.follow(lambda view: self.cloud.setVisible(view is ResultView.CLOUD))
-        self._show_summary()
 
     # Show ------------------------------------------------------------------------------------------
 
@@ -202,11 +195,8 @@ class ResultsPage(PageWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
+        super().apply_theme(theme)
         self._theme = theme
-        for panel in self._panels:
-            panel.apply_theme(theme)
-        if self._graph is not None:
-            self._graph.apply_theme(theme)
 
     # Do --------------------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame
 
 from dsl_app.results.state import ResultsState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel, number_text
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
@@ -60,8 +61,7 @@ class PixelInfo(QFrame):
             each.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             each.setSizePolicy(each.sizePolicy().Policy.Ignored, each.sizePolicy().verticalPolicy())
         column_of(self.values, self.reasons, on=self, margins=(0, 2, 0, 0), spacing=2)
-        state.cursor.follow(lambda _: self._show())
-        state.band.changed.connect(lambda _: self._show())
+        follow_any(self._show, state.cursor, state.band)
 
     def _show(self) -> None:
         result, pixel = self._state.result.value, self._state.cursor.value

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import QualityMap, ResultsState, ResultView, Tool
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, quiet
 from dsl_app.shared.widgets.icons import icon
@@ -176,9 +177,7 @@ class ViewBar(QWidget):
         state.band.follow(lambda _: self._show_band())
         state.light.changed.connect(lambda light: self.light.setCurrentIndex(self.light.findData(light)))
         state.adapted.follow(self.adapted.setChecked)
-        for value in (state.view, state.quality, state.cloud_by):
-            value.changed.connect(lambda _: self._show_controls())
-        self._show_controls()
+        follow_any(self._show_controls, state.view, state.quality, state.cloud_by)
 
     def _show_view(self, view: ResultView) -> None:
         self._control.show(view)

@@ -19,7 +19,6 @@ from dsl_app.rig.live_view import LiveView
 from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.rig.state import rig_view
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, set_role
 from dsl_app.shared.widgets.help_window import set_help
@@ -42,7 +41,7 @@ class RigPage(PageWidget):
         super().__init__()
         self._rig_commands, self._commands = live.rig, live
         self._state, self._live_state = live.rig.state, live.state
-        self._stops: list[Callable[[], None]] = []
+        self.stops: list[Callable[[], None]] = []
         self._live = Deferred(self._make_live)
         self._live.setObjectName("live-view")
         set_help(self._live, "rig#live-picture")
@@ -90,7 +89,7 @@ class RigPage(PageWidget):
     def _make_live(self) -> LiveView:
         state, made = self._live_state, LiveView()
         made.set_camera(self._state.camera)
-        self._stops += [state.frame.follow(made.show_frame), state.counts.follow(made.show_counts)]
+        self.stops += [state.frame.follow(made.show_frame), state.counts.follow(made.show_counts)]
         return made
 
     def _lay_out(self) -> None:
@@ -122,7 +121,7 @@ class RigPage(PageWidget):
         self._live_button.clicked.connect(self._toggle_live)
         self._exposure.valueChanged.connect(commands.set_exposure)
         self.projector.requested.connect(commands.show)
-        self._stops += [
+        self.stops += [
             state.choice.follow(self._show_choice),
             state.devices.follow(self._show_devices),
             state.live.follow(self._switch_timer),
@@ -204,14 +203,9 @@ class RigPage(PageWidget):
         """How the command line tests this rig."""
         return f"dsl-scan selftest {self._state.choice.value.command}"
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Apply the colours of a theme."""
-        self._live.apply_theme(theme)
-
     def release(self) -> None:
         """Stop the live view and follow nothing more."""
-        for stop in self._stops:
-            stop()
+        super().release()
         self._timer.stop()
         self._commands.stop()
 

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QScrollArea,
-    QTabWidget,
     QWidget,
 )
 
@@ -26,12 +25,12 @@ from dsl_app.scan.plan_editor import PlanEditor
 from dsl_app.scan.run import CalibrationBox, RunBox, TargetBox
 from dsl_app.scan.state import Phase, Reconnection, ScanState
 from dsl_app.scan.view import ScanView
-from dsl_app.shared.theme import Theme
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
@@ -83,7 +82,6 @@ class ScanPage(PageWidget):
         self._timer = QTimer(self)
         self._timer.setInterval(FETCH_MS)
         self._timer.timeout.connect(controller.take_news)
-        self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
 
@@ -93,16 +91,12 @@ class ScanPage(PageWidget):
         return self.forecast.curve.content
 
     def _lay_out(self) -> None:
-        self.middle = QTabWidget()
-        self.middle.setDocumentMode(True)
-        self.middle.tabBar().setDrawBase(False)
-        self.middle.tabBar().setAccessibleName("Views of the scan")
-        for tab, title, tip in (
+        self.middle = tabs_of(
+            "Views of the scan",
             (self.forecast, "&Accuracy against time", "Expected accuracy and capture time of each plan"),
             (self.view, "&Frames", "Frames while the scan runs"),
             (self.effects, "&Effects", "Effects of light that the simulated rig renders"),
-        ):
-            self.middle.setTabToolTip(self.middle.addTab(tab, title), tip)
+        )
         row = row_of(
             _side(LEFT_PX, self.plan),
             (self.middle, 1),
@@ -119,12 +113,8 @@ class ScanPage(PageWidget):
         self.plan.plan_changed.connect(self._change_plan)
         self.plan.open_requested.connect(self._open_plan)
         self.plan.save_requested.connect(self._save_plan)
-        self._stops = [
-            *self.calibration.stops,
-            *self.target.stops,
-            *self.run.stops,
-            state.plan.follow(lambda _: self._show_plan()),
-            state.period_ms.follow(lambda _: self._show_plan()),
+        self.stops = [
+            *follow_any(self._show_plan, state.plan, state.period_ms),
             state.interrupted.follow(lambda _: self._show_phase(state.phase.value)),
             state.phase.follow(self._show_phase),
             state.trouble.follow(self.banner.say),
@@ -222,20 +212,11 @@ class ScanPage(PageWidget):
             return None
         return PlotFigure("accuracy-against-time", curve.plot, curve.apply_theme)
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        for part in (self.forecast, self.view, self.effects):
-            part.apply_theme(theme)
-
     def release(self) -> None:
         """Disconnect from all state; the job runner stops the scan, whose frames are saved."""
+        super().release()
         self._timer.stop()
-        for stop in self._stops:
-            stop()
         self.forecast.release()
-        for part in (self.view.made, self.effects.made):
-            if part is not None:
-                part.release()
         self._effects.close()
         self._controller.close()
 

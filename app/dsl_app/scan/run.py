@@ -18,6 +18,7 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
@@ -146,11 +147,7 @@ class RunBox(QGroupBox):
         self.stops = [
             state.then_reconstruct.follow(self.then.setChecked),
             state.check_drift.follow(self.drift.setChecked),
-            state.phase.follow(lambda _: self._show()),
-            state.interrupted.follow(lambda _: self._show()),
-            state.facts.follow(lambda _: self._show()),
-            state.note.follow(lambda _: self._show()),
-            state.finished.follow(lambda _: self._show()),
+            *follow_any(self._show, state.phase, state.interrupted, state.facts, state.note, state.finished),
             state.status.follow(self._show_status),
         ]
 

@@ -117,21 +117,11 @@ class ScanView(QSplitter):
             self.addWidget(widget)
             self.setStretchFactor(self.count() - 1, stretch)
         self.picture.pointed.connect(controller.point_at)
-        self._stops = [
+        self.stops = [
             state.picture.follow(lambda shown: self.picture.show_picture(shown, state.plan.value)),
             state.cursor.follow(self.picture.show_cursor),
             state.graph.follow(self.graph.show_graph),
         ]
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self.picture.apply_theme(theme)
-        self.graph.apply_theme(theme)
-
-    def release(self) -> None:
-        """Disconnect from all state."""
-        for stop in self._stops:
-            stop()
 
 
 class GraphPlot(QWidget):

@@ -52,7 +52,6 @@ class BandpassEvidence(Evidence[BandpassCalibration]):
         )
         self.seconds = label("", "muted", wraps=True)
         self.warnings = label("", "warn", wraps=True)
-        self._parts = (self.table, self.efficiency, self.response)
         charts = side_by_side(self.efficiency, self.response)
         charts.setContentsMargins(0, 6, 0, 0)
         column_of(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from PySide6.QtCore import QObject, Qt, QThreadPool, Signal
 from PySide6.QtWidgets import QSplitter, QWidget
 
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.model.base import Record
 
@@ -20,13 +21,6 @@ if TYPE_CHECKING:
     from dsl_core.campaign.session import CalibrationSession
 
 R = TypeVar("R", bound=Record)
-
-
-class Themed(Protocol):
-    """A part of evidence that has colours."""
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
 
 
 class Evidence(QWidget, Generic[R]):
@@ -42,8 +36,6 @@ class Evidence(QWidget, Generic[R]):
         super().__init__()
         self._theme, self._record_type = DARK, record_type
         self._record: R | None = None
-        #: Parts that take the colours of a theme with the widget.
-        self._parts: Sequence[Themed] = ()
 
     def show_fit(self, fit: Fit) -> None:
         """Show a fit; quick enough for the thread of the window."""
@@ -62,8 +54,7 @@ class Evidence(QWidget, Generic[R]):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
-        for part in self._parts:
-            part.apply_theme(theme)
+        apply_theme_inside(self, theme)
         self._draw()
 
     def _draw(self) -> None:

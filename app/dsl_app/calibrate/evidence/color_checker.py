@@ -87,8 +87,6 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
             "Wavelength (nm)",
         )  # fmt: skip
         self._reader = BackgroundReader(self)
-        boxes = (self.residuals, self.response, self.emission)
-        self._parts = (self.chart, self.swatches, self.table, *boxes)
         self.tabs = named(QTabWidget(), "Evidence of the Color Checker")
         self.tabs.setDocumentMode(True)
         self.again.setAccessibleName("Fit with these corners")

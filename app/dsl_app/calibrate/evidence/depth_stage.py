@@ -106,8 +106,6 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         )
         self.warnings = label("", "warn", wraps=True)
         self._reader = BackgroundReader(self)
-        boxes = (self.planes, self.steps, self.held_out, self.shifts, self.curve, self.difference)
-        self._parts = (*boxes, self.film)
         self.tabs = named(QTabWidget(), "Evidence of the depth stage")
         self.tabs.setDocumentMode(True)
         self.film.setMinimumHeight(FILM_PX)

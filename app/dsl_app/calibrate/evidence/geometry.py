@@ -75,7 +75,6 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        self._parts = (self.coverage, self.errors, self.table)
         charts = side_by_side(self.coverage, self.errors)
         charts.setContentsMargins(0, 0, 0, 6)
         foot = row_of((self.diagnosis, 1), (self.again, 0, Qt.AlignmentFlag.AlignTop))

@@ -66,7 +66,7 @@ class SelfTestEvidence(Evidence[SelfTest]):
             "New picture seen (%)",
             "Wait after show (ms)",
         )
-        self._parts = boxes = (self.linearity, self.gamma, self.beat, self.latency)
+        boxes = (self.linearity, self.gamma, self.beat, self.latency)
         self._reader = BackgroundReader(self)
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 0, 0, 0)

@@ -65,7 +65,6 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         self._theme_bar()
 
     def _lay_out(self) -> None:
-        self._parts = (self.table, self.emission, self.field)
         charts = side_by_side(self.emission, self.field)
         charts.setContentsMargins(0, 0, 0, 6)
         below = QWidget()

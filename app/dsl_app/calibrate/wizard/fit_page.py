@@ -16,6 +16,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label, quiet, set_role
+from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_core.campaign.session import CalibrationSession
 
@@ -122,6 +123,4 @@ class FitPage(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
-        self.figures.apply_theme(theme)
-        if self._evidence is not None:
-            self._evidence.apply_theme(theme)
+        apply_theme_inside(self, theme)

@@ -62,11 +62,6 @@ class StepPage(QWidget):
         self.verdict.setText(shown.verdict)
         set_role(self.verdict, shown.role)
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        for part in (self.drawing, self.picture, self.figures):
-            part.apply_theme(theme)
-
 
 class LiveFrameView(QWidget):
     """The camera's last frame while a target is placed and captured; saturated pixels are red."""

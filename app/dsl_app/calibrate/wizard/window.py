@@ -28,6 +28,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import Banner, label, named, push_button, quiet, show_button
 from dsl_app.shared.widgets.help_window import add_help_key
+from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 if TYPE_CHECKING:
@@ -79,10 +80,7 @@ class CalibrationWizard(QDialog):
         self.fit.settings_requested.connect(lambda values: commands.change_settings(values, then_fit=True))
         self.buttons.leave.clicked.connect(self.reject)
         add_help_key(self, HELP)
-        self._stops: list[Callable[[], None]] = [
-            *self.step.stops,
-            *self.fit.stops,
-            *self.buttons.stops,
+        self.stops: list[Callable[[], None]] = [
             *follow_any(self._show_steps, state.statuses, state.fit),
             state.at.changed.connect(lambda _: self._show_page()),
             state.settings.follow(self.settings.show_settings),
@@ -116,8 +114,7 @@ class CalibrationWizard(QDialog):
         if self._state.doing.value.is_long and not self._may_stop():
             return
         self._timer.stop()
-        for stop in self._stops:
-            stop()
+        stop_following(self)
         self._commands.leave()
         super().reject()
 
@@ -132,8 +129,7 @@ class CalibrationWizard(QDialog):
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
-        for part in (self.steps, self.step, self.fit):
-            part.apply_theme(theme)
+        apply_theme_inside(self, theme)
 
 
 def _fitting(room: QSize) -> QSize:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -13,6 +12,7 @@ from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.pictures import PairControls, PairPictures
 from dsl_app.compare.pair.state import Pair, PairState, pair_display
 from dsl_app.compare.verdict_table import VerdictTable
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
@@ -43,7 +43,6 @@ class PairPanel(QWidget):
         self._pictures = Deferred(self._make_pictures)
         self.bar = PairControls(state, control)
         self._figures = Deferred(lambda: PairFigures(state))
-        self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
 
@@ -84,15 +83,10 @@ class PairPanel(QWidget):
         self.open_second.clicked.connect(lambda: self._choose(second=True))
         self.truth.clicked.connect(control.use_truth)
         self.report.clicked.connect(self._choose_report)
-        self._stops = [
-            *self.bar.stops,
+        self.stops = [
             state.pair.follow(lambda pair: self.parts.setEnabled(pair is not None)),
-            *(
-                value.changed.connect(lambda _: self._show())
-                for value in (state.first, state.second, state.pair, state.busy, state.trouble)
-            ),
+            *follow_any(self._show, state.first, state.second, state.pair, state.busy, state.trouble),
         ]
-        self._show()
 
     def _choose(self, second: bool) -> None:
         name = QFileDialog.getExistingDirectory(self, f"Open a result as {'B' if second else 'A'}")
@@ -122,17 +116,6 @@ class PairPanel(QWidget):
             (self.report, display.can_report),
         ):
             button.setEnabled(is_enabled)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Apply the colours of a theme."""
-        self._pictures.apply_theme(theme)
-        self._figures.apply_theme(theme)
-
-    def release(self) -> None:
-        """Stop following the state."""
-        late = [part.stops for part in (self._pictures.made, self._figures.made) if part is not None]
-        for stop in (*self._stops, *chain.from_iterable(late)):
-            stop()
 
 
 class PairFigures(QSplitter):

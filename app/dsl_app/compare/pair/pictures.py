@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QSlider, QWidget
 
 from dsl_app.compare.pair.controller import PairController
 from dsl_app.compare.pair.state import Pair, PairQuantity, PairState, cursor_text
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
@@ -54,8 +55,7 @@ class PairPictures(QWidget):
         self._mouse = pg.SignalProxy(self.canvas.scene().sigMouseMoved, rateLimit=60, slot=self._hover)
         self.stops = [
             state.pair.follow(self._new_pair),
-            state.shown.changed.connect(lambda _: self.paint()),
-            state.band.changed.connect(lambda _: self.paint()),
+            *follow_any(self.paint, state.shown, state.band),
             state.cursor.follow(self._show_cursor),
         ]
 
@@ -209,8 +209,7 @@ class PairControls(QWidget):
         self.band.valueChanged.connect(control.set_band)
         self.stops: list[Callable[[], None]] = [
             state.pair.follow(self._show_pair),
-            state.shown.follow(lambda _: self._show()),
-            state.band.follow(lambda _: self._show()),
+            *follow_any(self._show, state.shown, state.band),
             state.cursor.follow(lambda _: self._show_readout()),
         ]
 

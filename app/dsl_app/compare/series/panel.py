@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import chain
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -20,7 +18,7 @@ from dsl_app.compare.series.plot import SeriesPlot
 from dsl_app.compare.series.state import SeriesKind, SeriesState, series_display
 from dsl_app.compare.series.table import SeriesTable
 from dsl_app.compare.verdict_table import VerdictTable
-from dsl_app.shared.theme import Theme
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark, splitter
 from dsl_app.shared.widgets.help_window import set_help
@@ -57,7 +55,6 @@ class SeriesPanel(QWidget):
         self._picture = Deferred(lambda: SeriesPicture(state, control))
         set_help(self, "comparing#a-series")
         set_help(self.figures, "comparing#depth-over-stage-positions")
-        self._stops: list[Callable[[], None]] = []
         self._lay_out()
         self._connect()
 
@@ -88,18 +85,14 @@ class SeriesPanel(QWidget):
         self.against.activated.connect(lambda _: control.compare_with(self.against.currentData()))
         self.figure.activated.connect(lambda _: control.show_figure(self.figure.currentData()))
         self.report.clicked.connect(self._choose_report)
-        self._stops = [
-            *self.table.stops,
-            *(
-                value.changed.connect(lambda _: self._show())
-                for value in (state.kind, state.rows, state.advice, state.busy, state.against, state.selected)
-            ),
+        shown = (state.kind, state.rows, state.advice, state.busy, state.against, state.selected)
+        self.stops = [
+            *follow_any(self._show, *shown),
             state.test.follow(
                 lambda test: self.figures.show_verdicts(() if test is None else stage_table(test))
             ),
             state.figure.follow(lambda _: self.table.show_series()),
         ]
-        self._show()
 
     def choose(self) -> None:
         """Ask for a result or a folder of results."""
@@ -140,15 +133,3 @@ class SeriesPanel(QWidget):
             for text, path in display.references:
                 box.addItem(text, path)
         box.setCurrentIndex([path for _, path in display.references].index(self._state.against.value))
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Apply the colours of a theme."""
-        self.table.apply_theme(theme)
-        self._plot.apply_theme(theme)
-        self._picture.apply_theme(theme)
-
-    def release(self) -> None:
-        """Stop following the state."""
-        late = [part.stops for part in (self._plot.made, self._picture.made) if part is not None]
-        for stop in (*self._stops, *chain.from_iterable(late)):
-            stop()

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
@@ -40,11 +41,7 @@ class SeriesPicture(QWidget):
         self.rectangle.hide()
         self._lay_out()
         self.rectangle.sigRegionChangeFinished.connect(self._dragged)
-        self.stops = [
-            value.changed.connect(lambda _: self.show_row())
-            for value in (state.rows, state.selected, state.region)
-        ]
-        self.show_row()
+        self.stops = follow_any(self.show_row, state.rows, state.selected, state.region)
 
     def _lay_out(self) -> None:
         self.canvas.addItem(self.box, 0, 0)

@@ -11,6 +11,7 @@ import pyqtgraph as pg
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.compare.series.state import SeriesKind, SeriesState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
@@ -38,11 +39,7 @@ class SeriesPlot(QWidget):
         self.plot.setMouseEnabled(False, False)
         self.legend = label("", "muted", wraps=True)
         column_of(self.legend, (self.plot, 1), on=self, margins=0, spacing=2)
-        self.stops = [
-            value.changed.connect(lambda _: self.draw())
-            for value in (state.rows, state.test, state.kind, state.figure)
-        ]
-        self.draw()
+        self.stops = follow_any(self.draw, state.rows, state.test, state.kind, state.figure)
 
     def draw(self) -> None:
         """Draw the state."""

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesKind, SeriesState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
@@ -47,12 +48,7 @@ class SeriesTable(ReadTable):
         self.horizontalHeader().setStretchLastSection(True)
         self.itemChanged.connect(self._typed)
         self.itemSelectionChanged.connect(self._chosen)
-        self.stops = [
-            state.rows.changed.connect(lambda _: self.show_series()),
-            state.test.changed.connect(lambda _: self.show_series()),
-            state.kind.changed.connect(lambda _: self.show_series()),
-        ]
-        self.show_series()
+        self.stops = follow_any(self.show_series, state.rows, state.test, state.kind)
 
     def show_series(self) -> None:
         """Show all rows; the selection stays."""

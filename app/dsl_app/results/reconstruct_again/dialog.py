@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.results.reconstruct_again.controller import ReconstructionController
 from dsl_app.results.reconstruct_again.state import OWN, ReconstructionRequest, ReconstructionState
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -46,8 +47,7 @@ class ReconstructionDialog(JobDialog):
         self._connect()
         self.stops = [
             state.request.follow(self._show_request),
-            state.trouble.follow(lambda _: self._judge()),
-            state.cost.changed.connect(lambda _: self._judge()),
+            *follow_any(self._judge, state.trouble, state.cost),
         ]
         self.name.setFocus()
         self.name.selectAll()

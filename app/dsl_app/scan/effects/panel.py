@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -79,8 +80,7 @@ class EffectsPanel(QWidget):
         self.table.itemChanged.connect(self._ticked)
         self.apply.clicked.connect(lambda: self._controller.apply(self._wanted(), self._chosen_tolerance()))
         self.stops: list[Callable[[], None]] = [
-            state.in_use.follow(lambda _: self._show_in_use()),
-            state.tolerance.follow(lambda _: self._show_in_use()),
+            *follow_any(self._show_in_use, state.in_use, state.tolerance),
             state.view.follow(self._show),
             state.busy.follow(lambda _: self._show_state()),
         ]
@@ -191,11 +191,6 @@ class EffectsPanel(QWidget):
         """Take the colours of a theme."""
         self._theme = theme
         self._show(self._state.view.value)
-
-    def release(self) -> None:
-        """Disconnect from all state."""
-        for stop in self.stops:
-            stop()
 
 
 def number(value: float) -> str:

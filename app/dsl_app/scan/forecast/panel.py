@@ -17,7 +17,7 @@ from dsl_app.scan.forecast.controller import ForecastController
 from dsl_app.scan.forecast.figures import FIGURES
 from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity
-from dsl_app.shared.theme import Theme
+from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
@@ -90,15 +90,11 @@ class ForecastPanel(QWidget):
             box.lineEdit().returnPressed.connect(self._ask)
         self._show_wish()
         self.stops: list[Callable[[], None]] = [
-            state.points.follow(lambda _: self._show_points()),
-            state.current.follow(lambda _: self._show_points()),
-            state.measured.follow(lambda _: self._show_figures()),
-            state.progress.follow(lambda _: self._show_note()),
-            state.trouble.follow(lambda _: self._show_note()),
-            state.refusal.follow(lambda _: self._show_note()),
+            *follow_any(self._show_points, state.points, state.current),
+            *follow_any(self._show_figures, state.measured),
+            *follow_any(self._show_note, state.progress, state.trouble, state.refusal),
+            *follow_any(self._show_scene, state.look, state.last_look),
             state.answer.follow(self._show_answer),
-            state.look.follow(lambda _: self._show_scene()),
-            state.last_look.follow(lambda _: self._show_scene()),
         ]
 
     def _show_wish(self) -> None:
@@ -213,15 +209,9 @@ class ForecastPanel(QWidget):
             box.setEnabled(not self._is_fixed)
         self.ask.setEnabled(not self._is_fixed and bool(self._state.points.value))
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self.curve.apply_theme(theme)
-
     def release(self) -> None:
         """Disconnect from all state."""
         self._timer.stop()
-        for stop in self.stops:
-            stop()
         self._controller.close()
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from PySide6.QtCore import QObject, QSize, QTimer
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QWidget
 from shiboken6 import isValid
 
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widgets.inside import apply_theme_to
+from dsl_app.shared.widgets.layouts import column_of
 
 #: Between two deferred calls, ms: the window handles its other events.
 PAUSE_MS = 30
@@ -59,10 +61,7 @@ def call_deferred(widget: QWidget, act: Callable[[], object]) -> None:
 
 
 class Deferred(QWidget, Generic[P]):
-    """A placeholder that makes its content by a deferred call when it is first seen, or at once on request.
-
-    The content is a widget with ``apply_theme``.
-    """
+    """A placeholder: makes its content by a deferred call when it is first seen, or at once on request."""
 
     def __init__(self, make: Callable[[], P]) -> None:
         super().__init__()
@@ -70,15 +69,14 @@ class Deferred(QWidget, Generic[P]):
         #: The content, once it has been made.
         self.made: P | None = None
         self._is_queued = False
-        self._column = QVBoxLayout(self)
-        self._column.setContentsMargins(0, 0, 0, 0)
+        self._column = column_of(on=self, margins=0)
 
     @property
     def content(self) -> P:
         """The content, made now if need be."""
         if self.made is None:
             self.made = self._make()
-            _apply(self._theme, self.made)
+            apply_theme_to(self.made, self._theme)
             self._column.addWidget(self.made)
             self.setFocusProxy(self.made)
         return self.made
@@ -104,8 +102,4 @@ class Deferred(QWidget, Generic[P]):
         """Apply the colours of a theme, now or when the content is made."""
         self._theme = theme
         if self.made is not None:
-            _apply(theme, self.made)
-
-
-def _apply(theme: Theme, content: Any) -> None:
-    content.apply_theme(theme)
+            apply_theme_to(self.made, theme)

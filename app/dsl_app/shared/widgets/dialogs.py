@@ -13,11 +13,11 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QLabel,
     QPlainTextEdit,
-    QVBoxLayout,
     QWidget,
 )
 
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
+from dsl_app.shared.widgets.inside import stop_following
 from dsl_app.shared.widgets.layouts import column_of
 
 
@@ -69,7 +69,7 @@ class JobDialog(QDialog):
         self._orders = commands
         #: Functions that disconnect the dialog from its state when it closes.
         self.stops: list[Callable[[], None]] = []
-        self.column = QVBoxLayout(self)
+        self.column = column_of(on=self)
         self.text: QLabel = label("", "muted")
         self.text.setWordWrap(True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
@@ -103,6 +103,5 @@ class JobDialog(QDialog):
 
     def done(self, result: int) -> None:
         """Disconnect from the state."""
-        for stop in self.stops:
-            stop()
+        stop_following(self)
         super().done(result)

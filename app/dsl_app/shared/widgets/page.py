@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.figure_file import PlotFigure
+from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 
 
 class PageWidget(QWidget):
@@ -42,9 +43,11 @@ class PageWidget(QWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
+        apply_theme_inside(self, theme)
 
     def release(self) -> None:
-        """Release devices, files and threads before the window closes."""
+        """Stop following states, and release devices, files and threads, before the window closes."""
+        stop_following(self)
 
 
 def dropped_paths(data: QMimeData) -> list[Path]:
