@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QGroupBox,
     QMessageBox,
-    QSplitter,
     QTableWidgetItem,
     QTextBrowser,
     QVBoxLayout,
@@ -28,7 +27,7 @@ from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.io.calibration_library import LibraryLine
 
@@ -89,12 +88,7 @@ class LibraryPanel(QGroupBox):
         ]
 
     def _lay_out(self) -> None:
-        split = QSplitter(Qt.Orientation.Horizontal)
-        split.setChildrenCollapsible(False)
-        split.addWidget(self.table)
-        split.addWidget(self.details)
-        split.setStretchFactor(0, 3)
-        split.setStretchFactor(1, 2)
+        split = splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.details, 2))
         row = row_of(self.use, self.report, self.restore, self.check, self.export, STRETCH, self.import_)
         self.table.setMinimumHeight(110)
         column_of((split, 1), row, self._note, on=self, margins=(0, 4, 0, 0))

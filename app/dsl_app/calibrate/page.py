@@ -13,8 +13,6 @@ from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
     QPushButton,
-    QScrollArea,
-    QSplitter,
     QWidget,
 )
 
@@ -25,7 +23,7 @@ from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.forms import Banner, label, set_role, show_button
-from dsl_app.shared.widgets.layouts import STRETCH, column_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, scrolled, splitter
 from dsl_app.shared.widgets.page import PageWidget
 
 if TYPE_CHECKING:
@@ -58,21 +56,9 @@ class CalibratePage(PageWidget):
         self._connect()
 
     def _lay_out(self) -> None:
-        content = QWidget()
-        column_of(*self.rows.values(), STRETCH, on=content, margins=0, spacing=4)
-        area = QScrollArea()
-        area.setWidget(content)
-        area.setWidgetResizable(True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area = scrolled(boxed(column_of(*self.rows.values(), STRETCH, margins=0, spacing=4)))
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        split = QSplitter(Qt.Orientation.Vertical)
-        split.setChildrenCollapsible(False)
-        split.addWidget(area)
-        split.addWidget(self.library)
-        split.setStretchFactor(0, 0)
-        split.setStretchFactor(1, 1)
-        split.setSizes([ROWS_PX, 300])
+        split = splitter(Qt.Orientation.Vertical, (area, 0), (self.library, 1), sizes=(ROWS_PX, 300))
         column_of(self.banner, self.head, (split, 1), on=self)
 
     def _connect(self) -> None:

@@ -73,10 +73,8 @@ class ImportDialog(JobDialog):
             "Film, sensor and scales of",
             "The folder does not contain the film's pose, the sensor's response and the scale of white.\n"
             "A scan needs the calibration of the rig that captured it.",
+            [("The published rig", PUBLISHED), *((name, name) for name in self._state.library.value)],
         )
-        self.base.addItem("The published rig", PUBLISHED)
-        for name in self._state.library.value:
-            self.base.addItem(name, name)
         self.file = push_button("&File…", "Choose a calibration file (.json)", self._choose_file)
         self._size = QWidget()
         self.width_px, self.height_px = (
@@ -150,7 +148,7 @@ class ImportDialog(JobDialog):
             return
         if self.base.findData(request.base) < 0:
             self.base.addItem(Path(request.base).name, request.base)
-        self.base.setCurrentIndex(self.base.findData(request.base))
+        self.base.choose(request.base)
         # Text that is being typed is not replaced.
         is_other, self._shown = request.folder != self._shown, request.folder
         for field, text in ((self.name, request.target.stem), (self.home, str(request.target.parent))):

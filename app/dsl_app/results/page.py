@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -33,9 +32,9 @@ from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
-from dsl_app.shared.widgets.forms import label, push_button, splitter
+from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import column_of, row_of, tabs_of
+from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.workflows.inspection import IntensityGraph
 
@@ -125,8 +124,7 @@ class ResultsPage(PageWidget):
         head = row_of(
             self.title, 10, (self.about, 1), self.reconstruct_again, self._inspect, self._open, self._export
         )
-        greeting = QWidget()
-        QVBoxLayout(greeting).addWidget(self.welcome, 0, Qt.AlignmentFlag.AlignCenter)
+        greeting = boxed(column_of((self.welcome, 0, Qt.AlignmentFlag.AlignCenter)))
         self.stack = QStackedWidget()
         # In the order of `Content`.
         for content in (self.offer, self._content(), greeting):
@@ -136,14 +134,10 @@ class ResultsPage(PageWidget):
     def _content(self) -> QWidget:
         self.pictures = splitter(Qt.Orientation.Horizontal, (self._image, 1), (self.cloud, 2))
         self.pictures.setObjectName("result-pictures")
-        left = QWidget()
-        column_of(self.bar, (self.pictures, 1), self.pixel_info, on=left, margins=0)
+        left = boxed(column_of(self.bar, (self.pictures, 1), self.pixel_info, margins=0))
         tabs = tabs_of("", (self.marks, "Pins, regions, references", ""), (self.search, "Search", ""))
-        right = splitter(Qt.Orientation.Vertical, (self._spectra, 3), (tabs, 2))
-        content = splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2))
-        right.setSizes([400, 340])
-        content.setSizes([720, 440])
-        return content
+        right = splitter(Qt.Orientation.Vertical, (self._spectra, 3), (tabs, 2), sizes=(400, 340))
+        return splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2), sizes=(720, 440))
 
     def _connect(self) -> None:
         control, state = self._control, self._state

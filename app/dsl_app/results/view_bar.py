@@ -175,7 +175,7 @@ class ViewBar(QWidget):
         state.result.follow(lambda _: self._new_result())
         state.tool.follow(lambda tool: self.tools[tool].setChecked(True))
         state.band.follow(lambda _: self._show_band())
-        state.light.changed.connect(lambda light: self.light.setCurrentIndex(self.light.findData(light)))
+        state.light.changed.connect(self.light.choose)
         state.adapted.follow(self.adapted.setChecked)
         follow_any(self._show_controls, state.view, state.quality, state.cloud_by)
 
@@ -225,8 +225,8 @@ class ViewBar(QWidget):
         state = self._state
         self.views[state.view.value].setChecked(True)
         needed = controls_for(state.view.value, state.cloud_by.value, state.quality.value)
-        self.cloud_by.setCurrentIndex(self.cloud_by.findData(state.cloud_by.value))
-        self.quality.setCurrentIndex(self.quality.findData(state.quality.value))
+        self.cloud_by.choose(state.cloud_by.value)
+        self.quality.choose(state.quality.value)
         for widgets, visible in (
             ((self._light_label, self.light, self.adapted), needed.light),
             ((self._quality_label, self.quality), needed.quality),

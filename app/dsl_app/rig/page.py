@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QLineEdit,
     QPushButton,
-    QWidget,
 )
 
 from dsl_app.connection.state import Link, RigChoice
@@ -22,7 +21,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, set_role
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_core.devices.base import DeviceRig
 
@@ -47,9 +46,7 @@ class RigPage(PageWidget):
         set_help(self._live, "rig#live-picture")
         self.projector = ProjectorPanel()
         set_help(self.projector, "rig#projector")
-        self._rig = ChoiceBox("Rig", "The rig to connect")
-        for name in rigs:
-            self._rig.addItem(name, name)
+        self._rig = ChoiceBox("Rig", "The rig to connect", [(name, name) for name in rigs])
         self._options = QLineEdit()
         self._options.setAccessibleName("Options of the rig")
         self._options.setPlaceholderText("scene=color-checker size=445x290")
@@ -109,10 +106,11 @@ class RigPage(PageWidget):
         camera_form.addRow("", self._cycles)
         camera_form.addRow("", self.auto)
         camera_form.addRow("", self._live_button)
-        left, right = QWidget(), QWidget()
-        for side, boxes in ((left, (devices, camera)), (right, (self.projector,))):
+        left, right = (
+            boxed(column_of(*boxes, STRETCH, margins=0)) for boxes in ((devices, camera), (self.projector,))
+        )
+        for side in (left, right):
             side.setFixedWidth(SIDE_PX)
-            column_of(*boxes, STRETCH, on=side, margins=0)
         row_of(left, (self._live, 1), right, on=self)
 
     def _connect(self) -> None:

@@ -126,7 +126,7 @@ class ProjectorPanel(QGroupBox):
 
     def _switch_loop(self, on: bool) -> None:
         if on:
-            self._kind.setCurrentIndex(self._kind.findData("line"))
+            self._kind.choose("line")
             self._timer.start()
         else:
             self._timer.stop()

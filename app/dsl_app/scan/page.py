@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
-    QFrame,
     QScrollArea,
     QWidget,
 )
@@ -30,7 +29,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
 from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, tabs_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
@@ -222,12 +221,6 @@ class ScanPage(PageWidget):
 
 
 def _side(width_px: int, *boxes: QWidget) -> QScrollArea:
-    content = QWidget()
-    column_of(*boxes, STRETCH, on=content, margins=(0, 0, 4, 0))
-    area = QScrollArea()
-    area.setWidget(content)
-    area.setWidgetResizable(True)
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area = scrolled(boxed(column_of(*boxes, STRETCH, margins=(0, 0, 4, 0))))
     area.setFixedWidth(width_px)
     return area

@@ -103,9 +103,9 @@ class PlanEditor(QGroupBox):
         """Show a plan on a projector with this frame period."""
         self._plan = plan
         preset = preset_of(plan, period_ms)
-        self.preset.setCurrentIndex(self.preset.findData("" if preset is None else preset.key))
+        self.preset.choose("" if preset is None else preset.key)
         self._purpose.setText(_purpose_of(plan) if preset is None else preset.purpose)
-        self.code.setCurrentIndex(self.code.findData(name_of(plan.code) or ""))
+        self.code.choose(name_of(plan.code) or "")
         lines = isinstance(plan.spectral, ScanLines | LineComb)
         self._offer_file(not lines)
         for widget in (self.line_width, self.step):
@@ -123,13 +123,13 @@ class PlanEditor(QGroupBox):
         elif not on and index >= 0:
             self.patterns.removeItem(index)
         if on:
-            self.patterns.setCurrentIndex(self.patterns.findData(FILE))
+            self.patterns.choose(FILE)
 
     def _show_lines(self, lines: ScanLines | LineComb) -> None:
         kind = LINES
         if isinstance(lines, LineComb):
             kind = COLOURS if any(lines.shifts_px) else COMB
-        self.patterns.setCurrentIndex(self.patterns.findData(kind))
+        self.patterns.choose(kind)
         values: list[tuple[WholeBox, int]] = [(self.line_width, lines.width_px), (self.step, lines.step_px)]
         if isinstance(lines, LineComb):
             values.append((self.period, lines.period_px))

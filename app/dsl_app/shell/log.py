@@ -45,9 +45,7 @@ class LogPanel(QWidget):
     def __init__(self, records: LogRecords, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._records = records
-        self._level = ChoiceBox("Lowest level shown", "Hide messages below this level")
-        for name, level in LEVELS:
-            self._level.addItem(name, level)
+        self._level = ChoiceBox("Lowest level shown", "Hide messages below this level", LEVELS)
         self._level.setCurrentIndex(1)
         self._filter = named(QLineEdit(), "Filter by text", "Show only messages that contain this text")
         self._filter.setPlaceholderText("Filter by text")

@@ -9,14 +9,14 @@ from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QObject, QSize, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QPaintEvent
-from PySide6.QtWidgets import QMainWindow, QMessageBox, QStackedWidget, QWidget
+from PySide6.QtWidgets import QMainWindow, QMessageBox, QStackedWidget
 
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings, save_settings
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.undo import UndoStack
-from dsl_app.shared.widgets.layouts import row_of
+from dsl_app.shared.widgets.layouts import boxed, row_of
 from dsl_app.shared.widgets.page import PageWidget, dropped_paths
 from dsl_app.shell.actions import PAGES, Page
 from dsl_app.shell.job_strip import JobStrip
@@ -81,9 +81,7 @@ class PagedWindow(QMainWindow):
         self._lay_out()
 
     def _lay_out(self) -> None:
-        centre = QWidget()
-        row_of(self.rail, (self.stack, 1), on=centre, margins=0, spacing=0)
-        self.setCentralWidget(centre)
+        self.setCentralWidget(boxed(row_of(self.rail, (self.stack, 1), margins=0, spacing=0)))
 
     # Pages -----------------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QSplitter, QWidget
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.inside import apply_theme_inside
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
 from dsl_core.model.base import Record
 
 if TYPE_CHECKING:
@@ -103,19 +103,12 @@ def make_evidence(name: str) -> Evidence[Any]:
 
 def side_by_side(*widgets: QWidget) -> QWidget:
     """Widgets in a row that share the room equally."""
-    made = QWidget()
-    row_of(*((widget, 1) for widget in widgets), on=made, margins=0)
-    return made
+    return boxed(row_of(*((widget, 1) for widget in widgets), margins=0))
 
 
 def stacked(top: QWidget, bottom: QWidget, sizes: tuple[int, int]) -> QSplitter:
     """Two widgets above each other, with a handle between them."""
-    made = QSplitter(Qt.Orientation.Vertical)
-    made.setChildrenCollapsible(False)
-    made.addWidget(top)
-    made.addWidget(bottom)
-    made.setSizes(sizes)
-    return made
+    return splitter(Qt.Orientation.Vertical, (top, 0), (bottom, 0), sizes=sizes)
 
 
 class BackgroundReader(QObject):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtWidgets import QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QTabWidget, QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.chart_picture import ChartPicture, Swatches, corners_in
@@ -28,7 +28,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
-from dsl_app.shared.widgets.layouts import column_of, row_of
+from dsl_app.shared.widgets.layouts import boxed, column_of, row_of
 from dsl_app.shared.widgets.plots import RGB_COLOURS
 from dsl_core.calibration.colour.color_checker import WORST_PERCENT
 from dsl_core.model.calibration.color_checker import ORIENTATIONS, ColorCheckerCalibration
@@ -100,14 +100,14 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         self.back.clicked.connect(self._put_back)
 
     def _chart_tab(self) -> QWidget:
-        tab, right = QWidget(), QVBoxLayout()
-        right.addWidget(label("Measured next to expected", "heading"))
-        right.addWidget(label("Numbers: held-out residual, % of white", "muted"))
-        right.addWidget(self.swatches, 1)
+        right = column_of(
+            label("Measured next to expected", "heading"),
+            label("Numbers: held-out residual, % of white", "muted"),
+            (self.swatches, 1),
+        )
         row = row_of((self.chart, 3), (right, 2))
         foot = row_of((self.words, 1), self.back, self.again)
-        column_of((row, 1), foot, on=tab, margins=(0, 8, 0, 0))
-        return tab
+        return boxed(column_of((row, 1), foot, margins=(0, 8, 0, 0)))
 
     def _patches_tab(self) -> QWidget:
         tab = stacked(self.residuals, self.table, (250, 210))

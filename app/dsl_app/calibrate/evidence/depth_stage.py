@@ -29,7 +29,7 @@ from dsl_app.calibrate.evidence.charts import (
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, named
-from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.layouts import boxed, column_of
 from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_PLANE_MM, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
@@ -253,11 +253,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
 
 def _tab(charts: QWidget, below: QWidget | None = None) -> QWidget:
     """A tab of charts, with something below them."""
-    tab = QWidget()
-    column = column_of((charts, 3), on=tab, margins=(0, 8, 0, 0))
-    if below is not None:
-        column.addWidget(below, 2)
-    return tab
+    return boxed(column_of((charts, 3), *(((below, 2),) if below is not None else ()), margins=(0, 8, 0, 0)))
 
 
 def _film_rows(record: DepthStageCalibration, before: Film) -> list[list[Cell | str]]:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import (
@@ -18,7 +17,7 @@ from dsl_app.calibrate.evidence.charts import (
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
-from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.layouts import boxed, column_of
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 
 HEADS = (
@@ -67,14 +66,8 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
     def _lay_out(self) -> None:
         charts = side_by_side(self.emission, self.field)
         charts.setContentsMargins(0, 0, 0, 6)
-        below = QWidget()
-        column_of(
-            label("Signals of white at unit shading, DN/ms", "heading"),
-            (self.table, 1),
-            self.words,
-            on=below,
-            margins=0,
-        )
+        title = label("Signals of white at unit shading, DN/ms", "heading")
+        below = boxed(column_of(title, (self.table, 1), self.words, margins=0))
         column_of(stacked(charts, below, (330, 170)), on=self, margins=0)
 
     def _theme_bar(self) -> None:

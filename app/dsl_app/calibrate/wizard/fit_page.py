@@ -6,7 +6,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QCheckBox, QSplitter, QWidget
+from PySide6.QtWidgets import QCheckBox, QWidget
 
 from dsl_app.calibrate.evidence.base import Evidence, make_evidence
 from dsl_app.calibrate.figures_table import FiguresTable
@@ -17,7 +17,7 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label, quiet, set_role
 from dsl_app.shared.widgets.inside import apply_theme_inside
-from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.layouts import column_of, splitter
 from dsl_core.campaign.session import CalibrationSession
 
 
@@ -38,9 +38,7 @@ class FitPage(QWidget):
         self.allow = QCheckBox("Accept although figures are outside their limits")
         self.allow.setToolTip("The report and the library continue to show that these figures are missed")
         self.allow.toggled.connect(self._allow)
-        self._split = QSplitter(Qt.Orientation.Vertical)
-        self._split.setChildrenCollapsible(False)
-        self._split.addWidget(self.figures)
+        self._split = splitter(Qt.Orientation.Vertical, (self.figures, 0))
         column_of(self.verdict, (self._split, 1), self.allow, on=self, margins=(8, 0, 0, 0))
         self.stops = [
             state.fit.follow(self._show_fit),

@@ -11,17 +11,15 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QFormLayout,
-    QFrame,
     QHBoxLayout,
     QLineEdit,
-    QScrollArea,
     QWidget,
 )
 
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, quiet
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, scrolled
 from dsl_core.model.board import Board, Charuco, Checkerboard
 
 F = TypeVar("F", bound=QWidget)
@@ -48,11 +46,7 @@ class SettingsPage(QWidget):
         content = QWidget()
         self._form = QFormLayout(content)
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
-        area = QScrollArea()
-        area.setWidget(content)
-        area.setWidgetResizable(True)
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        area = scrolled(content)
         area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         column_of(self._intro, self._trouble, (area, 1), on=self, margins=(8, 0, 0, 0))
         self.say("")
@@ -165,7 +159,7 @@ class BoardEdit(QWidget):
         boxes = (self.kind, self.columns, self.rows, self.square, self.marker)
         with quiet(*boxes):
             board = self._board
-            self.kind.setCurrentIndex(self.kind.findData(board.kind))
+            self.kind.choose(board.kind)
             self.columns.setValue(board.columns)
             self.rows.setValue(board.rows)
             self.square.setValue(board.square_mm)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pyqtgraph as pg
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QSplitter, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
@@ -13,7 +13,7 @@ from dsl_app.calibrate.wizard.state import Seen, WizardState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
-from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.layouts import boxed, column_of, splitter
 from dsl_core.capture.preview import MANY_SATURATED
 
 TABLE_PX = 166
@@ -41,14 +41,8 @@ class StepPage(QWidget):
         self.stops = [*follow_any(self._show, *shown), state.seen.follow(self.picture.show_seen)]
 
     def _lay_out(self) -> None:
-        left = QWidget()
-        column_of((self.drawing, 1), self.instruction, on=left, margins=0)
-        split = QSplitter(Qt.Orientation.Horizontal)
-        split.setChildrenCollapsible(False)
-        split.addWidget(left)
-        split.addWidget(self.picture)
-        split.setStretchFactor(0, 1)
-        split.setStretchFactor(1, 1)
+        left = boxed(column_of((self.drawing, 1), self.instruction, margins=0))
+        split = splitter(Qt.Orientation.Horizontal, (left, 1), (self.picture, 1))
         column_of(self.title, (split, 1), self.verdict, self.figures, on=self, margins=(8, 0, 0, 0))
 
     def _show(self) -> None:

@@ -16,9 +16,9 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark, splitter
+from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
@@ -73,8 +73,7 @@ class PairPanel(QWidget):
             self.swap,
             self.report,
         )
-        above = QWidget()
-        column_of((self._pictures, 1), self.bar, on=above, margins=0)
+        above = boxed(column_of((self._pictures, 1), self.bar, margins=0))
         self.parts = splitter(Qt.Orientation.Vertical, (above, 5), (self._figures, 4))
         column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
 

@@ -225,7 +225,7 @@ class PairControls(QWidget):
     def _show(self) -> None:
         state = self._state
         pair, in_band = state.pair.value, state.shown.value is PairQuantity.BAND
-        self.shown.setCurrentIndex(self.shown.findData(state.shown.value))
+        self.shown.choose(state.shown.value)
         self.band.setVisible(in_band)
         self.nm.setVisible(in_band)
         if pair is not None and pair.bands:

@@ -20,9 +20,9 @@ from dsl_app.compare.series.table import SeriesTable
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark, splitter
+from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark
 from dsl_app.shared.widgets.help_window import set_help
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_core.evaluation.stage_test import stage_table
 from dsl_core.evaluation.time_sweep import FIGURES
 
@@ -116,7 +116,7 @@ class SeriesPanel(QWidget):
     def _show(self) -> None:
         display = series_display(self._state)
         show_remark(self.hint, display.remark)
-        self.kind.setCurrentIndex(self.kind.findData(self._state.kind.value))
+        self.kind.choose(self._state.kind.value)
         self.parts.setVisible(display.has_rows)
         self.remove.setEnabled(display.can_remove)
         self.report.setEnabled(display.can_report)

@@ -167,7 +167,7 @@ class ReconstructionDialog(JobDialog):
             return
         if self.calibration.findData(name) < 0:
             self.calibration.addItem(Path(name).name, name)
-        self.calibration.setCurrentIndex(self.calibration.findData(name))
+        self.calibration.choose(name)
 
 
 def _nanometres(name: str, value: float, tip: str) -> NumberBox:

@@ -131,9 +131,9 @@ class EffectsPanel(QWidget):
         kind = self._state.in_use.value if self._state.in_use.value in named else EffectChoice.CHOSEN.value
         tolerance = self._state.tolerance.value
         with quiet(self.choice, self.tolerance, self.unit):
-            self.choice.setCurrentIndex(self.choice.findData(kind))
+            self.choice.choose(kind)
             self.tolerance.setValue(tolerance.value)
-            self.unit.setCurrentIndex(self.unit.findData(tolerance.unit))
+            self.unit.choose(tolerance.unit)
         if self.isVisible():
             self._controller.look_again()
         self._show_state()

@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QPushButton,
     QSpinBox,
-    QSplitter,
     QStyle,
     QWidget,
 )
@@ -181,16 +180,6 @@ def show_button(button: QPushButton, state: ButtonState) -> None:
     button.setVisible(state.is_visible)
     button.setEnabled(state.is_enabled)
     set_role(button, "primary" if state.is_primary else "")
-
-
-def splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int]) -> QSplitter:
-    """A splitter of parts with their stretch factors; no part can be collapsed."""
-    made = QSplitter(direction)
-    made.setChildrenCollapsible(False)
-    for place, (widget, stretch) in enumerate(parts):
-        made.addWidget(widget)
-        made.setStretchFactor(place, stretch)
-    return made
 
 
 def set_role(widget: QWidget, role: str) -> None:

@@ -12,13 +12,12 @@ from PySide6.QtWidgets import (
     QListWidget,
     QListWidgetItem,
     QPushButton,
-    QSplitter,
     QTextBrowser,
     QWidget,
 )
 
 from dsl_app.shared.widgets.forms import named, push_button, quiet
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
 
@@ -108,12 +107,7 @@ class HelpWindow(QDialog):
 
     def _lay_out(self) -> None:
         head = row_of(self.back, self.forward, STRETCH, self.close_button)
-        parts = QSplitter(Qt.Orientation.Horizontal)
-        parts.setChildrenCollapsible(False)
-        parts.addWidget(self.pages)
-        parts.addWidget(self.text)
-        parts.setSizes([270, 690])
-        parts.setStretchFactor(1, 1)
+        parts = splitter(Qt.Orientation.Horizontal, (self.pages, 0), (self.text, 1), sizes=(270, 690))
         column_of(head, (parts, 1), on=self)
 
     @property

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLayout, QScrollArea, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QHBoxLayout,
+    QLayout,
+    QScrollArea,
+    QSplitter,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 B = TypeVar("B", bound=QBoxLayout)
 Margins = int | tuple[int, int, int, int]
@@ -81,6 +91,18 @@ def _add_item(box: QBoxLayout, item: Item, stretch: int = 0) -> None:
         box.addWidget(item, stretch)
     else:
         box.addLayout(item, stretch)
+
+
+def splitter(direction: Qt.Orientation, *parts: tuple[QWidget, int], sizes: Sequence[int] = ()) -> QSplitter:
+    """A splitter of parts with their stretch factors, and their first sizes; no part can be collapsed."""
+    made = QSplitter(direction)
+    made.setChildrenCollapsible(False)
+    for place, (widget, stretch) in enumerate(parts):
+        made.addWidget(widget)
+        made.setStretchFactor(place, stretch)
+    if sizes:
+        made.setSizes(sizes)
+    return made
 
 
 def scrolled(content: QWidget) -> QScrollArea:
