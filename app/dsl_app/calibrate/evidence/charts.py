@@ -140,7 +140,7 @@ class ChartBox(QWidget):
         self.sentence.setText(sentence)
         self._stack.setCurrentWidget(self.sentence)
 
-    def name_curves(self, keys: Sequence[Key]) -> None:
+    def name_curves(self, *keys: Key) -> None:
         """Show a legend of colours and names."""
         self.legend.setText(" &nbsp; ".join(_legend(*key) for key in keys))
         self.legend.show()
@@ -192,7 +192,7 @@ def draw_curves(box: ChartBox, curves: Sequence[NamedCurve]) -> list[SpectrumCur
     top = max(max(each.curve.values) for each in curves)
     box.item.setXRange(low, high, padding=0.01)
     box.item.setYRange(min(0.0, min(min(each.curve.values) for each in curves)), 1.08 * top, padding=0)
-    box.name_curves([(each.name, each.colour, DASHES if each.dashed else LINE) for each in curves])
+    box.name_curves(*((each.name, each.colour, DASHES if each.dashed else LINE) for each in curves))
     return drawn
 
 
@@ -236,8 +236,10 @@ class Bars:
     is_pale: Sequence[bool] = ()
 
 
-def draw_bars(box: ChartBox, kinds: Sequence[Bars], names: Sequence[str]) -> float:
-    """Draw groups of bars on a fresh plot, their names below; returns the largest height."""
+def draw_bars(
+    box: ChartBox, kinds: Sequence[Bars], names: Sequence[str], limit: float, theme: Theme, *others: Key
+) -> None:
+    """Draw groups of bars on a fresh plot, names below, against a limit; ``others`` join the legend."""
     box.begin()
     at, width = np.arange(len(names)), 0.8 / len(kinds)
     for index, kind in enumerate(kinds):
@@ -251,7 +253,8 @@ def draw_bars(box: ChartBox, kinds: Sequence[Bars], names: Sequence[str]) -> flo
         )
     box.item.getAxis("bottom").setTicks([list(enumerate(names))])
     box.item.setXRange(-0.6, len(names) - 0.4, padding=0)
-    return max(float(np.max(kind.heights)) for kind in kinds)
+    range_from_zero(box, max(float(np.max(kind.heights)) for kind in kinds), limit, theme)
+    box.name_curves(*((kind.name, kind.colour, BAR) for kind in kinds if kind.name), *others)
 
 
 def _brush(colour: str, alpha: int) -> QColor:

@@ -14,7 +14,6 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.chart_picture import ChartPicture, Swatches, corners_in
 from dsl_app.calibrate.evidence.charts import (
-    BAR,
     CHANNELS,
     DASHES,
     DOT,
@@ -24,7 +23,6 @@ from dsl_app.calibrate.evidence.charts import (
     channel_curves,
     draw_bars,
     draw_curves,
-    range_from_zero,
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.widgets.forms import label, named, push_button, set_role
@@ -218,7 +216,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         old = [replace(each, name=f"{each.name} before", dashed=True) for each in channel_curves(bare)]
         draw_curves(box, [*old, *channel_curves(after)])
         keys = [(name, colour, DOT) for name, colour in zip(CHANNELS, RGB_COLOURS, strict=True)]
-        box.name_curves([*keys, ("after", self._theme.text, LINE), ("before", self._theme.text, DASHES)])
+        box.name_curves(*keys, ("after", self._theme.text, LINE), ("before", self._theme.text, DASHES))
 
     def _draw_patches(self) -> None:
         record, view = self._record, self._view
@@ -252,18 +250,18 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
 
     def _draw_residuals(self, record: ColorCheckerCalibration) -> None:
         box, theme = self.residuals, self._theme
-        kinds = (
-            Bars("before the refinement", theme.line, 100 * np.array([p.start for p in record.patches])),
-            Bars("held out", theme.pins[1], 100 * np.array([p.held_out for p in record.patches])),
-            Bars("in the fit", theme.pins[0], 100 * np.array([p.residual for p in record.patches])),
-        )
-        top = draw_bars(box, kinds, [str(number) for number in range(1, len(record.patches) + 1)])
-        range_from_zero(box, top, WORST_PERCENT, theme)
+        kinds = [
+            Bars(
+                f"{name}, {100 * getattr(record, field):.2f} % in all",
+                colour,
+                100 * np.array([getattr(patch, field) for patch in record.patches]),
+            )
+            for name, field, colour in (
+                ("before the refinement", "start", theme.line),
+                ("held out", "held_out", theme.pins[1]),
+                ("in the fit", "residual", theme.pins[0]),
+            )
+        ]
+        numbers = [str(number) for number in range(1, len(record.patches) + 1)]
+        draw_bars(box, kinds, numbers, WORST_PERCENT, theme)
         box.plot.setLabel("bottom", "Patch, in reading order")
-        totals = (record.start, record.held_out, record.residual)
-        box.name_curves(
-            [
-                (f"{kind.name}, {100 * total:.2f} % in all", kind.colour, BAR)
-                for kind, total in zip(kinds, totals, strict=True)
-            ]
-        )

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QTabWidget, QWidget
 
 from dsl_app.calibrate.evidence.base import BackgroundReader, Evidence, side_by_side
 from dsl_app.calibrate.evidence.charts import (
-    BAR,
     COVER,
     DASHES,
     DOT,
@@ -24,7 +23,6 @@ from dsl_app.calibrate.evidence.charts import (
     draw_points,
     level_line,
     range_about_zero,
-    range_from_zero,
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
@@ -145,9 +143,9 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         box, theme = self.planes, self._theme
         heights = np.array([position.plane_rms_mm for position in record.positions])
         names = [f"{p.position_mm:g}" for p in record.positions]
-        top = draw_bars(box, [Bars("", theme.pins[0], heights)], names)
-        range_from_zero(box, top, MAX_PLANE_MM, theme)
-        box.name_curves([(f"depth left open by the geometry {record.depth_std_mm:.3f} mm", theme.text, "")])
+        left_open = f"depth left open by the geometry {record.depth_std_mm:.3f} mm"
+        bars = Bars("", theme.pins[0], heights)
+        draw_bars(box, [bars], names, MAX_PLANE_MM, theme, (left_open, theme.text, ""))
 
     def _draw_steps(self, record: DepthStageCalibration) -> None:
         box, theme = self.steps, self._theme
@@ -158,9 +156,8 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         draw_points(box, at, error, std, theme.pins[0])
         box.item.setXRange(at.min(), at.max(), padding=0.1)
         range_about_zero(box, 1.2 * float((np.abs(error) + COVER * std).max()), MAX_STEP_MM, theme)
-        box.name_curves(
-            [(f"pull of the planes on the geometry {record.geometry_pull:.2f} deviations", theme.text, "")]
-        )
+        pull = f"pull of the planes on the geometry {record.geometry_pull:.2f} deviations"
+        box.name_curves((pull, theme.text, ""))
 
     # First orders ----------------------------------------------------------------------------------
 
@@ -175,12 +172,9 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
             Bars("noise", theme.line, np.array([each.noise_px for each in record.held_out])),
         )
         names = [_short(each.kept_out) for each in record.held_out]
-        range_from_zero(box, draw_bars(box, kinds, names), MAX_HELD_OUT_PX, theme)
+        needless = () if record.residual.degrees else (("no residual was needed", theme.text, ""),)
+        draw_bars(box, kinds, names, MAX_HELD_OUT_PX, theme, *needless)
         box.plot.setLabel("bottom", "Held out: positions (mm), filters (nm), tiles")
-        keys: list[Key] = [(kind.name, kind.colour, BAR) for kind in kinds]
-        if not record.residual.degrees:
-            keys.append(("no residual was needed", theme.text, ""))
-        box.name_curves(keys)
 
     def _draw_shifts(self, record: DepthStageCalibration) -> None:
         box, theme = self.shifts, self._theme
@@ -197,7 +191,7 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         level_line(box, 0.0, theme.muted)
         box.item.setXRange(at.min(), at.max(), padding=0.1)
         box.item.setYRange(-1.3 * reach, 1.3 * reach, padding=0)
-        box.name_curves(keys)
+        box.name_curves(*keys)
 
     # Columns over depth ----------------------------------------------------------------------------
 
@@ -244,11 +238,10 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         self.difference.item.setYRange(-1.2 * reach, 1.2 * reach, padding=0)
         keys: list[Key] = [(f"{nm:g} nm", colour, LINE) for nm, colour in colours.items()]
         orders: list[Key] = [("order +1", theme.text, "●"), ("order −1", theme.text, "▼")]
-        self.curve.name_curves([*keys, *orders])
+        self.curve.name_curves(*keys, *orders)
         grid = "data-driven curve" if record.correspondence is not None else "no data-driven curve was fitted"
-        self.difference.name_curves(
-            [("measured", theme.text, DOT), (grid, theme.text, DASHES if record.correspondence else "")]
-        )
+        sign = DASHES if record.correspondence else ""
+        self.difference.name_curves(("measured", theme.text, DOT), (grid, theme.text, sign))
 
 
 def _tab(charts: QWidget, below: QWidget | None = None) -> QWidget:

@@ -17,7 +17,6 @@ from dsl_app.calibrate.evidence.charts import (
     ChartBox,
     draw_bars,
     like_a_picture,
-    range_from_zero,
 )
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
@@ -174,9 +173,9 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         frame.setPen(pg.mkPen(theme.muted, width=1))
         self.coverage.item.addItem(frame)
         self.coverage.item.setRange(xRange=(0, size[0]), yRange=(0, size[1]), padding=0.02)
-        keys = [(f"covered, {100 * record.camera_coverage:.0f} % of the cells", theme.accent, BAR)]
+        covered = f"covered, {100 * record.camera_coverage:.0f} % of the cells"
         chosen_keys = [(name, theme.warn, DOT) for name in sorted(chosen)]
-        self.coverage.name_curves([*keys, *chosen_keys])
+        self.coverage.name_curves((covered, theme.accent, BAR), *chosen_keys)
 
     def _draw_errors(self, record: GeometryCalibration) -> None:
         is_pale = [not pose.used for pose in record.poses]
@@ -186,9 +185,8 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
             Bars(f"camera, {record.camera_rms_px:.3f} px in all", self._theme.pins[0], camera, is_pale),
             Bars(f"projector, {record.projector_rms_px:.3f} px", self._theme.pins[1], projector, is_pale),
         )
-        top = draw_bars(self.errors, kinds, [pose.name.removeprefix("Pose ") for pose in record.poses])
-        range_from_zero(self.errors, top, GOOD_RMS_PX, self._theme)
-        self.errors.name_curves([(kind.name, kind.colour, BAR) for kind in kinds])
+        names = [pose.name.removeprefix("Pose ") for pose in record.poses]
+        draw_bars(self.errors, kinds, names, GOOD_RMS_PX, self._theme)
 
 
 def _row(pose: PoseQuality) -> list[Cell | str]:

@@ -115,7 +115,7 @@ class SelfTestEvidence(Evidence[SelfTest]):
         range_about_zero(box, max(1.3 * reach, 0.02), LINEARITY_PERCENT, self._theme)
         checks = zip(CHANNELS, record.camera.linearity_percent, RGB_COLOURS, strict=True)
         box.name_curves(
-            [(f"{name}, at most {each.value:.3f} %", colour, DOT) for name, each, colour in checks]
+            *((f"{name}, at most {each.value:.3f} %", colour, DOT) for name, each, colour in checks)
         )
 
     def _draw_gamma(self, record: SelfTest, curves: SelfTestCurves) -> None:
@@ -136,10 +136,10 @@ class SelfTestEvidence(Evidence[SelfTest]):
             level_line(box, limit, self._theme.bad, "limit, RMS" if limit > 0 else "")
         box.item.setRange(xRange=(0, 1), yRange=(-span, span), padding=0.02)
         box.name_curves(
-            [
+            *(
                 (f"{name} {with_spread(check.gamma.value, check.gamma.std)}", colours[name], LINE)
                 for name, check in checks.items()
-            ]
+            )
         )
 
     def _draw_beat(self, cycle: CycleCheck) -> None:
@@ -165,7 +165,7 @@ class SelfTestEvidence(Evidence[SelfTest]):
         box.item.setRange(xRange=(-0.6, len(beats) - 0.4), yRange=(0, 1.1 * top), padding=0)
         period = cycle.period_ms
         words = "steady light" if period is None else f"cycle of {with_spread(period.value, period.std)} ms"
-        box.name_curves([("advised", theme.good, BAR), ("others", theme.muted, BAR), (words, theme.text, "")])
+        box.name_curves(("advised", theme.good, BAR), ("others", theme.muted, BAR), (words, theme.text, ""))
 
     def _draw_latency(self, record: SelfTest, curves: SelfTestCurves) -> None:
         box, theme, latency = self.latency, self._theme, record.latency
@@ -177,14 +177,9 @@ class SelfTestEvidence(Evidence[SelfTest]):
         box.item.addItem(wait, ignoreBounds=True)
         box.item.setXRange(0, max(float(curves.waits_ms.max()), 1.0), padding=0.04)
         box.item.setYRange(0, 105, padding=0.02)
+        safe = f"safe after {with_spread(latency.wait_ms.value, latency.wait_ms.std)} ms"
         box.name_curves(
-            [
-                (
-                    f"safe after {with_spread(latency.wait_ms.value, latency.wait_ms.std)} ms",
-                    theme.accent,
-                    DASHES,
-                ),
-                (f"show takes {latency.blocking_ms.value:.1f} ms", theme.text, ""),
-                (f"stale {latency.stale_frames} of {latency.checked}", theme.text, ""),
-            ]
+            (safe, theme.accent, DASHES),
+            (f"show takes {latency.blocking_ms.value:.1f} ms", theme.text, ""),
+            (f"stale {latency.stale_frames} of {latency.checked}", theme.text, ""),
         )

@@ -81,13 +81,16 @@ def test_groups_of_bars_stand_next_to_each_other_over_their_names(qtbot: QtBot) 
     qtbot.addWidget(box)
     faded = Bars("a", "#ff0000", np.array([1.0, 2.0]), (False, True))
     kinds = [faded, Bars("b", "#00ff00", np.array([3.0, 0.0]))]
-    assert draw_bars(box, kinds, ["first", "second"]) == 3.0
+    draw_bars(box, kinds, ["first", "second"], 2.0, LIGHT, ("c", "#0000ff", "●"))
+    assert top(box) == pytest.approx(3.3)
+    assert limits(box) == [2.0]
     red, green = items(box, pg.BarGraphItem)
     assert np.allclose(red.opts["x"], (-0.2, 0.8))
     assert np.allclose(green.opts["x"], (0.2, 1.2))
     assert [brush.alpha() for brush in red.opts["brushes"]] == [255, 70]
     assert [brush.name() for brush in green.opts["brushes"]] == ["#00ff00", "#00ff00"]
     assert box.item.getAxis("bottom")._tickLevels == [[(0, "first"), (1, "second")]]
+    assert all(f"&nbsp;{name}" in box.legend.text() for name in "abc"), "bars and others are named"
 
 
 def test_a_limit_is_drawn_where_it_is_near(qtbot: QtBot) -> None:
