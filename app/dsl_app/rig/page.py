@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import (
-    QFormLayout,
-    QGroupBox,
-    QLineEdit,
-    QPushButton,
-)
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QLineEdit, QPushButton
 
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.rig.controller import LiveController

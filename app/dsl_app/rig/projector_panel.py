@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QScreen
-from PySide6.QtWidgets import (
-    QFormLayout,
-    QGroupBox,
-    QSlider,
-)
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QSlider
 
 from dsl_app.rig.state import panel_view
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, check_box, label, push_button, quiet

@@ -113,15 +113,10 @@ class ScanController:
         """Stop reconnecting a lost rig automatically."""
         self._reconnector.stop()
 
-    def pause(self) -> None:
-        """Wait before the next frame."""
+    def pause(self, on: bool = True) -> None:
+        """Wait before the next frame, or continue."""
         if self._is_under_way() and self._scan is not None:
-            self._scan.pause()
-
-    def unpause(self) -> None:
-        """Continue after `pause`."""
-        if self._is_under_way() and self._scan is not None:
-            self._scan.unpause()
+            self._scan.pause(on)
 
     def cancel(self) -> None:
         """Stop before the next frame, or stop waiting for a lost rig; saved frames are kept."""

@@ -127,15 +127,8 @@ class ScanJob:
         """The intensity graph of a pixel, as far as captured."""
         return None if self._graphs is None else self._graphs.graph(pixel)
 
-    def pause(self) -> None:
-        """Wait before the next frame; a scan still in preparation waits before its first."""
-        self._pause(True)
-
-    def unpause(self) -> None:
-        """Continue after `pause`."""
-        self._pause(False)
-
-    def _pause(self, on: bool) -> None:
+    def pause(self, on: bool = True) -> None:
+        """Wait before the next frame, or continue; a scan still in preparation waits before its first."""
         with self._pausing:
             self._is_paused = on
             if self._runner is not None:

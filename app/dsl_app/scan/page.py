@@ -7,11 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QScrollArea,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QScrollArea, QWidget
 
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.controls import banner_controls

@@ -170,10 +170,7 @@ class RunBox(QGroupBox):
 
     def toggle_pause(self) -> None:
         """Pause, or continue."""
-        if self._state.phase.value is Phase.PAUSED:
-            self._controller.unpause()
-        else:
-            self._controller.pause()
+        self._controller.pause(self._state.phase.value is not Phase.PAUSED)
 
     def _show(self) -> None:
         state = self._state

@@ -6,13 +6,7 @@ import logging
 from collections import deque
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import (
-    QApplication,
-    QLabel,
-    QLineEdit,
-    QPlainTextEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget
 
 from dsl_app.shared.widgets.forms import ChoiceBox, named, push_button
 from dsl_app.shared.widgets.layouts import column_of, row_of

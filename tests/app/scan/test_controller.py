@@ -533,7 +533,7 @@ def test_a_pause_while_a_scan_is_prepared_holds_its_first_frame(
 
     def prepare(job: ScanJob) -> tuple[DeviceRig, dict[str, str]]:
         job.pause()
-        threading.Timer(0.3, job.unpause).start()
+        threading.Timer(0.3, lambda: job.pause(False)).start()
         return calibrated(job)
 
     def hear(job: ScanJob, status: Status) -> None:

@@ -10,14 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGraphicsRectItem, QTableWidgetItem
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
-from dsl_app.calibrate.evidence.charts import (
-    BAR,
-    DOT,
-    Bars,
-    ChartBox,
-    draw_bars,
-    like_a_picture,
-)
+from dsl_app.calibrate.evidence.charts import BAR, DOT, Bars, ChartBox, draw_bars, like_a_picture
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet, set_role

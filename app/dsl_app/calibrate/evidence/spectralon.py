@@ -8,13 +8,7 @@ import numpy as np
 import pyqtgraph as pg
 
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
-from dsl_app.calibrate.evidence.charts import (
-    CHANNELS,
-    ChartBox,
-    channel_curves,
-    draw_curves,
-    like_a_picture,
-)
+from dsl_app.calibrate.evidence.charts import CHANNELS, ChartBox, channel_curves, draw_curves, like_a_picture
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import boxed, column_of

@@ -8,13 +8,7 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QCheckBox,
-    QFormLayout,
-    QHBoxLayout,
-    QLineEdit,
-    QWidget,
-)
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QWidget
 
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow

@@ -6,11 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QHeaderView,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QHeaderView, QWidget
 
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.picture import SeriesPicture

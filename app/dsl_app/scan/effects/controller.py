@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice
-from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
+from dsl_app.scan.effects.state import EffectChoice, EffectsState, EffectsView
 from dsl_app.scan.state import ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier, sentence_of
@@ -16,7 +16,6 @@ from dsl_core.progress import Progress
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
 
 if TYPE_CHECKING:
-    from dsl_core.simulation.effects.planner import EffectPlan
     from dsl_core.simulation.world import World
 
 EFFECTS, TOLERANCE = "effects", "tolerance"
@@ -120,26 +119,5 @@ def view_of(world: World, choice: str, tolerance: Tolerance, plan: CapturePlan) 
     from dsl_core.simulation.effects.catalogue import Choice
     from dsl_core.simulation.rendered_scene import EffectRequest
 
-    made = world.effect_plan(EffectRequest(Choice.of(choice), tolerance, plan.settings))
-    frame_s, all_s = made.seconds
-    return EffectsView(_rows(made), _left_out(made), frame_s, all_s, plan.shot_count)
-
-
-def _rows(made: EffectPlan) -> tuple[EffectRow, ...]:
-    return tuple(
-        EffectRow(
-            d.effect.name,
-            d.effect.summary,
-            d.bound.dn,
-            d.bound.sigmas,
-            d.cost_s,
-            d.on,
-            d.effect.needed,
-            d.why,
-        )
-        for d in made.decisions
-    )
-
-
-def _left_out(made: EffectPlan) -> str:
-    return f"{made.left_out_bound:.3g} {made.tolerance.unit}"
+    request = EffectRequest(Choice.of(choice), tolerance, plan.settings)
+    return EffectsView(world.effect_plan(request), plan.shot_count)

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import (
-    QPushButton,
-    QTableWidgetItem,
-    QWidget,
-)
+from PySide6.QtWidgets import QPushButton, QTableWidgetItem, QWidget
 
 from dsl_app.scan.effects.controller import EffectsController
-from dsl_app.scan.effects.state import EffectChoice, EffectRow, EffectsState, EffectsView
+from dsl_app.scan.effects.state import EffectChoice, EffectsState, EffectsView
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
+
+if TYPE_CHECKING:
+    from dsl_core.simulation.effects.planner import Decision
 
 _COLUMNS = ("Effect", "At most", "In σ", "Per frame", "Why")
 _CHOICES = (
@@ -97,14 +97,9 @@ class EffectsPanel(QWidget):
         kind = str(self.choice.currentData())
         if kind != EffectChoice.CHOSEN.value:
             return kind
-        names = (row.name for row, item in self._items() if item.checkState() is Qt.CheckState.Checked)
-        return ",".join(names)
-
-    def _items(self) -> list[tuple[EffectRow, QTableWidgetItem]]:
-        view = self._state.view.value
-        rows = () if view is None else view.rows
-        items = [self.table.item(i, 0) for i in range(self.table.rowCount())]
-        return [(row, item) for row, item in zip(rows, items, strict=False) if item is not None]
+        items = (self.table.item(i, 0) for i in range(self.table.rowCount()))
+        ticked = Qt.CheckState.Checked
+        return ",".join(each.text() for each in items if each is not None and each.checkState() is ticked)
 
     def _chosen_tolerance(self) -> Tolerance:
         return Tolerance(self.tolerance.value(), str(self.unit.currentData()))
@@ -139,23 +134,22 @@ class EffectsPanel(QWidget):
         self._show_state()
 
     def _show(self, view: EffectsView | None) -> None:
-        rows = () if view is None else view.rows
+        rows = () if view is None else view.plan.decisions
         with quiet(self.table):
             self.table.show_rows([self._cells(row) for row in rows])
         self._show_state()
 
-    def _cells(self, row: EffectRow) -> tuple[QTableWidgetItem, ...]:
-        theme = self._theme
-        colour = theme.text if row.on else theme.muted
-        first = cell(row.name, colour)
-        first.setToolTip(row.what)
+    def _cells(self, row: Decision) -> tuple[QTableWidgetItem, ...]:
+        colour = self._theme.text if row.on else self._theme.muted
+        first = cell(row.effect.name, colour)
+        first.setToolTip(row.effect.summary)
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
-        first.setFlags(flags if row.needed else flags | Qt.ItemFlag.ItemIsUserCheckable)
+        first.setFlags(flags if row.effect.needed else flags | Qt.ItemFlag.ItemIsUserCheckable)
         first.setCheckState(Qt.CheckState.Checked if row.on else Qt.CheckState.Unchecked)
         cost = f"{1e3 * row.cost_s:.1f} ms" if row.cost_s else "–"
         numbers = tuple(
             cell(text, colour, RIGHT)
-            for text in (f"{number(row.bound_dn)} DN", f"{number(row.bound_sigmas)} σ", cost)
+            for text in (f"{number(row.bound.dn)} DN", f"{number(row.bound.sigmas)} σ", cost)
         )
         return (first, *numbers, cell(row.why, colour))
 
@@ -176,16 +170,8 @@ class EffectsPanel(QWidget):
             self._summary.setText("Weighing…" if state.busy.value else "")
             self._saved.setText("")
             return
-        self._summary.setText(
-            f"{len(view.on)} of {len(view.rows)} effects are rendered. The others change no pixel of any"
-            f" picture by more than {view.left_out}."
-        )
-        saved_s = view.frames * (view.all_s - view.frame_s)
-        self._saved.setText(
-            f"A frame takes about {1e3 * view.frame_s:.0f} ms to compute, {1e3 * view.all_s:.0f} ms with all"
-            f" effects. This saves {100 * view.saved_share:.0f} %, or {saved_s:.0f} s for"
-            f" all {view.frames} frames."
-        )
+        self._summary.setText(view.summary)
+        self._saved.setText(view.saved)
 
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from dsl_app.shared.evented import Value
 from dsl_core.simulation.effects.tolerance import ONE_DN
+
+if TYPE_CHECKING:
+    from dsl_core.simulation.effects.planner import EffectPlan
 
 
 class EffectChoice(Enum):
@@ -20,42 +24,31 @@ class EffectChoice(Enum):
 
 
 @dataclass(frozen=True)
-class EffectRow:
-    """An effect: the most it changes (counts, sigmas of a dark pixel), its seconds a frame, and why."""
-
-    name: str
-    what: str
-    bound_dn: float
-    bound_sigmas: float
-    cost_s: float
-    on: bool
-    needed: bool
-    why: str
-
-
-@dataclass(frozen=True)
 class EffectsView:
-    """A decision on every effect of the current scene.
+    """A decision on every effect of the current scene, for a scan of so many ``frames``."""
 
-    ``left_out`` bounds the change by all effects that are off, in words; ``frame_s`` and ``all_s`` are the
-    computing times of a frame with this choice and with all effects; the scan has ``frames``.
-    """
-
-    rows: tuple[EffectRow, ...]
-    left_out: str
-    frame_s: float
-    all_s: float
+    plan: EffectPlan
     frames: int
 
     @property
-    def saved_share(self) -> float:
-        """Share of computing saved, compared with rendering everything."""
-        return 1 - self.frame_s / self.all_s if self.all_s > 0 else 0.0
+    def summary(self) -> str:
+        """How much is rendered, and what the rest would change at most."""
+        plan = self.plan
+        return (
+            f"{len(plan.names)} of {len(plan.decisions)} effects are rendered. The others change no pixel of"
+            f" any picture by more than {plan.left_out_bound:.3g} {plan.tolerance.unit}."
+        )
 
     @property
-    def on(self) -> tuple[str, ...]:
-        """Names of the rendered effects."""
-        return tuple(row.name for row in self.rows if row.on)
+    def saved(self) -> str:
+        """How long frames take to compute, and how much less that is than with all effects."""
+        frame_s, all_s = self.plan.seconds
+        share = 1 - frame_s / all_s if all_s > 0 else 0.0
+        return (
+            f"A frame takes about {1e3 * frame_s:.0f} ms to compute, {1e3 * all_s:.0f} ms with all effects."
+            f" This saves {100 * share:.0f} %, or {self.frames * (all_s - frame_s):.0f} s for all"
+            f" {self.frames} frames."
+        )
 
 
 class EffectsState:

@@ -130,25 +130,13 @@ class OperatingCurve(QWidget):
 
     @staticmethod
     def _spot_of(point: ForecastPoint, at: tuple[float, float], theme: Theme) -> dict[str, Any]:
+        symbol, size, brush = "o", 6, theme.muted
         if point.is_published:
-            return {
-                "pos": at,
-                "data": point,
-                "symbol": "star",
-                "size": 16,
-                "brush": theme.warn,
-                "pen": theme.base,
-            }
-        if point.preset:
-            return {
-                "pos": at,
-                "data": point,
-                "symbol": "o",
-                "size": 10,
-                "brush": theme.accent,
-                "pen": theme.base,
-            }
-        return {"pos": at, "data": point, "symbol": "o", "size": 6, "brush": theme.muted, "pen": theme.base}
+            symbol, size, brush = "star", 16, theme.warn
+        elif point.preset:
+            size, brush = 10, theme.accent
+        place = {"pos": at, "data": point, "pen": theme.base}
+        return {**place, "symbol": symbol, "size": size, "brush": brush}
 
     def _named(self) -> list[ForecastPoint]:
         """Labelled points; the current one hides labels that would overlap its own."""

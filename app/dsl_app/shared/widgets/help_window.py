@@ -7,14 +7,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QKeySequence, QShortcut, QTextBlock, QTextCursor
-from PySide6.QtWidgets import (
-    QDialog,
-    QListWidget,
-    QListWidgetItem,
-    QPushButton,
-    QTextBrowser,
-    QWidget,
-)
+from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QPushButton, QTextBrowser, QWidget
 
 from dsl_app.shared.widgets.forms import named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter

@@ -11,6 +11,7 @@ from dsl_app.scan.effects.panel import EffectsPanel
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.state import Phase
 from dsl_app.shared.theme import LIGHT
+from dsl_app.shared.widgets.inside import stop_following
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -42,7 +43,7 @@ def panel(qtbot: QtBot, control: EffectsController) -> Iterator[EffectsPanel]:
     made.resize(700, 500)
     made.show()
     yield made
-    made.release()
+    stop_following(made)
 
 
 def choose(panel: EffectsPanel, key: str) -> None:
@@ -53,18 +54,19 @@ def test_every_effect_has_its_bound_cost_and_reason(control: EffectsController, 
     control.look("auto", ONE_DN)
     view = control.state.view.value
     assert view is not None
-    assert [row.name for row in view.rows] == list(NAMES)
-    assert all(row.why.endswith(".") for row in view.rows)
-    assert set(NEEDED) <= set(view.on)
+    assert [row.effect.name for row in view.plan.decisions] == list(NAMES)
+    assert all(row.why.endswith(".") for row in view.plan.decisions)
+    assert set(NEEDED) <= view.plan.names
     # A flat chart lights nothing else, is not glossy and not translucent.
-    assert not {"interreflection", "subsurface", "specular"} & set(view.on)
-    assert 0 < view.saved_share < 1
-    assert view.frames == FRAMES
+    assert not {"interreflection", "subsurface", "specular"} & view.plan.names
+    assert f"{len(view.plan.names)} of {len(NAMES)} effects are rendered" in view.summary
+    assert f"s for all {FRAMES} frames" in view.saved
+    assert "saves 0 %" not in view.saved
     control.look("all", ONE_DN)
     everything = control.state.view.value
     assert everything is not None
-    assert everything.on == NAMES
-    assert everything.saved_share == 0
+    assert everything.plan.names == set(NAMES)
+    assert "saves 0 %, or 0 s" in everything.saved
 
 
 def test_looking_changes_nothing_in_the_rig(control: EffectsController, bench: ScanBench) -> None:
@@ -162,7 +164,7 @@ def test_ticking_an_effect_chooses_by_name_and_apply_renders_it(
     assert panel.choice.currentData() == "chosen"
     view = control.state.view.value
     assert view is not None
-    assert set(view.on) == USUAL | {"glare"}
+    assert view.plan.names == USUAL | {"glare"}
     QTest.mouseClick(panel.apply, Qt.MouseButton.LeftButton)
     used = dict(bench.rig.state.choice.value.options)["effects"]
     assert set(used.split(",")) == USUAL | {"glare"}
