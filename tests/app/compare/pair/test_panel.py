@@ -9,6 +9,7 @@ from dsl_app.compare.pair.panel import PairPanel
 from dsl_app.compare.pair.state import NOTHING, PairQuantity, PairState
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.theme import DARK, LIGHT
+from dsl_app.shared.widgets.inside import apply_theme_to, stop_following
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -31,11 +32,11 @@ def bench(qtbot: QtBot) -> Iterator[Bench]:
     control = PairController(state, runner, RecordingNotifier())
     page = PairPanel(state, control)
     qtbot.addWidget(page)
-    page.apply_theme(LIGHT)
+    apply_theme_to(page, LIGHT)
     page.resize(1100, 700)
     page.show()
     yield page, state, control
-    page.release()
+    stop_following(page)
     runner.shut_down()
 
 
@@ -77,7 +78,7 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     assert state.cursor.value == (22, 24)
     assert "column 22, row 24" in page.bar.readout.text()
     assert all(curve.solid.isVisible() for curve in page.figures.curves)
-    page.apply_theme(DARK)
+    apply_theme_to(page, DARK)
 
 
 def test_the_slider_steps_through_common_bands(qtbot: QtBot, bench: Bench, chart: Path) -> None:

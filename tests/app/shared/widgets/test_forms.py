@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from dsl_app.shared.widgets.forms import ChoiceBox
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, named, push_button, quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -22,6 +22,43 @@ def test_an_entry_that_was_found_by_keys_is_told(qtbot: QtBot, keys: list[Qt.Key
         QTest.keyClick(box, key)
     assert box.currentText() == "green"
     assert told[-1] == 2
+
+
+def test_an_entry_is_chosen_by_what_it_stands_for(qtbot: QtBot) -> None:
+    box = ChoiceBox("Colour", choices=[("Red", 7), ("Blue", 9)])
+    qtbot.addWidget(box)
+    box.choose(9)
+    assert (box.currentText(), box.accessibleName(), box.toolTip()) == ("Blue", "Colour", "Colour")
+
+
+def test_a_button_says_and_does_what_it_was_made_for(qtbot: QtBot) -> None:
+    done: list[int] = []
+    button = push_button("&Start", "Begins the work", lambda: done.append(1), role="primary")
+    qtbot.addWidget(button)
+    button.click()
+    assert (done, button.toolTip(), button.property("role")) == ([1], "Begins the work", "primary")
+    box = check_box("Loop", "Again and again")
+    qtbot.addWidget(box)
+    assert (box.text(), box.toolTip()) == ("Loop", "Again and again")
+    line = named(QLineEdit(), "Filter", "By words")
+    qtbot.addWidget(line)
+    assert (line.accessibleName(), line.toolTip()) == ("Filter", "By words")
+
+
+def test_what_is_set_quietly_is_not_told(qtbot: QtBot) -> None:
+    first, second = NumberBox("First", 0, 9, 1), NumberBox("Second", 0, 9, 1)
+    told: list[float] = []
+    for box in (first, second):
+        qtbot.addWidget(box)
+        box.valueChanged.connect(told.append)
+    with quiet(first, second):
+        first.setValue(2)
+        with quiet(second):
+            second.setValue(3)
+        second.setValue(4)
+    assert told == [], "an inner block does not end the outer one"
+    first.setValue(5)
+    assert told == [5.0]
 
 
 def test_a_table_to_read_shows_whole_cells_and_is_left_by_tab(qtbot: QtBot) -> None:
