@@ -19,6 +19,7 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step, colour_map
+from dsl_app.shared.widgets.plots import theme_bar
 
 #: Mouse moves are handled at most this often, Hz.
 CURSOR_HZ = 60
@@ -239,11 +240,7 @@ class ResultImage(QWidget):
         self.box.set_colour(theme.accent)
         for line in (self._vertical, self._horizontal):
             line.setPen(pg.mkPen(theme.accent, width=1))
-        for side in ("left", "right"):
-            axis = self.bar.getAxis(side)
-            axis.setTextPen(theme.text)
-            axis.setPen(theme.line)
-            axis.labelStyle["color"] = theme.text
+        theme_bar(self.bar, theme)
         self._show_marks(self._state.marks.value)
         self._show_search()
         self.paint()

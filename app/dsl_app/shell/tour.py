@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QObject, QPoint, QRect, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPainterPath, QPaintEvent, QPen
-from PySide6.QtWidgets import QFrame, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QWidget
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button
@@ -100,13 +100,14 @@ class Tour(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._count, self._title, self._text = label("", "muted"), label("", "heading"), label("")
         self._text.setWordWrap(True)
-        self.skip = _button("&Skip", "End the tour (Escape)")
-        self.back = _button("&Back", "Previous step (left arrow)")
-        self.next = _button("&Next", "Next step (right arrow or Enter)")
-        self.next.setProperty("role", "primary")
-        self.skip.clicked.connect(self.leave)
-        self.back.clicked.connect(lambda: self.go(self._at - 1))
-        self.next.clicked.connect(lambda: self.go(self._at + 1))
+        self.skip = push_button("&Skip", "End the tour (Escape)", self.leave)
+        self.back = push_button("&Back", "Previous step (left arrow)", lambda: self.go(self._at - 1))
+        self.next = push_button(
+            "&Next", "Next step (right arrow or Enter)", lambda: self.go(self._at + 1), role="primary"
+        )
+        for button in (self.skip, self.back, self.next):
+            # Enter presses the one that has the focus, as in a dialog.
+            button.setAutoDefault(True)
         self.card = self._make_card()
         for watched in (window, self.skip, self.back, self.next):
             watched.installEventFilter(self)
@@ -232,10 +233,3 @@ def next_to(hole: QRect, width: int, height: int, room: QRect) -> QPoint:
     if hole.top() - GAP_PX - height > room.top():
         return QPoint(x, hole.top() - GAP_PX - height)
     return QPoint(hole.center().x() - width // 2, hole.center().y() - height // 2)
-
-
-def _button(text: str, tip: str) -> QPushButton:
-    button = push_button(text, tip)
-    # Enter presses the one that has the focus, as in a dialog.
-    button.setAutoDefault(True)
-    return button

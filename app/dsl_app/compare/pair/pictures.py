@@ -28,6 +28,7 @@ from dsl_app.shared.widgets.pictures import (
     moved_within,
     spread_of,
 )
+from dsl_app.shared.widgets.plots import theme_bar
 
 BAND_PX = 260
 
@@ -175,11 +176,8 @@ class PairPictures(QWidget):
         self.paint()
 
     def _theme_bars(self) -> None:
-        theme = self._theme
         for bar in self.bars:
-            for side in ("left", "right"):
-                bar.getAxis(side).setTextPen(theme.text)
-                bar.getAxis(side).setPen(theme.line)
+            theme_bar(bar, self._theme)
 
 
 def common_levels(first: Any, second: Any, shown: PairQuantity) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.pictures import DIFFERENCE, RegionBox, colour_map, spread_of
+from dsl_app.shared.widgets.plots import theme_bar
 
 
 class SeriesPicture(QWidget):
@@ -102,6 +103,4 @@ class SeriesPicture(QWidget):
         self._theme = theme
         self.canvas.setBackground(theme.base)
         self.rectangle.apply_theme(theme)
-        for side in ("left", "right"):
-            self.bar.getAxis(side).setTextPen(theme.text)
-            self.bar.getAxis(side).setPen(theme.line)
+        theme_bar(self.bar, theme)

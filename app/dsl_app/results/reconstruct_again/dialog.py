@@ -43,6 +43,8 @@ class ReconstructionDialog(JobDialog):
         add_help_key(self, "reconstructing-again")
         self._make_parameters(state.request.value)
         self._make_target(state.request.value)
+        #: Boxes by the field of the request that they tick.
+        self._ticks = {name: getattr(self, name) for name in ("spectra", "refine", "override", "replace")}
         self._lay_out()
         self._connect()
         self.stops = [
@@ -121,12 +123,7 @@ class ReconstructionDialog(JobDialog):
 
     def _connect(self) -> None:
         change = self._control.change
-        for box, field in (
-            (self.spectra, "spectra"),
-            (self.refine, "refine"),
-            (self.override, "override"),
-            (self.replace, "replace"),
-        ):
+        for field, box in self._ticks.items():
             box.toggled.connect(lambda on, field=field: change(**{field: on}))
         for number, field in ((self.first, "start_nm"), (self.last, "stop_nm"), (self.step, "step_nm")):
             number.valueChanged.connect(lambda value, field=field: change(**{field: value}))
@@ -144,13 +141,8 @@ class ReconstructionDialog(JobDialog):
     # Show ------------------------------------------------------------------------------------------
 
     def _show_request(self, request: ReconstructionRequest) -> None:
-        for box, on in (
-            (self.spectra, request.spectra),
-            (self.refine, request.refine),
-            (self.override, request.override),
-            (self.replace, request.replace),
-        ):
-            box.setChecked(on)
+        for field, box in self._ticks.items():
+            box.setChecked(getattr(request, field))
         for widget in (self.first, self.last, self.step, self.model, self.solver):
             widget.setEnabled(request.spectra)
         self.override.setEnabled(request.calibration != OWN)

@@ -46,6 +46,15 @@ def theme_plots(plots: Iterable[Any], theme: Theme) -> None:
             axis.setLabel(axis.labelText)
 
 
+def theme_bar(bar: Any, theme: Theme) -> None:
+    """Apply the colours of a theme to a colour bar of pyqtgraph."""
+    for side in ("left", "right"):
+        axis = bar.getAxis(side)
+        axis.setTextPen(theme.text)
+        axis.setPen(theme.line)
+        axis.labelStyle["color"] = theme.text
+
+
 def time_ticks(low_s: float, high_s: float) -> Ticks:
     """Where seconds and minutes are marked.
 
