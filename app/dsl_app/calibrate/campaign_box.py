@@ -13,6 +13,7 @@ from dsl_app.calibrate.presentation import campaign_head
 from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.known_files import first_free
 from dsl_app.shared.widgets.forms import label, push_button, set_role, show_button
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
@@ -27,7 +28,7 @@ class NewCampaignDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("New campaign")
         self.resize(540, 200)
-        self.name = QLineEdit(_free_name(home))
+        self.name = QLineEdit(first_free(home, f"campaign-{datetime.now():%Y%m%d}").name)
         self.name.setAccessibleName("Name of the campaign")
         self.name.setToolTip("Name of the folder, and of the calibrated rig in the library")
         self.folder = QLineEdit(str(home))
@@ -147,13 +148,3 @@ class CampaignBox(QFrame):
         set_role(self._progress, head.progress_role)
         for name in ("new", "open", "keep", "cancel", "everything"):
             show_button(getattr(self, name), getattr(head, name))
-
-
-def _free_name(home: Path) -> str:
-    """A name with today's date that is free in a folder."""
-    stem = f"campaign-{datetime.now():%Y%m%d}"
-    name, count = stem, 1
-    while (home / name).exists():
-        count += 1
-        name = f"{stem}-{count}"
-    return name

@@ -8,6 +8,7 @@ from html import escape
 
 from dsl_app.calibrate.state import CalibrateState, Row, RowState
 from dsl_app.shared.button_state import ButtonState
+from dsl_app.shared.known_files import breakable
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
@@ -57,9 +58,7 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     places_itself = devices is not None and devices.place is not None
     title, place = "Calibrate", CAMPAIGN_HINT
     if facts is not None:
-        # Zero-width spaces let long paths break at their slashes.
-        folder = str(facts.path.parent).replace("/", "/" + chr(0x200B))
-        title, place = facts.path.name, f"in {folder}  ·  rig {facts.rig.words}"
+        title, place = facts.path.name, f"in {breakable(facts.path.parent)}  ·  rig {facts.rig.words}"
     return CampaignHead(
         title,
         place,

@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.known_files import breakable
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
@@ -127,7 +128,7 @@ class ImportDialog(JobDialog):
     def _show_found(self, found: Found | None) -> None:
         if found is None:
             return
-        self._folder.setText(_breakable(str(found.folder)))
+        self._folder.setText(breakable(found.folder))
         self._summary.setText(found.summary)
         self._form.setRowVisible(self._size, import_view(self._state).asks_size)
         self.table.show_rows([self._items(row) for row in found.rows])
@@ -137,8 +138,8 @@ class ImportDialog(JobDialog):
         harmless = row.status in ("misnamed", "extra", "optional")
         colour = theme.good if not row.is_odd else theme.warn if harmless else theme.bad
         return (
-            cell(_breakable(row.expected or "–")),
-            cell("as expected" if row.found == row.expected else _breakable(row.found or "–"), theme.muted),
+            cell(breakable(row.expected or "–")),
+            cell("as expected" if row.found == row.expected else breakable(row.found or "–"), theme.muted),
             cell(row.status, colour),
             cell(row.advice),
         )
@@ -187,11 +188,6 @@ class ImportDialog(JobDialog):
         if name:
             self.home.setText(name)
             self._rename()
-
-
-def _breakable(path: str) -> str:
-    """A path whose lines may break at its slashes, by zero-width spaces."""
-    return path.replace("/", "/" + chr(0x200B))
 
 
 def _row(field: QWidget, button: QPushButton) -> QHBoxLayout:

@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
 from dsl_app.shared.evented import Event, Value
+from dsl_app.shared.known_files import first_free
 
 if TYPE_CHECKING:
     from dsl_core.io.published import FileRecord
@@ -124,11 +125,7 @@ def summary_of(kind: str, records: Sequence[FileRecord]) -> str:
 
 def target_for(folder: Path, kind: str, home: Path) -> Path:
     """A path for what is imported that does not exist yet."""
-    target, count = home / f"{folder.name}{SUFFIXES[kind]}", 1
-    while target.exists():
-        count += 1
-        target = home / f"{folder.name}-{count}{SUFFIXES[kind]}"
-    return target
+    return first_free(home, folder.name, SUFFIXES[kind])
 
 
 def trouble_of(found: Found, request: ImportRequest) -> str:

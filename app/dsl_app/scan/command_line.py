@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from dsl_app.connection.state import RigChoice
+from dsl_app.shared.known_files import first_free
 from dsl_core.io.scan.folder import SUFFIX
 from dsl_core.io.scan.origin import rig_of_notes
 from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
@@ -61,9 +62,4 @@ def rig_words(notes: Mapping[str, object]) -> str:
 
 def fresh_target(folder: Path, now: datetime) -> Path:
     """A scan folder that does not exist yet, named by date and minute."""
-    stem = f"scan-{now:%Y%m%d-%H%M}"
-    target, count = folder / f"{stem}{SUFFIX}", 1
-    while target.exists():
-        count += 1
-        target = folder / f"{stem}-{count}{SUFFIX}"
-    return target
+    return first_free(folder, f"scan-{now:%Y%m%d-%H%M}", SUFFIX)

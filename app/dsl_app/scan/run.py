@@ -19,6 +19,7 @@ from dsl_app.scan.controls import progress_text, run_controls
 from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
@@ -99,8 +100,7 @@ class TargetBox(QGroupBox):
 
     def _show_target(self, target: Path) -> None:
         self.name.setText(target.stem)
-        # Zero-width spaces let long paths break at their slashes.
-        self._where.setText(f"in {str(target.parent).replace('/', '/' + chr(0x200B))}")
+        self._where.setText(f"in {breakable(target.parent)}")
 
     def _show_facts(self, facts: Facts | None) -> None:
         if facts is None:

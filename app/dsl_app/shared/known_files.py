@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from enum import Enum
+from itertools import chain, count
 from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
@@ -85,6 +86,17 @@ def meant_by(path: Path) -> Path:
     if path.name.endswith(_MARKS):
         return path.with_name(path.name.removesuffix(_MARKS) + ".zarr")
     return path
+
+
+def first_free(folder: Path, stem: str, suffix: str = "") -> Path:
+    """A path in a folder that does not exist yet: its name is the stem, with a number if that is taken."""
+    names = chain((stem,), (f"{stem}-{number}" for number in count(2)))
+    return next(path for name in names if not (path := folder / f"{name}{suffix}").exists())
+
+
+def breakable(path: Path | str) -> str:
+    """A path whose lines may break at its slashes, by zero-width spaces."""
+    return str(path).replace("/", "/" + chr(0x200B))
 
 
 def refusal(path: Path) -> str:

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from dsl_app.shared.known_files import Kind, kind_of, meant_by, refusal
+from dsl_app.shared.known_files import Kind, breakable, first_free, kind_of, meant_by, refusal
 from dsl_app.shared.settings import RecentFiles, Settings
 
 
@@ -51,6 +51,18 @@ def test_every_refusal_says_what_to_do(tmp_path: Path) -> None:
 
 def test_marks_mean_the_result_beside_them(tmp_path: Path) -> None:
     assert meant_by(tmp_path / "leaf.marks.json") == tmp_path / "leaf.zarr"
+
+
+def test_a_free_name_counts_on_from_those_that_are_taken(tmp_path: Path) -> None:
+    assert first_free(tmp_path, "scan.v1", ".dsl") == tmp_path / "scan.v1.dsl"
+    for name in ("scan.v1.dsl", "scan.v1-2.dsl", "scan.v1-4.dsl"):
+        (tmp_path / name).mkdir()
+    assert first_free(tmp_path, "scan.v1", ".dsl") == tmp_path / "scan.v1-3.dsl"
+    assert first_free(tmp_path, "campaign") == tmp_path / "campaign"
+
+
+def test_a_path_may_break_at_its_slashes() -> None:
+    assert breakable(Path("a/b/c")).split("\u200b") == ["a/", "b/", "c"]
 
 
 def test_recent_files_are_kept_in_the_settings(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import QToolTip, QWidget
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.layouts import column_of
+from dsl_app.shared.widgets.pictures import arrow_step
 from dsl_core.calibration.colour.patches import INNER, apply_homography, grid_corners
 from dsl_core.optics.charts import CHART_SHAPE
 
@@ -22,12 +23,6 @@ Floats = NDArray[np.float64]
 ROWS, COLUMNS = CHART_SHAPE
 #: Room between patches, px.
 GAP = 4.0
-_ARROWS = {
-    Qt.Key.Key_Left: (-1, 0),
-    Qt.Key.Key_Right: (1, 0),
-    Qt.Key.Key_Up: (0, -1),
-    Qt.Key.Key_Down: (0, 1),
-}
 
 
 def patch_outlines(corners_px: Floats) -> Floats:
@@ -102,15 +97,13 @@ class ChartPicture(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """1 to 4 choose a corner, arrows move it."""
-        key = Qt.Key(event.key())
+        key, step = Qt.Key(event.key()), arrow_step(event)
         if Qt.Key.Key_1 <= key <= Qt.Key.Key_4:
             self._chosen = int(key) - int(Qt.Key.Key_1)
             self._paint_corners()
-        elif key in _ARROWS:
-            step = 10 if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1
-            dx, dy = _ARROWS[key]
+        elif step is not None:
             corner = self.corners[self._chosen]
-            corner.setPos(corner.pos().x() + step * dx, corner.pos().y() + step * dy)
+            corner.setPos(corner.pos().x() + step[0], corner.pos().y() + step[1])
         else:
             super().keyPressEvent(event)
 

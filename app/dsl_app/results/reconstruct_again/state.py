@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_app.shared.evented import Event, Value
+from dsl_app.shared.known_files import first_free
 from dsl_core.errors import DslError, PlanError
 from dsl_core.model.spectral import WavelengthGrid
 
@@ -83,11 +84,7 @@ def target_of(request: ReconstructionRequest, source: ReconstructionSource) -> P
 
 def fresh_name(session: Path) -> str:
     """An unused name for a result of a scan."""
-    name, count = session.stem, 1
-    while session.with_name(name + RESULT_SUFFIX).exists():
-        count += 1
-        name = f"{session.stem}-{count}"
-    return name
+    return first_free(session.parent, session.stem, RESULT_SUFFIX).stem
 
 
 def bands_of(request: ReconstructionRequest) -> WavelengthGrid:
