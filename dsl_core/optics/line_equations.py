@@ -1,6 +1,7 @@
 """Normal equations of single scan lines: a line lights only a few neighbouring bands through one order.
 
 So their matrix is banded. Lines' light over a band comes from a table that pixels of like dispersion share.
+A pixel has one colour, that of its own filter; `dsl_core.optics.colour_neighbours` brings three together.
 """
 
 from __future__ import annotations
@@ -34,14 +35,23 @@ class LineEquations:
     """Adds the first orders of scan lines, one order and band at a time, over all pixels of a tile."""
 
     def __init__(
-        self, bands: Bands, lines: LineSet, blur_px: float, pixels: int, other: Tensor, offsets: bool = False
+        self,
+        bands: Bands,
+        lines: LineSet,
+        blur_px: float,
+        colour: Tensor,
+        other: Tensor,
+        offsets: bool = False,
     ) -> None:
-        """``blur_px`` is that of a line; ``offsets`` adds up as well what an offset of all frames does."""
-        self.bands, self.lines, self.blur_px = bands, lines, blur_px
-        self.matrix = torch.zeros((1, bands.count, pixels), device=other.device, dtype=other.dtype)
+        """``blur_px`` is that of a line, ``colour`` (pixels,) 0 to 2 for red, green and blue.
+
+        ``other`` gives device and precision; ``offsets`` adds up as well what an offset of all frames does.
+        """
+        self.bands, self.lines, self.blur_px, self.colour = bands, lines, blur_px, colour
+        self.matrix = torch.zeros((1, bands.count, len(colour)), device=other.device, dtype=other.dtype)
         self.right = torch.zeros_like(self.matrix[0])
-        #: Right side of an offset of one DN per ms in each colour, (3, bands, pixels), if it is asked for.
-        self.offset = torch.zeros((3, bands.count, pixels)).to(other) if offsets else None
+        #: Right side of an offset of one DN per ms, (bands, pixels), if it is asked for.
+        self.offset = torch.zeros_like(self.right) if offsets else None
         #: Bound of the diagonals left out, relative to the main one.
         self.dropped = 1e-6
         #: Weighted sum of squares of the data that entered, and their number, (pixels,).
@@ -56,7 +66,7 @@ class LineEquations:
         weight: Tensor,
         first_line: int,
     ) -> None:
-        """Add one order: ``radiance`` and ``weight`` are (3, frames, pixels), frame 0 being ``first_line``.
+        """Add one order: ``radiance`` and ``weight`` are (frames, pixels), frame 0 being ``first_line``.
 
         Bands are taken in groups that share one window of lines, so that data are gathered once a group.
         """
@@ -80,11 +90,11 @@ class LineEquations:
         reached = [j for j, any_pixel in enumerate(inside.any(1).tolist()) if any_pixel]
         if not reached:
             return
-        white = like(self.bands.moments[order].sum(1), columns)
+        white = like(self.bands.moments[order].sum(1), columns)[self.colour].T.contiguous()
         masked = None if bool(inside[reached[0] : reached[-1] + 1].all()) else inside
         weighted = radiance * weight
         self._add_squares(columns, inside, radiance, weight, weighted, first_line, table.support_px)
-        flat = weight.reshape(3, -1), weighted.reshape(3, -1)
+        flat = weight.reshape(-1), weighted.reshape(-1)
         for start in range(reached[0], reached[-1] + 1, GROUP):
             group = range(start, min(start + GROUP, reached[-1] + 1))
             stop = min(group[-1] + bandwidth, reached[-1]) + 1
@@ -108,12 +118,11 @@ class LineEquations:
     ) -> None:
         low = torch.where(inside, columns, torch.inf).amin(0) - support_px
         high = torch.where(inside, columns, -torch.inf).amax(0) + support_px
-        index = torch.arange(first_line, first_line + radiance.shape[1], device=columns.device)[:, None]
+        index = torch.arange(first_line, first_line + len(radiance), device=columns.device)[:, None]
         centre = self.lines.centre_px(index)
         used = ((centre > low) & (centre < high)).to(radiance.dtype)
-        for c in range(3):
-            self.square += (weighted[c] * radiance[c] * used).sum(0)
-            self.samples += ((weight[c] > 0) * used).sum(0)
+        self.square += (weighted * radiance * used).sum(0)
+        self.samples += ((weight > 0) * used).sum(0)
 
     def _add_group(
         self,
@@ -127,7 +136,7 @@ class LineEquations:
         table: ProfileTable,
     ) -> None:
         pixels = columns.shape[1]
-        count = flat[0].shape[1] // pixels
+        count = len(flat[0]) // pixels
         ends = columns[[group[0], group[-1]]]
         lowest, span = ends.amin(0), float((ends[1] - ends[0]).abs().max())
         window = math.ceil((span + 2 * table.support_px) / self.lines.step_px) + 1
@@ -139,22 +148,16 @@ class LineEquations:
             frame.clip_(0, count - 1) * pixels
             + torch.arange(pixels, device=columns.device, dtype=torch.int32)
         ).reshape(-1)
-        weights, weighted = (values.index_select(1, index) for values in flat)
+        weights, weighted = (values.index_select(0, index).reshape(window, pixels) for values in flat)
         relative = columns[group[0] : stop] - (start * self.lines.step_px + self.lines.first_px)
         profiles = table.at(relative[:, None] - (offsets * self.lines.step_px))
         profiles[: len(group)] *= valid
         if inside is not None:
             profiles *= inside[group[0] : stop, None]
         for i, j in enumerate(group):
-            own = profiles[i]
+            own = weights * profiles[i]
             if self.offset is not None:
-                self.offset[:, j] += (white[:, j, None, None] * weights.reshape(3, window, pixels) * own).sum(
-                    1
-                )
-            self.right[j] += ((white[:, j] @ weighted).reshape(window, pixels) * own).sum(0)
+                self.offset[j] += white[j] * own.sum(0)
+            self.right[j] += white[j] * (weighted * profiles[i]).sum(0)
             reach = profiles[i : i + self.matrix.shape[0]]
-            pairs = (white[:, j, None] * white[:, j : j + len(reach)]).T
-            mixed = (pairs @ weights).reshape(len(reach), window, pixels)
-            mixed *= own
-            mixed *= reach
-            self.matrix[: len(reach), j] += mixed.sum(1)
+            self.matrix[: len(reach), j] += white[j] * white[j : j + len(reach)] * (reach * own).sum(1)

@@ -63,8 +63,8 @@ class Traced:
     direct: Tensor
     orders: dict[int, Footprint]
 
-    def part(self, which: slice) -> Traced:
-        """Some of the pixels."""
+    def part(self, which: slice | Tensor) -> Traced:
+        """Some of the pixels, by a slice or their indices."""
         orders = {m: Footprint(f.columns[:, which], f.rows[:, which]) for m, f in self.orders.items()}
         return Traced(self.column_px[which], self.direct[which], orders)
 
@@ -173,14 +173,15 @@ class PixelModel:
         weighted = flat * w
         return weighted.mT @ flat, (weighted.mT @ y)[..., 0], (w * y * y).sum((1, 2))
 
-    def line_equations(self, other: Tensor, blur_px: float = 0.0, offsets: bool = False) -> LineEquations:
+    def line_equations(self, colour: Tensor, other: Tensor, offsets: bool = False) -> LineEquations:
         """Banded normal equations of unit shading, to which the orders of single lines are added.
 
-        ``other`` (pixels,) gives their number and precision; ``offsets`` as for `LineEquations`.
+        Each pixel has the one ``colour`` (pixels,) of its filter; ``other`` and ``offsets`` as for
+        `LineEquations`.
         """
         assert self.lines is not None
-        blur = self.response(blur_px).blur_px
-        return LineEquations(self.bands, self.lines, blur, len(other), other, offsets)
+        blur = self.response(0.0).blur_px
+        return LineEquations(self.bands, self.lines, blur, colour, other, offsets)
 
     def frames(self, columns_px: Tensor, inside: Tensor) -> range:
         """Frames of single lines that light any band (bands, pixels) that is inside; empty when none does."""

@@ -15,6 +15,7 @@ from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.demosaic import demosaic_variance
 from dsl_core.optics.pixel_model import DEMOSAIC_SPREAD, EDGE_PX, PixelModel, demosaic_blur_px, without_offset
@@ -151,7 +152,8 @@ def spectrum(centres_nm: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[An
 
 def test_the_pixel_has_bands_just_inside_and_just_outside_the_margin(readers: Readers) -> None:
     """Otherwise the next test would not see an edge that is elsewhere."""
-    _, traced = readers.solver().tile(slice(0, 16), slice(0, 40))
+    solver = readers.solver()
+    traced = solver.trace(solver.frames(slice(0, 16), slice(0, 40)))
     beyond = traced.orders[1].columns[:, 0] - (readers.column + BEYOND_PX - 0.5)
     assert ((beyond > 0) & (beyond < EDGE_PX)).any()
     assert ((beyond > EDGE_PX) & (beyond < EDGE_PX + 2)).any(), beyond
@@ -160,7 +162,8 @@ def test_the_pixel_has_bands_just_inside_and_just_outside_the_margin(readers: Re
 def test_solver_prediction_and_graph_expect_the_same_frames(readers: Readers) -> None:
     solver, virtual = readers.solver(), readers.virtual()
     nodes = torch.as_tensor(spectrum(solver.bands.centres_nm))
-    frames, traced = solver.tile(slice(0, 16), slice(0, 40))
+    frames = solver.frames(slice(0, 16), slice(0, 40))
+    traced = solver.trace(frames)
     shading = frames.known("shading")
     solved = solver.model.operator(traced, shading, frames.blur_px()).forward(nodes[:, None])[..., 0]
     both = virtual.matrices.first[0] + virtual.matrices.zero[0]
@@ -200,6 +203,13 @@ def test_the_solvers_equations_are_those_of_the_predictions_operator(
     mosaic = np.ones(SIZE[::-1])
     weight = 1 / demosaic_variance(mosaic, readers.rig.sensor.bayer)[:, readers.pixel[1], readers.pixel[0]]
     operator = virtual.matrices.first[0] + (0 if single else virtual.matrices.zero[0])
+    if single:
+        # Without neighbours a pixel has its own sample only, where it is: no mean of columns blurs it.
+        traced = solver.trace(solver.frames(slice(0, 16), slice(0, 40)))
+        one = torch.ones(1, dtype=torch.float64)
+        operator = solver.model.operator(traced, one, 0.0, solver.model.orders).matrix()[0]
+        colour = bayer_colours(readers.rig.sensor.bayer, *(np.array([i]) for i in readers.pixel[::-1]))
+        weight = np.eye(3)[colour[0]]
     wanted = torch.einsum("c,cfi,cfj->ij", torch.as_tensor(weight), operator, operator) * readers.shading**2
     found = banded.to_dense(data)[0] if single else data[0]
     assert torch.equal(found.diagonal() > 0, wanted.diagonal() > 0), "other bands belong to the model"

@@ -36,13 +36,16 @@ def random_equations(count: int, seed: int, dtype: torch.dtype) -> Equations:
     noise = np.geomspace(6e-3, 6, 64)[rng.integers(0, 64, count)]
     weight_of_noise = torch.as_tensor(1 / (noise**2 + (0.01 * rng.uniform(0, 1, (3, 1, count))) ** 2))
     weight = weight_of_noise.expand(-1, plan.spectral_count, -1).to(dtype)
-    system = LineEquations(bands, lines, rig.projector_response.blur_px, count, depth)
-    nothing = torch.zeros((3, plan.spectral_count, count), dtype=dtype)
-    for order in ORDERS:
-        footprint = GratingModel(rig).trace(pixels, depth, order, bands.centroids_nm[order])
-        inside = footprint.inside(*plan.projector_size_px)
-        system.add(order, footprint.columns, inside, nothing, weight, 0)
-    data = system.positive_matrix()
+    data = torch.zeros((0, 0, 0))
+    for colour in range(3):
+        which = torch.full((count,), colour)
+        system = LineEquations(bands, lines, rig.projector_response.blur_px, which, depth)
+        nothing = torch.zeros((plan.spectral_count, count), dtype=dtype)
+        for order in ORDERS:
+            footprint = GratingModel(rig).trace(pixels, depth, order, bands.centroids_nm[order])
+            inside = footprint.inside(*plan.projector_size_px)
+            system.add(order, footprint.columns, inside, nothing, weight[colour], 0)
+        data = data + system.positive_matrix() if colour else system.positive_matrix()
     truth = torch.as_tensor(_spectra(bands.centres_nm, count, rng)).to(dtype)
     right = multiply(data, truth) + _noise(data, rng).to(dtype)
     moments = torch.as_tensor(bands.moments[0].sum(1).T).to(dtype)

@@ -14,7 +14,9 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import Reach
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.colour_neighbours import ColourNeighbours, bayer_colours
 from dsl_core.optics.correspondence import Correspondence, like
+from dsl_core.optics.line_equations import LineEquations
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, Traced
 from dsl_core.optics.spectra import ORDERS, Bands
@@ -138,44 +140,77 @@ class SpectralReconstruction:
     def _pixels_and_depth(self, flat: NDArray[np.intp]) -> tuple[Tensor, Tensor]:
         return torch.as_tensor(flat, device=self.device), self._map(self.pixels.depth_mm, flat)
 
-    def tile(self, rows: slice, columns: slice) -> tuple[TileFrames, Traced]:
-        """What is measured of the valid pixels of a part of the picture, and where their light comes from."""
+    def frames(self, rows: slice, columns: slice) -> TileFrames:
+        """What is measured of the valid pixels of a part of the picture."""
         like = torch.empty(0, device=self.device, dtype=self.dtype)
-        frames = TileFrames(self.rig, self.radiance, self.std, self.pixels, rows, columns, like)
-        traced = self.model.trace(*self._pixels_and_depth(frames.flat), frames.known("column_px"))
-        return frames, traced
+        return TileFrames(self.rig, self.radiance, self.std, self.pixels, rows, columns, like)
+
+    def trace(self, frames: TileFrames) -> Traced:
+        """Where the light of pixels comes from."""
+        return self.model.trace(*self._pixels_and_depth(frames.flat), frames.known("column_px"))
 
     @torch.inference_mode()
     def _tile(self, rows: slice, columns: slice, out: SpectralMaps, check: Check) -> None:
         if not self.pixels.valid[rows, columns].any():
             return
-        frames, traced = self.tile(rows, columns)
-        check()
-        spectra, misfit = (self._banded if self.model.single else self._dense)(frames, traced, check)
+        frames = self.frames(rows, columns)
+        if self.model.single:
+            # The samples of pixels just outside the tile belong to pixels inside it.
+            height, width = self.pixels.valid.shape
+            near = self.frames(
+                *(
+                    slice(max(part.start - 1, 0), min(part.stop + 1, size))
+                    for part, size in ((rows, height), (columns, width))
+                )
+            )
+            traced = self.trace(near)
+            check()
+            spectra, misfit = self._banded(frames, near, traced, check)
+            traced = traced.part(torch.as_tensor(np.searchsorted(near.flat, frames.flat), device=self.device))
+        else:
+            traced = self.trace(frames)
+            check()
+            spectra, misfit = self._dense(frames, traced, check)
         self._store(spectra, misfit, frames, traced, out)
 
-    def _banded(self, frames: TileFrames, traced: Traced, check: Check) -> tuple[Spectra, Tensor]:
+    def _banded(
+        self, frames: TileFrames, near: TileFrames, traced: Traced, check: Check
+    ) -> tuple[Spectra, Tensor]:
+        """Spectra and reduced chi-square of a tile from the samples ``near`` it, whose light was traced."""
         shading = frames.known("shading")
-        offset_variance = frames.offset_variance()
-        unsure = bool(offset_variance.any())
-        system = self.model.line_equations(shading, frames.blur_px(), unsure)
+        system, offset = self._samples(near, traced, check)
+        gather = ColourNeighbours(
+            self.rig.sensor.bayer, frames.rows, frames.columns, near.place(), frames.place()
+        )
+        matrix, right, square, samples = (
+            gather.sum(values)
+            for values in (system.positive_matrix(), system.right, system.square, system.samples)
+        )
+        scaled = right * shading
+        rows = self._colour_rows(frames, shading, scaled)
+        check()
+        spectra = solve_spectra(matrix * shading**2, scaled, rows, self.prior, check)
+        if offset is not None:
+            spectra = with_offset(spectra, matrix * shading**2, gather.sum(offset) * shading**2, self.prior)
+        radiance = spectra.nodes * shading
+        explained = (radiance * (2 * right - multiply(matrix, radiance))).sum(0)
+        return spectra, (square - explained) / (samples - PARAMETERS).clip(min=1)
+
+    def _samples(
+        self, frames: TileFrames, traced: Traced, check: Check
+    ) -> tuple[LineEquations, Tensor | None]:
+        """Equations of the pixels' own colours alone, and the variance that offsets give their right side."""
+        variance = frames.known("offset_std") ** 2
+        colour = torch.as_tensor(bayer_colours(self.rig.sensor.bayer, *frames.place()), device=self.device)
+        system = self.model.line_equations(colour, variance, bool(variance.any()))
         for order, footprint in traced.orders.items():
             inside = self.model.inside(footprint)
             lit = self.model.frames(footprint.columns, inside)
-            if lit:
+            if lit and self.model.lines is not None:
                 check()
-                radiance, weight = frames.colours(lit, self.model.lines)
+                radiance, weight = frames.samples(lit, self.model.lines)
                 system.add(order, footprint.columns, inside, radiance, weight, lit.start)
-        right = system.right * shading
-        rows = self._colour_rows(frames, shading, right)
-        check()
-        matrix = system.positive_matrix() * shading**2
-        spectra = solve_spectra(matrix, right, rows, self.prior, check)
-        if system.offset is not None:
-            spectra = with_offset(spectra, matrix, system.offset * shading, offset_variance, self.prior)
-        radiance = spectra.nodes * shading
-        explained = (radiance * (2 * system.right - multiply(system.matrix, radiance))).sum(0)
-        return spectra, (system.square - explained) / (system.samples - PARAMETERS).clip(min=1)
+        return system, None if system.offset is None else variance * system.offset**2
 
     def _colour_rows(self, frames: TileFrames, shading: Tensor, right: Tensor) -> Tensor | None:
         """Weighted zero-order equations (bands, 3, pixels), added to ``right``; None if unneeded."""
@@ -193,7 +228,7 @@ class SpectralReconstruction:
         from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 
         shading, blur = frames.known("shading"), frames.blur_px()
-        radiance, weight = frames.colours(range(len(self.radiance)), None)
+        radiance, weight = frames.colours()
         colour, _ = frames.zero_order_colour()
         light = self.model.zero_light(shading, blur)
         direct = self.model.direct_light(light, traced.column_px, colour)
@@ -249,14 +284,13 @@ class SpectralReconstruction:
         out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
 
 
-def with_offset(spectra: Spectra, matrix: Tensor, offset: Tensor, variance: Tensor, prior: Prior) -> Spectra:
-    """Spectra less sure by an offset of all frames with a variance (3, pixels).
+def with_offset(spectra: Spectra, matrix: Tensor, variance: Tensor, prior: Prior) -> Spectra:
+    """Spectra less sure by unknown offsets that all frames of a sample share.
 
-    An offset with the right side ``offset`` (3, bands, pixels) looks like a grey that gives the same.
+    ``variance`` (bands, pixels) is theirs in the right side. An offset looks like a grey that gives the same.
     """
     grey = multiply(matrix, torch.ones_like(spectra.std)) + prior.level_std**-2
-    change = (variance[:, None] * (offset / grey) ** 2).sum(0).sqrt()
-    return replace(spectra, std=torch.hypot(spectra.std, change))
+    return replace(spectra, std=torch.hypot(spectra.std, variance.sqrt() / grey))
 
 
 def tile_shape(bands: int) -> tuple[int, int]:

@@ -54,10 +54,12 @@ class TileFrames:
         All comes in the precision and on the device of ``like``.
         """
         self.response, self.bayer, self.like = rig.projector_response, rig.sensor.bayer, like
+        self.rows, self.columns = rows, columns
         inside = np.nonzero(pixels.valid[rows, columns])
         y, x = (at + part.start for at, part in zip(inside, (rows, columns), strict=True))
-        #: Flat indices of the tile's valid pixels in the picture.
-        self.flat = y * pixels.valid.shape[1] + x
+        self.width = pixels.valid.shape[1]
+        #: Flat indices of the tile's valid pixels in the picture, ascending.
+        self.flat = y * self.width + x
         near = np.s_[max(rows.start - 2, 0) : rows.stop + 2, max(columns.start - 2, 0) : columns.stop + 2]
         self._radiance, self._std = radiance[:, *near], std[:, *near]
         self._near = Pixels(**{name: values[near] for name, values in vars(pixels).items()})
@@ -75,21 +77,23 @@ class TileFrames:
         """Spread of the projector columns that demosaicing averages, px."""
         return demosaic_blur_px(self._near.column_px)
 
-    def colours(self, frames: range, lines: LineSet | None) -> tuple[Tensor, Tensor]:
-        """Radiance without offset, and halo of lines, and weight of some frames, each (3, frames, pixels)."""
-        part = slice(frames.start, frames.stop)
-        y = self._tensor(self._radiance[part])
-        variance = self._tensor(self._std[part]) ** 2
-        y = y - self._tensor(self._near.offset)
-        if lines is not None:
-            index = torch.arange(frames.start, frames.stop, device=y.device)[:, None, None]
-            distance = self._tensor(self._near.column_px) - lines.centre_px(index).to(y.dtype)
-            y = y - self._tensor(self._near.amplitude) * halo_of_line(distance, lines.width_px, self.response)
+    def colours(self) -> tuple[Tensor, Tensor]:
+        """Radiance of all frames without offset, in three colours, and its weight, (3, frames, pixels)."""
+        y = self._tensor(self._radiance) - self._tensor(self._near.offset)
         rgb = self._pick(demosaic(y, self.bayer))
-        spread = self._pick(demosaic_variance(variance, self.bayer))
-        weight = spread.addcmul_(rgb, rgb, value=MODEL_ERROR**2).reciprocal_()
-        # An infinite variance has weight zero by itself; NaN must not survive the product.
-        return torch.nan_to_num_(rgb, 0.0, 0.0, 0.0), torch.nan_to_num_(weight, 0.0, 0.0, 0.0)
+        return weighted(rgb, self._pick(demosaic_variance(self._tensor(self._std) ** 2, self.bayer)))
+
+    def samples(self, frames: range, lines: LineSet) -> tuple[Tensor, Tensor]:
+        """Radiance without offset and halo of lines, and weight, of the pixels' own colour.
+
+        Each has shape (frames, pixels).
+        """
+        part = slice(frames.start, frames.stop)
+        y, std = (self._tensor(values[part]).flatten(1)[:, self.at] for values in (self._radiance, self._std))
+        index = torch.arange(frames.start, frames.stop, device=y.device)[:, None]
+        distance = self.known("column_px") - lines.centre_px(index).to(y.dtype)
+        halo = halo_of_line(distance, lines.width_px, self.response)
+        return weighted(y - self.known("offset") - self.known("amplitude") * halo, std**2)
 
     def _pick(self, images: Tensor) -> Tensor:
         """The tile's pixels of colour images (frames, 3, rows, columns), as (3, frames, pixels)."""
@@ -106,6 +110,18 @@ class TileFrames:
         colour = demosaic(self._tensor(self._near.amplitude), self.bayer).reshape(3, -1)[:, self.at]
         return colour, self._variance(self._near.amplitude_std)
 
+    def place(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the pixels in the picture."""
+        rows, columns = np.divmod(self.flat, self.width)
+        return rows, columns
+
     def _variance(self, std: NDArray[np.float32]) -> Tensor:
         """Variance in three colours of independent deviations (rows, columns), (3, pixels)."""
         return demosaic_variance(self._tensor(std) ** 2, self.bayer).reshape(3, -1)[:, self.at]
+
+
+def weighted(values: Tensor, variance: Tensor) -> tuple[Tensor, Tensor]:
+    """Values and their weight, with the error of the model itself."""
+    weight = variance.addcmul_(values, values, value=MODEL_ERROR**2).reciprocal_()
+    # An infinite variance has weight zero by itself; NaN must not survive the product.
+    return torch.nan_to_num_(values, 0.0, 0.0, 0.0), torch.nan_to_num_(weight, 0.0, 0.0, 0.0)

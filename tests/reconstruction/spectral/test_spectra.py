@@ -24,8 +24,8 @@ def test_tiles_shrink_with_the_bands_so_that_memory_stays() -> None:
 def test_an_offset_that_looks_like_a_grey_makes_spectra_as_unsure() -> None:
     prior = Prior()
     matrix = torch.full((1, BANDS, 1), 1e8)
-    like_grey = (matrix[0] + prior.level_std**-2).expand(3, -1, -1)
+    like_grey = matrix[0] + prior.level_std**-2
     spectra = Spectra.empty(torch.zeros((BANDS, 1)))
     spectra.std[:] = 0.004
-    variance = torch.tensor([[0.003**2], [0.0], [0.0]])
-    assert with_offset(spectra, matrix, like_grey, variance, prior).std.numpy() == pytest.approx(0.005)
+    variance = (0.003 * like_grey) ** 2
+    assert with_offset(spectra, matrix, variance, prior).std.numpy() == pytest.approx(0.005)
