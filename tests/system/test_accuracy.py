@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
 from dsl_core import pipeline
 from dsl_core.evaluation.summary import Evaluation, Truth
@@ -181,8 +182,10 @@ def test_pixels_of_the_order_gap_keep_a_spectrum() -> None:
     scanned = scan("leaves", GAP, COLUMNS_ONLY)
     result = scanned.reconstruct()
     valid = (result["flags"].values & int(DEPTH_INVALID)) == 0
-    gap = valid & (result["reach"].values == int(Reach.ZERO_ONLY)).all(0)
-    some = valid & (result["reach"].values == int(Reach.ZERO_ONLY)).any(0) & ~gap
+    unlit = result["reach"].values == int(Reach.ZERO_ONLY)
+    gap = valid & unlit.all(0)
+    # Samples of neighbours belong to a pixel as well: its bands count as unlit where they do for all of them.
+    some = valid & minimum_filter(unlit, (1, 3, 3)).any(0) & ~gap
     assert min(gap.sum(), some.sum()) > 300
     assert np.isfinite(result["reflectance"].values[:, valid]).all()
     unreached = (result["flags"].values & int(Flag.BANDS_UNREACHED)) != 0
