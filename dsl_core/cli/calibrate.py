@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,7 +14,11 @@ from dsl_core.cli.options import Force, Json, RigOptions, parse_options
 from dsl_core.cli.output import Output
 from dsl_core.cli.pictures import BoardOptions, PictureOptions, calibrate_pictures
 from dsl_core.errors import CalibrationError
-from dsl_core.evaluation.cost import StageTimer
+from dsl_core.evaluation.cost import StageCost, StageTimer
+
+if TYPE_CHECKING:
+    from dsl_core.devices.base import DeviceRig
+    from dsl_core.io.campaign_folder import CampaignFolder
 
 calibrate = typer.Typer(
     help="Calibrate a rig step by step; the folder of a campaign keeps all captures.", no_args_is_help=True
@@ -168,14 +172,18 @@ def all_(
         opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
     ):
         with output.progress() as progress:
-            calibrated = calibrate_all(
-                folder,
-                devices,
-                guide,
-                progress,
-                name,
-                stage=timer.stage,
-            )
+            try:
+                calibrated = calibrate_all(
+                    folder,
+                    devices,
+                    guide,
+                    progress,
+                    name,
+                    stage=timer.stage,
+                )
+            except CalibrationError:
+                _save_so_far(folder, devices, output, timer.stages)
+                raise
         made = write_products(folder, calibrated, calibrated.name if library else None, timer.stages)
     output.costs(timer.stages)
     output.say(f"The calibrated rig is saved in {made.rig}, its report in {made.report}.")
@@ -184,6 +192,20 @@ def all_(
     output.put(rig=made.rig, report=made.report, library=made.entry)
     output.put(figures={note.name: figures_json(note.figures) for note in calibrated.calibrations})
     output.finish()
+
+
+def _save_so_far(
+    campaign: CampaignFolder, devices: DeviceRig, output: Output, stages: Sequence[StageCost]
+) -> None:
+    """Save the rig as far as its calibrations were accepted, so that a late refusal leaves a usable one."""
+    from dsl_core.campaign.guide import calibrated_rig
+    from dsl_core.campaign.products import write_products
+
+    try:
+        made = write_products(campaign, calibrated_rig(campaign, devices), None, stages)
+    except CalibrationError:
+        return  # nothing was accepted
+    output.say(f"The rig as calibrated so far is saved in {made.rig}, its report in {made.report}.")
 
 
 def _settings_by_name(texts: list[str]) -> dict[str, dict[str, str]]:

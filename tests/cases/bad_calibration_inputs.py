@@ -248,9 +248,10 @@ CASES = (
     ),
     BadInput(
         "plane not flat at one position",
-        "fit of the depth stage",
+        "figures of the depth stage",
         _redo("depth-stage", "position-740"),
-        r"stage's position 740 mm are \d\.\d+ mm RMS off a plane",
+        r"Depth stage was not accepted: scatter about the plane \d\.\d+ mm. Columns scatter by 0\.\d+ px,"
+        r" worst at 740 mm",
         {"bow_mm": "5"},
         touched=_depth_stage("position-740"),
     ),
@@ -264,7 +265,7 @@ CASES = (
     ),
     BadInput(
         "one step of the stage is not what was asked",
-        "fit of the depth stage",
+        "capture of the plane",
         _redo("depth-stage", "position-850"),
         r"position \d+ mm is .* mm from where the other positions put it",
         {"stage_scale": "1.03"},
@@ -272,9 +273,9 @@ CASES = (
     ),
     BadInput(
         "all steps of the stage are too long",
-        "fit of the depth stage",
+        "capture of the second plane",
         _redo("depth-stage", *PLANES),
-        r"planes are 1\.0\d+ times as far apart as the stage's positions 620, 740, 850 mm",
+        r"planes are 1\.0\d+ times as far apart as the stage's positions 620, 740 mm",
         {"stage_scale": "1.04"},
         touched=_depth_stage(*PLANES),
     ),

@@ -82,6 +82,15 @@ def test_one_command_makes_a_rig_a_report_and_a_library_entry(give: Give, tmp_pa
     assert ScanReader(tmp_path / "a.dsl").calibration == rig
 
 
+def test_a_late_refusal_leaves_the_rig_as_calibrated_so_far(give: Give, tmp_path: Path) -> None:
+    folder = tmp_path / "campaign"
+    ending = give("calibrate", "all", folder, *TWIN, "--yes", "--set", "geometry.largest_dn=0")
+    assert (ending.code, "was not accepted: brightest" in ending.sentence) == (2, True)
+    assert [note.name for note in load_rig(folder / "rig.json").calibrations] == ["selftest"]
+    assert "The rig as calibrated so far is saved in" in ending.out
+    assert CalibrationLibrary().names() == ()
+
+
 @pytest.mark.parametrize(("folder", "named"), [("lab (1)", []), ("lab", ["--name", "lab/1"])])
 def test_a_name_that_the_library_cannot_take_is_told_before_anything_is_captured(
     give: Give, tmp_path: Path, folder: str, named: list[str]

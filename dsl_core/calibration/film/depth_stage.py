@@ -231,6 +231,7 @@ def _positions(data: StageData, planes: PlaneRefinement) -> tuple[StagePosition,
             distance_mm=float(1 / np.linalg.norm(plane.inverse)),
             plane_rms_mm=float(planes.plane_rms_mm[k]),
             column_rms_px=float(planes.residual_rms_px[k]),
+            column_limit_px=float(planes.limit_px[k]),
             step_error_mm=float(planes.step_error_mm[k]),
             step_std_mm=float(planes.step_std_mm[k]),
         )

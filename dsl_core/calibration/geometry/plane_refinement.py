@@ -21,12 +21,13 @@ from dsl_core.calibration.geometry.stage_planes import (
     SLOPES,
     STEPS,
     StageProblem,
+    column_limit_px,
     columns_at,
     plane_of,
     rays_through,
     require_agreement,
-    require_alike,
-    require_flat,
+    require_enough,
+    require_plane,
     require_steps,
     require_tiles,
 )
@@ -49,12 +50,12 @@ class PlaneRefinement:
 
     ``rig`` and ``planes`` are those of the fitted ``numbers`` of a ``problem``, ``posterior`` the covariance
     of these. ``plane_rms_mm`` is the scatter of the points of each position about its plane (the 95 % nearest
-    to it), ``step_error_mm`` how far each position is from where the stage says, with its deviation.
-    ``covariance`` (24, 24) is that of the refined lenses and pose; ``column_std_px`` is what it means for
-    zero-order columns and ``depth_std_mm`` for depths, rms over the image and the range of depth. ``pull`` is
-    how far lenses and pose had to move, in their deviations before, rms: about one or less if all is well.
-    ``bow_mm`` is by how much the target seems to bulge towards the camera, over 300 mm, with its deviation;
-    the planes are fitted as if it did not.
+    to it), ``residual_rms_px`` the same in columns and ``limit_px`` what it may be; ``step_error_mm`` is how
+    far each position is from where the stage says, with its deviation. ``covariance`` (24, 24) is that of the
+    refined lenses and pose; ``column_std_px`` is what it means for zero-order columns and ``depth_std_mm``
+    for depths, rms over the image and the range of depth. ``pull`` is how far lenses and pose had to move, in
+    their deviations before, rms: about one or less if all is well. ``bow_mm`` is by how much the target seems
+    to bulge towards the camera, over 300 mm, with its deviation; the planes are fitted as if it did not.
     """
 
     problem: StageProblem
@@ -64,6 +65,7 @@ class PlaneRefinement:
     planes: tuple[Plane, ...]
     plane_rms_mm: Floats
     residual_rms_px: Floats
+    limit_px: Floats
     step_error_mm: Floats
     step_std_mm: Floats
     covariance: Floats
@@ -105,15 +107,16 @@ def refine_planes(
     """Refine lenses and pose of ``rig``, whose covariance (24, 24) is the prior; None keeps them.
 
     ``positions_mm`` are what the stage reported, ``samples`` the tile means of each position. Raises
-    `CalibrationError` that names the position whose plane is not flat, or whose step is not what was asked.
+    `CalibrationError` that names the position that shows no plane, or whose step is not what was asked.
     """
     require_tiles(positions_mm, samples)
     start, rise = _start(rig, positions_mm, samples, stage_std_mm)
     problem = StageProblem(rig, positions_mm, samples, covariance, stage_std_mm)
     free = np.arange(SHARED if covariance is None else 0, len(start))
     numbers, posterior = _gauss_newton(problem, start, free)
-    found = _summary(rig, problem, numbers, posterior)
-    require_flat(positions_mm, found.plane_rms_mm)
+    limits = np.array([column_limit_px(part) for part in samples])
+    found = _summary(rig, problem, numbers, posterior, limits)
+    require_plane(positions_mm, found.residual_rms_px)
     require_agreement(found.pull, found.bow_mm, found.bow_std_mm, rise)
     return found
 
@@ -162,6 +165,26 @@ def _start(
     rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
 ) -> tuple[Floats, float]:
     """Plane of each position for itself under the geometry given, and how long steps are by it."""
+    slopes, distances = _alone(rig, positions_mm, samples, stage_std_mm)
+    rise = require_steps(positions_mm, distances)
+    start = np.zeros(STEPS + len(samples))
+    start[SLOPES] = slopes.mean(0)
+    steps = np.asarray(positions_mm) - positions_mm[0]
+    start[DISTANCE] = np.median(distances - steps)
+    return start, rise
+
+
+def plane_distance_mm(rig: Rig, position_mm: float, samples: ColumnSamples) -> float:
+    """Distance of one plane under the geometry given; raises `CalibrationError` when there is none."""
+    require_enough(position_mm, samples)
+    _, distances = _alone(rig, [position_mm], [samples], 1.0)
+    return float(distances[0])
+
+
+def _alone(
+    rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
+) -> tuple[Floats, Floats]:
+    """Slopes (positions, 2) and distances (positions,) of the planes, each for itself."""
     slopes, distances, scatter = [], [], []
     for part in samples:
         alone = StageProblem(rig, [0.0], [part], None, stage_std_mm)
@@ -172,17 +195,14 @@ def _start(
             numbers, _ = _gauss_newton(alone, numbers, np.array(free), prior=False)
         slopes.append(numbers[SLOPES])
         distances.append(float(numbers[DISTANCE]))
-        scatter.append(_rms(alone.residual_px(numbers) / _per_mm(alone, numbers)))
-    require_alike(positions_mm, np.array(scatter))
-    rise = require_steps(positions_mm, np.array(distances))
-    start = np.zeros(STEPS + len(samples))
-    start[SLOPES] = np.mean(slopes, 0)
-    steps = np.asarray(positions_mm) - positions_mm[0]
-    start[DISTANCE] = np.median(np.array(distances) - steps)
-    return start, rise
+        scatter.append(_rms(alone.residual_px(numbers)))
+    require_plane(positions_mm, np.array(scatter))
+    return np.array(slopes), np.array(distances)
 
 
-def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats) -> PlaneRefinement:
+def _summary(
+    rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats, limit_px: Floats
+) -> PlaneRefinement:
     shared = problem.shared(numbers)
     covariance = problem.root @ posterior[:SHARED, :SHARED] @ problem.root.T
     refined, planes = _found(rig, problem, numbers)
@@ -199,6 +219,7 @@ def _summary(rig: Rig, problem: StageProblem, numbers: Floats, posterior: Floats
         planes=planes,
         plane_rms_mm=np.array([_rms(residual[part] / slope[part]) for part in each]),
         residual_rms_px=np.array([_rms(residual[part]) for part in each]),
+        limit_px=limit_px,
         step_error_mm=numbers[STEPS:] - numbers[STEPS:].mean(),
         step_std_mm=np.sqrt(np.diag(posterior)[STEPS:].clip(0)),
         covariance=covariance,

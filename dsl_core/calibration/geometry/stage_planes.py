@@ -32,10 +32,15 @@ GAIN_STD = 1e-4
 BOW_RADIUS_MM = 150.0
 #: Tiles a position needs.
 MIN_TILES = 30
-#: What a stage or a plane may be off (mm) before it is taken as wrong, and by how much a stage's scale.
-MAX_STEP_ERROR_MM, MAX_PLANE_RMS_MM, MAX_SCALE_ERROR = 0.3, 0.3, 0.02
-#: What a board leaves open of the scale, and how many times less flat than others a wrong plane is.
-UNSURE_SCALE, LESS_FLAT = 0.002, 2.0
+#: What a stage may be off (mm) before it is taken as wrong, and by how much its scale.
+MAX_STEP_ERROR_MM, MAX_SCALE_ERROR = 0.3, 0.02
+#: What a board leaves open of the scale.
+UNSURE_SCALE = 0.002
+#: How far columns may scatter about a plane: what models of lenses and of line profiles leave (px), the share
+#: of a camera pixel that an unevenly sampled line moves by, and so many deviations of their own noise.
+MODEL_PX, SAMPLING_SHARE, NOISE_SIGMAS = 0.03, 0.01, 3.0
+#: Columns that scatter more about a plane (px) are not those of a plane at all.
+NO_PLANE_PX = 0.5
 #: How far planes may pull the geometry, in its own deviations (rms).
 MAX_PULL = 4.0
 
@@ -155,23 +160,29 @@ def require_tiles(positions_mm: Sequence[float], samples: Sequence[ColumnSamples
             f"The depth stage needs a plane at two or more positions, not {len(samples)}. Add positions."
         )
     for position, part in zip(positions_mm, samples, strict=True):
-        if len(part) < MIN_TILES:
-            raise CalibrationError(
-                f"At the stage's position {position:g} mm only {len(part)} tiles of the image show"
-                f" columns of the projector; {MIN_TILES} are needed. Check that the plane fills the view."
-            )
+        require_enough(position, part)
 
 
-def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> float:
+def require_enough(position_mm: float, samples: ColumnSamples) -> None:
+    """Raise `CalibrationError` when a position shows too few tiles."""
+    if len(samples) < MIN_TILES:
+        raise CalibrationError(
+            f"At the stage's position {position_mm:g} mm only {len(samples)} tiles of the image show"
+            f" columns of the projector; {MIN_TILES} are needed. Check that the plane fills the view."
+        )
+
+
+def require_steps(positions_mm: Sequence[float], distances_mm: Sequence[float] | Floats) -> float:
     """How many times as far apart as the stage says the planes stand by the geometry before it is refined.
 
     Raises `CalibrationError` when that is far from one, or one of them stands elsewhere.
     """
     positions = np.asarray(positions_mm, float)
     tolerance = MAX_STEP_ERROR_MM + UNSURE_SCALE * float(np.ptp(positions))
-    rise, offset = np.polyfit(positions - positions.mean(), distances_mm, 1)
-    bent = np.abs(distances_mm - offset - rise * (positions - positions.mean())).max() > tolerance
-    off = distances_mm - positions
+    distances = np.asarray(distances_mm, float)
+    rise, offset = np.polyfit(positions - positions.mean(), distances, 1)
+    bent = np.abs(distances - offset - rise * (positions - positions.mean())).max() > tolerance
+    off = distances - positions
     off -= np.median(off)
     worst = int(np.abs(off).argmax())
     if bent and abs(off[worst]) > tolerance:
@@ -189,22 +200,31 @@ def require_steps(positions_mm: Sequence[float], distances_mm: Floats) -> float:
     return float(rise)
 
 
-def require_alike(positions_mm: Sequence[float], rms_mm: Floats) -> None:
-    """Raise `CalibrationError` naming a position that is far less flat than the others.
+def column_limit_px(samples: ColumnSamples) -> float:
+    """How far the columns of a flat target may scatter about their plane (rms, px).
 
-    Before the geometry is refined it bends planes, but all alike.
+    A limit in millimetres would mean another error of columns at every distance. It follows the capture: its
+    noise, and by how many columns its camera pixels are apart.
     """
-    require_flat(positions_mm, rms_mm, MAX_PLANE_RMS_MM + LESS_FLAT * float(np.median(rms_mm)))
+    x, y = (samples.camera_px - samples.camera_px.mean(0)).T
+    slope = np.linalg.lstsq(np.stack([x, y], 1), samples.column_px - samples.column_px.mean(), rcond=None)[0]
+    sampling_px = SAMPLING_SHARE * float(np.hypot(*slope))
+    noise_px = NOISE_SIGMAS * float(np.sqrt(np.mean(samples.std_px**2)))
+    return float(np.sqrt(MODEL_PX**2 + sampling_px**2 + noise_px**2))
 
 
-def require_flat(positions_mm: Sequence[float], rms_mm: Floats, limit_mm: float = MAX_PLANE_RMS_MM) -> None:
-    """Raise `CalibrationError` naming the position whose points scatter too far about their plane."""
-    worst = int(rms_mm.argmax())
-    if rms_mm[worst] > limit_mm:
+def require_plane(positions_mm: Sequence[float], rms_px: Floats) -> None:
+    """Raise `CalibrationError` naming the position whose columns are not those of a plane at all.
+
+    Smaller errors are a figure of the calibration, which a person may accept.
+    """
+    worst = int(rms_px.argmax())
+    if rms_px[worst] > NO_PLANE_PX:
         raise CalibrationError(
-            f"The points at the stage's position {positions_mm[worst]:g} mm are {rms_mm[worst]:.2f} mm RMS"
-            f" off a plane; {limit_mm:.2g} mm are allowed. Use a flat target that fills the view, and check"
-            " that all positions were captured with this rig."
+            f"The columns at the stage's position {positions_mm[worst]:g} mm are {rms_px[worst]:.2f} px RMS"
+            f" off those of a plane; beyond {NO_PLANE_PX:g} px nothing can be fitted. Check that a flat"
+            " target fills the view, that nothing stands before it, and that this position was captured with"
+            " this rig; capture it again."
         )
 
 

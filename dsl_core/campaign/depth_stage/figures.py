@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dsl_core.model.calibration.chain import ChainCorrection
-from dsl_core.model.calibration.depth_stage import DepthStageCalibration
+from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
 from dsl_core.model.figure import Figure
 
-#: Flatness of a plane and error of a stage's step, mm; error of columns that a fit never saw, px.
-MAX_PLANE_MM, MAX_STEP_MM, MAX_HELD_OUT_PX = 0.15, 0.1, 0.3
+#: Error of a stage's step, mm; error of columns that a fit never saw, px.
+MAX_STEP_MM, MAX_HELD_OUT_PX = 0.1, 0.3
+#: One plane scatters for itself when all others have less than this share of its scatter of columns.
+ALONE = 0.5
 #: How far planes may move the geometry, in its deviations, before it is in doubt.
 MAX_PULL = 1.8
 #: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
@@ -19,7 +21,7 @@ MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
 
 def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
     """Flatness, steps, what depth leaves open, held-out error, the film, and doubts."""
-    flat = max(record.positions, key=lambda each: each.plane_rms_mm)
+    flat = max(record.positions, key=lambda each: each.column_rms_px / each.column_limit_px)
     step = max(record.positions, key=lambda each: abs(each.step_error_mm))
     film = [
         Figure(
@@ -42,8 +44,8 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             name="scatter about the plane",
             value=flat.plane_rms_mm,
             unit="mm",
-            high=MAX_PLANE_MM,
-            advice=f"Use a flatter target, or check the lenses; worst at {flat.position_mm:g} mm.",
+            high=flat.plane_limit_mm,
+            advice=_plane_advice(record, flat),
         ),
         Figure(
             name="error of the stage's steps",
@@ -79,6 +81,18 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             high=0.0,
             advice=". ".join(record.warnings),
         ),
+    )
+
+
+def _plane_advice(record: DepthStageCalibration, worst: StagePosition) -> str:
+    """What may be wrong: the target where one plane is worse than all others, else the models as well."""
+    others = [each.column_rms_px for each in record.positions if each is not worst]
+    what = f"Columns scatter by {worst.column_rms_px:.3f} px, worst at {worst.position_mm:g} mm"
+    if max(others, default=0.0) < ALONE * worst.column_rms_px:
+        return f"{what} and much less elsewhere: check the target there and capture this position again."
+    return (
+        f"{what}, alike at all positions: the model of the line profile or of the lenses may be too simple"
+        " for this rig, or the target is not flat. Check the focus, and compare with another target."
     )
 
 

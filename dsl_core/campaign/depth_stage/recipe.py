@@ -10,6 +10,8 @@ import numpy as np
 from dsl_core.calibration.common.tiles import ColumnSamples, tile_columns
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibrate_depth_stage
 from dsl_core.calibration.film.order_paths import LineFrames, thinned
+from dsl_core.calibration.geometry.plane_refinement import plane_distance_mm
+from dsl_core.calibration.geometry.stage_planes import require_steps
 from dsl_core.campaign.common.flat_target import (
     diffuser_lines,
     line_frames,
@@ -34,6 +36,7 @@ from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, apply_depth_stage
 from dsl_core.model.figure import Figure
 from dsl_core.model.frames import FrameSource
+from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.result import DEPTH_INVALID
@@ -41,7 +44,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import Progress
 
-STAGE_NOTE = "stage.json"
+STAGE_NOTE, PLANE_NOTE = "stage.json", "plane.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
 LONGER = 3.0
 
@@ -53,6 +56,16 @@ class StageNote(Record):
     filter_nm: float | None = None
     transmission: SpectralCurve | None = None
     measured: bool = False
+
+
+class PlaneNote(Record):
+    """Where a plane stands by the geometry of its time, which was that of the lenses and the pose."""
+
+    position_mm: float
+    distance_mm: float
+    camera: Lens
+    projector: Lens
+    pose: Pose
 
 
 @dataclass(frozen=True)
@@ -100,9 +113,15 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         return film_light(shoot_white(bench), bench.rig)
 
     def capture(self, bench: Bench, step: Step, progress: Progress) -> None:
-        """Move the stage, choose exposures by a test shot, and scan; a scan that was begun continues."""
+        """Move the stage, choose exposures by a test shot, and scan; a scan that was begun continues.
+
+        Raises `CalibrationError` when the plane just captured is none, or stands elsewhere than the stage
+        says: found at the end, it would cost all captures in between.
+        """
         note = self._move(bench, step)
         bench.scan(step, lambda: self._begin(bench, step, note), progress)
+        if step.placement.filter_nm is None:
+            self._check(bench, step, progress)
 
     def fit(self, bench: Bench, progress: Progress) -> DepthStageCalibration:
         """Calibrate from the captures of all steps."""
@@ -173,6 +192,33 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
             settings=(Setting(exposure_ms=max(cycles, 1) * rig.frame_period_ms, level=bright.level),),
             code_settings=(0,),
         )
+
+    def _check(self, bench: Bench, step: Step, progress: Progress) -> None:
+        """Compare a plane with those of the positions before it."""
+        plain = [each for each in self.steps(bench) if each.placement.filter_nm is None]
+        plain = [each for each in plain[: plain.index(step)] if bench.is_scanned(each)] + [step]
+        planes = [self._plane(bench, each, progress, each is step) for each in plain]
+        if len(planes) > 1:
+            with naming(step):
+                require_steps([each.position_mm for each in planes], [each.distance_mm for each in planes])
+
+    def _plane(self, bench: Bench, step: Step, progress: Progress, new: bool) -> PlaneNote:
+        """Where a position's plane stands, as noted when it was captured if the geometry is still that."""
+        geometry = (bench.rig.camera, bench.rig.projector, bench.rig.pose)
+        if not new and (bench.step_folder(step) / PLANE_NOTE).exists():
+            note = bench.kept(step, PLANE_NOTE, PlaneNote)
+            if (note.camera, note.projector, note.pose) == geometry:
+                return note
+        position_mm = bench.kept(step, STAGE_NOTE, StageNote).position_mm
+        columns = self._columns(bench, step, progress)
+        with naming(step):
+            distance_mm = plane_distance_mm(bench.rig, position_mm, columns)
+        camera, projector, pose = geometry
+        note = PlaneNote(
+            position_mm=position_mm, distance_mm=distance_mm, camera=camera, projector=projector, pose=pose
+        )
+        bench.keep(step, PLANE_NOTE, note)
+        return note
 
     def _columns(self, bench: Bench, step: Step, progress: Progress) -> ColumnSamples:
         with naming(step):

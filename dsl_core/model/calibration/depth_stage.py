@@ -13,7 +13,8 @@ from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid, Film, Rig
 class StagePosition(Record):
     """The plane at one position of the stage.
 
-    ``plane_rms_mm`` is the scatter of the points about it, ``column_rms_px`` the same in projector columns;
+    ``plane_rms_mm`` is the scatter of the points about it, ``column_rms_px`` the same in projector columns
+    and ``column_limit_px`` what that may be (in older records what lenses and line profiles leave);
     ``step_error_mm`` is how far the plane stands from where the stage says, relative to the other positions.
     """
 
@@ -22,8 +23,14 @@ class StagePosition(Record):
     distance_mm: float
     plane_rms_mm: float
     column_rms_px: float
+    column_limit_px: float = 0.03
     step_error_mm: float
     step_std_mm: float
+
+    @property
+    def plane_limit_mm(self) -> float:
+        """What the scatter may be in mm at this distance."""
+        return self.column_limit_px * self.plane_rms_mm / max(self.column_rms_px, 1e-9)
 
 
 class FilterSeen(Record):

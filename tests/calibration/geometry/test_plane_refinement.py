@@ -132,10 +132,14 @@ def _samples(truth: Rig) -> list[ColumnSamples]:
     return [seen(truth, distance, rng) for distance in distances_mm(rng)]
 
 
-def test_a_bowed_plane_is_named() -> None:
+def test_a_bowed_plane_misses_its_limit_and_no_plane_at_all_is_refused() -> None:
     truth, samples = small_rig(), _samples(small_rig())
     samples[1] = seen(truth, 750.0, np.random.default_rng(0), bow_mm=3.0)
-    with pytest.raises(CalibrationError, match=r"750 mm are .* mm RMS off a plane"):
+    found = refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
+    missed = found.residual_rms_px > found.limit_px
+    assert missed.tolist() == [False, True, False]
+    samples[1] = seen(truth, 750.0, np.random.default_rng(0), bow_mm=40.0)
+    with pytest.raises(CalibrationError, match=r"750 mm are .* px RMS off those of a plane"):
         refine_planes(truth, POSITIONS_MM, samples, None, STAGE_STD_MM)
 
 

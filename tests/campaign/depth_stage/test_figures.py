@@ -1,0 +1,66 @@
+"""Planes are judged in columns, whatever a column is in millimetres at their distance."""
+
+from __future__ import annotations
+
+import pytest
+
+from dsl_core.campaign.depth_stage.figures import depth_stage_figures
+from dsl_core.model.calibration.depth_stage import DepthStageCalibration, HeldOutError, StagePosition
+from dsl_core.model.figure import Figure
+from dsl_core.simulation.published_rig import published_rig
+
+RIG = published_rig()
+#: Millimetres a column at 600 and 900 mm.
+MM_PER_PX = {600.0: 6.5, 900.0: 14.6}
+
+
+def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
+    """The figure of planes whose columns scatter by so much at each position."""
+    positions = tuple(
+        StagePosition(
+            position_mm=mm,
+            tilt_deg=0.1,
+            distance_mm=mm,
+            plane_rms_mm=px * MM_PER_PX[mm],
+            column_rms_px=px,
+            column_limit_px=limit_px,
+            step_error_mm=0.0,
+            step_std_mm=0.01,
+        )
+        for mm, px in rms_px.items()
+    )
+    record = DepthStageCalibration.model_construct(
+        positions=positions,
+        film=RIG.film,
+        film_std=dict.fromkeys(
+            ("lines_per_mm", "distance_mm", "tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm"), 0.1
+        ),
+        geometry_pull=1.0,
+        bow_mm=None,
+        depth_std_mm=0.1,
+        held_out=(HeldOutError(kept_out="x", grating_px=0.1, hybrid_px=0.1, noise_px=0.1),),
+        chain=None,
+        warnings=(),
+    )
+    return next(each for each in depth_stage_figures(record) if each.name == "scatter about the plane")
+
+
+def test_the_same_error_of_columns_passes_at_every_distance() -> None:
+    # .026 px are .38 mm at 900 mm: what a rig with another line profile leaves.
+    figure = plane_figure({600.0: 0.026, 900.0: 0.026})
+    assert figure.passed
+    assert plane_figure({600.0: 0.02, 900.0: 0.026}).value == pytest.approx(0.38, abs=0.005)
+    assert figure.high == pytest.approx(0.04 * MM_PER_PX[600.0])
+
+
+def test_planes_that_all_scatter_do_not_put_the_blame_on_the_target() -> None:
+    figure = plane_figure({600.0: 0.06, 900.0: 0.07})
+    assert not figure.passed
+    assert "0.070 px, worst at 900 mm, alike at all positions" in figure.advice
+    assert figure.advice.index("line profile") < figure.advice.index("target is not flat")
+
+
+def test_a_plane_that_is_worse_than_all_others_is_named() -> None:
+    figure = plane_figure({600.0: 0.09, 900.0: 0.01})
+    assert not figure.passed
+    assert "worst at 600 mm and much less elsewhere: check the target there" in figure.advice
