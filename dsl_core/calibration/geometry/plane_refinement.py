@@ -165,7 +165,7 @@ def _start(
     rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
 ) -> tuple[Floats, float]:
     """Plane of each position for itself under the geometry given, and how long steps are by it."""
-    slopes, distances = _alone(rig, positions_mm, samples, stage_std_mm)
+    slopes, distances, _ = _alone(rig, positions_mm, samples, stage_std_mm)
     rise = require_steps(positions_mm, distances)
     start = np.zeros(STEPS + len(samples))
     start[SLOPES] = slopes.mean(0)
@@ -174,17 +174,20 @@ def _start(
     return start, rise
 
 
-def plane_distance_mm(rig: Rig, position_mm: float, samples: ColumnSamples) -> float:
-    """Distance of one plane under the geometry given; raises `CalibrationError` when there is none."""
+def lone_plane(rig: Rig, position_mm: float, samples: ColumnSamples) -> tuple[float, float]:
+    """Distance (mm) of one plane under the geometry given, and scatter of its columns (px).
+
+    Raises `CalibrationError` when there is no plane.
+    """
     require_enough(position_mm, samples)
-    _, distances = _alone(rig, [position_mm], [samples], 1.0)
-    return float(distances[0])
+    _, distances, scatter = _alone(rig, [position_mm], [samples], 1.0)
+    return float(distances[0]), float(scatter[0])
 
 
 def _alone(
     rig: Rig, positions_mm: Sequence[float], samples: Sequence[ColumnSamples], stage_std_mm: float
-) -> tuple[Floats, Floats]:
-    """Slopes (positions, 2) and distances (positions,) of the planes, each for itself."""
+) -> tuple[Floats, Floats, Floats]:
+    """Slopes (positions, 2), distances and scatter of columns (positions,) of the planes, each for itself."""
     slopes, distances, scatter = [], [], []
     for part in samples:
         alone = StageProblem(rig, [0.0], [part], None, stage_std_mm)
@@ -197,7 +200,7 @@ def _alone(
         distances.append(float(numbers[DISTANCE]))
         scatter.append(_rms(alone.residual_px(numbers)))
     require_plane(positions_mm, np.array(scatter))
-    return np.array(slopes), np.array(distances)
+    return np.array(slopes), np.array(distances), np.array(scatter)
 
 
 def _summary(

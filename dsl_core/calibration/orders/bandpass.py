@@ -17,7 +17,13 @@ from dsl_core.calibration.orders.efficiency import (
     second_order_curve,
     second_order_share,
 )
-from dsl_core.calibration.orders.filter_check import PlacedFilter, effective_nm, found_wavelengths, verdict
+from dsl_core.calibration.orders.filter_check import (
+    NOISE_SIGMAS,
+    PlacedFilter,
+    effective_nm,
+    found_wavelengths,
+    verdict,
+)
 from dsl_core.calibration.orders.order_light import FilterLight
 from dsl_core.calibration.orders.order_place import MIN_PIXELS, PlanePixels, by_cell
 from dsl_core.calibration.orders.response import BandSample, fit_response
@@ -154,7 +160,8 @@ def _check(
             each.light.orders[order] for order in ORDERS if np.isfinite(each.light.orders[order].offset_px)
         ]
         width = max((light.width_px for light in first), default=0.0)
-        share = min((light.share for light in first), default=1.0)
+        # Noise between the orders looks like light that is spread out.
+        share = min((light.share + NOISE_SIGMAS * light.share_std for light in first), default=1.0)
         unusable, sentence = verdict(place, where, width, share)
         shift = each.light.shift_px[0]
         if abs(shift) > MOVED_PX:

@@ -14,10 +14,11 @@ from dsl_core.optics.filters import FINE_NM, moved, passed
 
 Floats = NDArray[np.float64]
 
-#: Centres of measured and of nominal curves are as good as this, nm; beyond a few times that, a filter tilts
-#: (always to the blue) or is another one.
+#: Centres of measured and of nominal curves are as good as this, nm.
 MEASURED_NM, NOMINAL_NM = 0.5, 1.5
-DOUBT_SIGMAS, WRONG_NM = 3.0, 7.0
+#: A filter that is off by more than this (nm) tilts (always to the blue), or is another one; the shift counts
+#: less so many deviations, since a dim filter cannot be judged to a nanometre.
+DOUBT_NM, WRONG_NM, NOISE_SIGMAS = 1.5, 4.0, 2.0
 #: The data sheet's line density of a film is as good as this.
 DENSITY_STD = 0.04
 #: Fewer filters than this are compared with the film's data sheet, not with each other.
@@ -109,17 +110,19 @@ def verdict(
     if found is None:
         return False, f"{name}: no first order stands out; it is left out"
     shift, std = found[0] - each.effective_nm, found[1]
-    if abs(shift) > max(WRONG_NM, DOUBT_SIGMAS * std):
+    certain = abs(shift) - NOISE_SIGMAS * std
+    if certain > WRONG_NM:
         return True, (
-            f"{name}: its first orders are where those of {found[0]:.0f} nm should be. This is not the"
-            " requested filter; put the right one in front of the camera and capture the step again"
+            f"{name}: its first orders are where those of {found[0]:.0f} ± {std:.0f} nm should be."
+            " This is not the requested filter; put the right one in front of the camera and capture the step"
+            " again"
         )
-    if abs(shift) > DOUBT_SIGMAS * std:
+    if certain > DOUBT_NM:
         why = "it may be tilted in the beam" if shift < 0 else "its curve is not the one assumed"
         return (
             False,
-            f"{name}: it passes wavelengths {abs(shift):.1f} nm {'shorter' if shift < 0 else 'longer'} than"
-            f" it should; {why}",
+            f"{name}: it passes wavelengths {abs(shift):.1f} ± {std:.1f} nm"
+            f" {'shorter' if shift < 0 else 'longer'} than it should; {why}",
         )
     return False, ""
 

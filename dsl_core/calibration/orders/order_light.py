@@ -38,7 +38,8 @@ class OrderLight:
 
     ``ratio`` and ``std`` are those of the three colours (NaN, infinite: not seen). ``offset_px`` is the
     distance of the peak from the zero order in the middle of the image, with its deviation (NaN: not found);
-    ``share`` how much of all light where first orders may be is in the peak; ``width_px`` its rms width.
+    ``share`` how much of all light where first orders may be is in the peak, with its deviation; ``width_px``
+    its rms width.
     """
 
     order: int
@@ -49,6 +50,7 @@ class OrderLight:
     share: float
     width_px: float
     pixels: int
+    share_std: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -139,4 +141,14 @@ def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: floa
         scatter = float(np.std(apart) / np.sqrt(len(apart) - 1)) if len(apart) > 2 else 0.0
         spread[colour] = max(noise, scatter)
     middle = float(place.at(np.array([[0.5], [0.5]]))[0])
-    return OrderLight(order, ratio, spread, middle, place.std_px, place.share, place.width_px, int(use.sum()))
+    return OrderLight(
+        order,
+        ratio,
+        spread,
+        middle,
+        place.std_px,
+        place.share,
+        place.width_px,
+        int(use.sum()),
+        place.share_std,
+    )

@@ -140,13 +140,14 @@ def by_cell(pixels: PlanePixels, which: NDArray[np.bool_]) -> list[NDArray[np.bo
 class OrderPlace:
     """Signed distance of an order from the zero order as a quadratic over the image.
 
-    ``std_px`` is its deviation in the middle of the image; ``share`` the part of the light in the peak;
-    ``width_px`` the rms width of the peak.
+    ``std_px`` is its deviation in the middle of the image, noise included; ``share`` the part of the light in
+    the peak with what noise makes of it; ``width_px`` the rms width of the peak.
     """
 
     coefficients: Floats
     std_px: float
     share: float
+    share_std: float
     width_px: float
 
     def at(self, place: Floats) -> Floats:
@@ -173,9 +174,12 @@ def find_second(graph: LineGraph, sign: int, first: OrderPlace | None) -> OrderP
     middle = float(np.median(np.abs(lined)))
     scale = middle / np.maximum(np.abs(lined), 1e-6)
     reach = (SECOND_PLACE[0] * middle, SECOND_PLACE[1] * middle)
-    place, share, width = _peak(graph, everywhere, sign * graph.distance * scale, reach, SECOND_HALF_PX)
-    times = place / middle if np.isfinite(place) else float(np.mean(SECOND_PLACE))
-    return OrderPlace(first.coefficients * times, first.std_px * times, share, width)
+    peak = _peak(graph, everywhere, sign * graph.distance * scale, reach, SECOND_HALF_PX)
+    times = float(np.mean(SECOND_PLACE)) if peak is None else peak.centre_px / middle
+    coefficients, std_px = first.coefficients * times, first.std_px * times
+    if peak is None:
+        return OrderPlace(coefficients, std_px, 0.0, 0.0, np.nan)
+    return OrderPlace(coefficients, std_px, peak.share, peak.share_std, peak.width_px)
 
 
 def _terms(place: Floats) -> Floats:
@@ -193,17 +197,16 @@ def _fit(
     """Peaks of all cells around a centre (P,), and the quadratic through them."""
     distance = sign * (graph.distance - centre)
     use = np.ones(len(centre), bool) if before is None else graph.holds(centre, INSIDE_PX)
-    peaks, places, widths, shares = [], [], [], []
+    peaks, values, places = [], [], []
     for which in by_cell(graph.pixels, use):
-        peak, share, width = _peak(graph, which, distance, reach_px, ORDER_HALF_PX)
-        if np.isfinite(peak):
-            peaks.append(sign * peak + (float(centre[which].mean()) if before is None else 0.0))
+        peak = _peak(graph, which, distance, reach_px, ORDER_HALF_PX)
+        if peak is not None:
+            peaks.append(peak)
+            values.append(sign * peak.centre_px + (float(centre[which].mean()) if before is None else 0.0))
             places.append(graph.pixels.place[:, which].mean(1))
-            shares.append(share)
-            widths.append(width)
     if not peaks:
         return None
-    value, place = np.array(peaks), np.array(places).T
+    value, place = np.array(values), np.array(places).T
     near = np.abs(value - np.median(value)) < (3 * OUTLIER_PX if before is None else OUTLIER_PX)
     terms = _terms(place[:, near])
     # Few cells carry a constant only; a little damping keeps a quadratic from bending where no cell is.
@@ -211,12 +214,26 @@ def _fit(
     change = np.linalg.solve(terms.T @ terms + damping, terms.T @ value[near])
     left = value[near] - terms @ change
     coefficients = change if before is None else before.coefficients + change
-    share = float(np.median(shares)) if before is None else before.share
+    share = float(np.median([peak.share for peak in peaks])) if before is None else before.share
+    share_std = float(np.median([peak.share_std for peak in peaks])) / np.sqrt(len(peaks))
+    share_std = share_std if before is None else before.share_std
     # Where few cells see the order, the middle of the image is far from them.
     middle = _terms(np.array([[0.5], [0.5]]))[0]
     lever = float(middle @ np.linalg.solve(terms.T @ terms + damping, middle))
-    std_px = float(np.hypot(np.sqrt((left**2).mean()), CELL_PX) * np.sqrt(lever))
-    return OrderPlace(coefficients, std_px, share, float(np.median(widths)))
+    noise_px = float(np.median([peak.centre_std_px for peak in peaks]))
+    std_px = float(np.sqrt((left**2).mean() + CELL_PX**2 + noise_px**2) * np.sqrt(lever))
+    return OrderPlace(coefficients, std_px, share, share_std, float(np.median([p.width_px for p in peaks])))
+
+
+@dataclass(frozen=True)
+class _Peak:
+    """The brightest peak of lined-up signals: centre and rms width (px), its share of the light."""
+
+    centre_px: float
+    centre_std_px: float
+    share: float
+    share_std: float
+    width_px: float
 
 
 def _peak(
@@ -225,11 +242,10 @@ def _peak(
     distance: Floats,
     reach_px: tuple[float, float],
     half_px: float,
-) -> tuple[float, float, float]:
-    """Centre (px, NaN: none) of the brightest peak of lined-up signals, its share of the light, its width."""
-    nothing = np.nan, 0.0, np.nan
+) -> _Peak | None:
+    """The brightest peak of some pixels (P,) with deviations by the noise of their signals; None for none."""
     if which.sum() < MIN_PIXELS:
-        return nothing
+        return None
     low, high = reach_px[0] - half_px, reach_px[1] + half_px
     own = distance[:, which]
     inside = (own > low) & (own < high)
@@ -246,19 +262,27 @@ def _peak(
     ratio = np.where(enough, sums / np.where(enough, below, 1), -np.inf)
     best = int(ratio.argmax())
     if not sums[best] > MIN_SIGMAS * np.sqrt(spread[best]) or ratio[best] < MIN_SHARE:
-        return nothing
-    density = np.where(enough & (reference > 0), light / np.where(reference > 0, reference, 1), 0.0)
+        return None
+    known, below = enough & (reference > 0), np.where(reference > 0, reference, 1)
+    density, spread = np.where(known, light / below, 0.0), np.where(known, noise / below**2, 0.0)
     at = low + (np.arange(bins) + 0.5) * BIN_PX
     centre = float(at[best])
     for _ in range(5):
         window = np.abs(at - centre) < half_px
         total = float(density[window].sum())
         if not total > 0:
-            return nothing
+            return None
         centre = float((density * at)[window].sum()) / total
     window = np.abs(at - centre) < half_px
     total = float(density[window].sum())
     if not (total > 0 and reach_px[0] <= centre <= reach_px[1]):
-        return nothing
+        return None
     width = float(np.sqrt(max((density * (at - centre) ** 2)[window].sum() / total, 0.0)))
-    return centre, total / float(density.sum()), width
+    every = float(density.sum())
+    return _Peak(
+        centre,
+        float(np.sqrt((spread * (at - centre) ** 2)[window].sum())) / total,
+        total / every,
+        abs(total / every**2) * float(np.sqrt(spread[~window].sum())),
+        width,
+    )

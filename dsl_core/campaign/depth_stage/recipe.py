@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +10,8 @@ import numpy as np
 from dsl_core.calibration.common.tiles import ColumnSamples, tile_columns
 from dsl_core.calibration.film.depth_stage import StageData, StageFilter, calibrate_depth_stage
 from dsl_core.calibration.film.order_paths import LineFrames, thinned
-from dsl_core.calibration.geometry.plane_refinement import plane_distance_mm
-from dsl_core.calibration.geometry.stage_planes import require_steps
+from dsl_core.calibration.geometry.plane_refinement import lone_plane
+from dsl_core.calibration.geometry.stage_planes import column_limit_px, require_steps
 from dsl_core.campaign.common.flat_target import (
     diffuser_lines,
     line_frames,
@@ -47,6 +47,8 @@ from dsl_core.progress import Progress
 STAGE_NOTE, PLANE_NOTE = "stage.json", "plane.json"
 #: First orders are so much dimmer than white that lines may be exposed longer; the zero order saturates.
 LONGER = 3.0
+#: A plane that scatters this many times as much as those before it is the one that is wrong.
+LESS_FLAT = 2.0
 
 
 class StageNote(Record):
@@ -59,10 +61,15 @@ class StageNote(Record):
 
 
 class PlaneNote(Record):
-    """Where a plane stands by the geometry of its time, which was that of the lenses and the pose."""
+    """Where a plane stands by the geometry of its time, which was that of the lenses and the pose.
+
+    ``column_rms_px`` is the scatter of columns about it, which bends of the geometry are part of.
+    """
 
     position_mm: float
     distance_mm: float
+    column_rms_px: float
+    column_limit_px: float
     camera: Lens
     projector: Lens
     pose: Pose
@@ -200,7 +207,7 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         planes = [self._plane(bench, each, progress, each is step) for each in plain]
         if len(planes) > 1:
             with naming(step):
-                require_steps([each.position_mm for each in planes], [each.distance_mm for each in planes])
+                _require_steps(planes)
 
     def _plane(self, bench: Bench, step: Step, progress: Progress, new: bool) -> PlaneNote:
         """Where a position's plane stands, as noted when it was captured if the geometry is still that."""
@@ -212,10 +219,16 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
         position_mm = bench.kept(step, STAGE_NOTE, StageNote).position_mm
         columns = self._columns(bench, step, progress)
         with naming(step):
-            distance_mm = plane_distance_mm(bench.rig, position_mm, columns)
+            distance_mm, rms_px = lone_plane(bench.rig, position_mm, columns)
         camera, projector, pose = geometry
         note = PlaneNote(
-            position_mm=position_mm, distance_mm=distance_mm, camera=camera, projector=projector, pose=pose
+            position_mm=position_mm,
+            distance_mm=distance_mm,
+            column_rms_px=rms_px,
+            column_limit_px=column_limit_px(columns),
+            camera=camera,
+            projector=projector,
+            pose=pose,
         )
         bench.keep(step, PLANE_NOTE, note)
         return note
@@ -241,6 +254,22 @@ class DepthStageRecipe(Recipe[DepthStageCalibration]):
                 scans.append(diffuser_lines(bench.scan_of(step), rig, progress))
         progress.report("chain", 0, 1)
         return chain_correction(rig, scans, reflectance=self.reflectance)
+
+
+def _require_steps(planes: Sequence[PlaneNote]) -> None:
+    """Raise `CalibrationError` when the last plane stands elsewhere than the stage says, and why it may."""
+    last = planes[-1]
+    try:
+        require_steps([each.position_mm for each in planes], [each.distance_mm for each in planes])
+    except CalibrationError as error:
+        others_px = max(each.column_rms_px for each in planes[:-1])
+        if last.column_rms_px < last.column_limit_px + LESS_FLAT * others_px:
+            raise
+        raise CalibrationError(
+            f"The columns at the stage's position {last.position_mm:g} mm scatter by"
+            f" {last.column_rms_px:.2f} px about a plane, those captured before by {others_px:.2f} px: the"
+            " target is not flat, or something stands before it. Put a flat target in place and capture this position again."
+        ) from error
 
 
 def _plain_step(position_mm: float) -> Step:

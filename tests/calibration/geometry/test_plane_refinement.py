@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.geometry.bundle import CAMERA
-from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, refine_planes
+from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, lone_plane, refine_planes
 from dsl_core.calibration.geometry.stage_planes import columns_at, plane_of, rays_through, shared_parameters
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
@@ -154,6 +154,16 @@ def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
         match=r"planes contradict the geometry .* bulge towards the camera by -?\d\.\d\d ± 0\.0\d mm",
     ):
         refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
+
+
+def test_one_plane_is_looked_at_while_it_still_stands_there() -> None:
+    truth, rng = small_rig(), np.random.default_rng(0)
+    distance, scatter = lone_plane(truth, 750.0, seen(truth, 740.0, rng))
+    assert (distance, scatter) == (pytest.approx(740.0, abs=0.05), pytest.approx(NOISE_PX, rel=0.2))
+    _, bowed = lone_plane(truth, 750.0, seen(truth, 740.0, rng, bow_mm=3.0))
+    assert bowed > 10 * scatter
+    with pytest.raises(CalibrationError, match=r"750 mm are .* px RMS off those of a plane"):
+        lone_plane(truth, 750.0, seen(truth, 740.0, rng, bow_mm=40.0))
 
 
 def test_a_step_that_was_not_made_is_named() -> None:

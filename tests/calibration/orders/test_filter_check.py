@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,7 @@ def test_wrong_filter_is_named_and_the_others_are_not() -> None:
     unusable, sentence = verdicts.pop(520.0)
     assert unusable
     assert "the filter of 520 nm: its first orders are where those of 55" in sentence
+    assert "± 1 nm should be" in sentence
     assert not any(bad for bad, _ in verdicts.values())
 
 
@@ -50,6 +53,23 @@ def test_tilted_filter_is_a_doubt() -> None:
     unusable, sentence = verdict(filters[index], found, 3.0, 1.0)
     assert not unusable
     assert "nm shorter than it should; it may be tilted" in sentence
+    assert "wavelengths 4.0 ± 0." in sentence
+
+
+@pytest.mark.parametrize(("noise_px", "doubted"), [(0.2, True), (1.2, False)])
+def test_a_dim_filter_is_not_judged_to_a_nanometre(noise_px: float, doubted: bool) -> None:
+    # A column is two nanometres: 5 nm are certain with little noise, and two deviations with much.
+    filters = placed({550.0: 555.1})
+    index = CENTRES.index(550.0)
+    dim = replace(
+        filters[index], offsets_px={m: (px, noise_px) for m, (px, _) in filters[index].offsets_px.items()}
+    )
+    filters[index] = dim
+    found = found_wavelengths(published_rig(), filters)[index]
+    unusable, sentence = verdict(dim, found, 3.0, 1.0)
+    assert not unusable
+    assert bool(sentence) == doubted
+    assert ("it passes wavelengths 5.1 ± 0." in sentence) == doubted
 
 
 def test_broad_light_is_no_filter() -> None:

@@ -36,3 +36,22 @@ def test_an_order_that_leaves_the_frame_is_placed_by_the_pixels_that_see_all_of_
 def test_light_that_is_none_has_no_place() -> None:
     dark = graph_of(200.0, 0.0)
     assert find_order(LineGraph(dark.signal * 0, *list(vars(dark).values())[1:]), 1, REACH_PX) is None
+
+
+@pytest.mark.parametrize("noise", [0.02, 0.3])
+def test_noise_is_in_the_deviations_of_place_and_share(noise: float) -> None:
+    # Three cells carry a constant only, whose scatter says little of their noise.
+    places, shares, stated, stated_share = [], [], [], []
+    for seed in range(6):
+        graph = graph_of(260.0, 0.0)
+        noisy = graph.signal + noise * np.random.default_rng(seed).standard_normal(graph.signal.shape)
+        rest = list(vars(graph).values())[2:]
+        found = find_order(LineGraph(noisy, np.full(noisy.shape, noise**2), *rest), 1, REACH_PX)
+        assert found is not None
+        places.append(float(found.at(np.array([[0.5], [0.5]]))[0]) - 260.0)
+        shares.append(found.share)
+        stated.append(found.std_px)
+        stated_share.append(found.share_std)
+    assert np.abs(np.array(places) / stated).max() < 3
+    assert np.std(shares) < 3 * np.mean(stated_share)
+    assert np.mean(stated_share) < 20 * np.std(shares)
