@@ -268,7 +268,8 @@ def _require_steps(planes: Sequence[PlaneNote]) -> None:
         raise CalibrationError(
             f"The columns at the stage's position {last.position_mm:g} mm scatter by"
             f" {last.column_rms_px:.2f} px about a plane, those captured before by {others_px:.2f} px: the"
-            " target is not flat, or something stands before it. Put a flat target in place and capture this position again."
+            " target is not flat, or something stands before it. Put a flat target in place and capture this"
+            " position again."
         ) from error
 
 
