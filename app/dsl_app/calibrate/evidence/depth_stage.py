@@ -28,7 +28,7 @@ from dsl_app.calibrate.evidence.tables import Cell, NumberTable
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, named
 from dsl_app.shared.widgets.layouts import boxed, column_of
-from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_PLANE_MM, MAX_STEP_MM
+from dsl_core.campaign.depth_stage.figures import MAX_HELD_OUT_PX, MAX_STEP_MM
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration
 from dsl_core.model.rig import Film
 
@@ -64,8 +64,8 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
         self._curves: tuple[StageCurve, ...] | Exception | None = None
         self.planes = ChartBox(
             "Scatter about the plane",
-            "RMS distance of the triangulated points from their plane, by position of the stage.",
-            "RMS (mm)",
+            "RMS distance of the columns seen from those of their plane, by position of the stage.",
+            "RMS (px)",
             "Position (mm)",
         )
         self.steps = ChartBox(
@@ -141,11 +141,12 @@ class DepthStageEvidence(Evidence[DepthStageCalibration]):
 
     def _draw_planes(self, record: DepthStageCalibration) -> None:
         box, theme = self.planes, self._theme
-        heights = np.array([position.plane_rms_mm for position in record.positions])
+        heights = np.array([position.column_rms_px for position in record.positions])
+        limit_px = min(position.column_limit_px for position in record.positions)
         names = [f"{p.position_mm:g}" for p in record.positions]
         left_open = f"depth left open by the geometry {record.depth_std_mm:.3f} mm"
         bars = Bars("", theme.pins[0], heights)
-        draw_bars(box, [bars], names, MAX_PLANE_MM, theme, (left_open, theme.text, ""))
+        draw_bars(box, [bars], names, limit_px, theme, (left_open, theme.text, ""))
 
     def _draw_steps(self, record: DepthStageCalibration) -> None:
         box, theme = self.steps, self._theme

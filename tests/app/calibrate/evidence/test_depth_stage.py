@@ -48,7 +48,7 @@ def position(mm: float, step_mm: float) -> StagePosition:
         tilt_deg=0.1,
         distance_mm=mm,
         plane_rms_mm=mm / 10_000,
-        column_rms_px=0.002,
+        column_rms_px=mm / 100_000,
         step_error_mm=step_mm,
         step_std_mm=0.01,
     )
@@ -96,7 +96,7 @@ SESSION = cast(CalibrationSession, SimpleNamespace(bench=SimpleNamespace(rig=RIG
 @pytest.mark.parametrize("theme", THEMES)
 def test_planes_film_and_held_out_errors_are_shown(qtbot: QtBot, theme: Theme) -> None:
     widget = shown(qtbot, "depth-stage", calibration(), SESSION, theme)
-    assert bars(widget.planes) == [pytest.approx([0.06, 0.09])]
+    assert bars(widget.planes) == [pytest.approx([0.006, 0.009])]
     assert np.allclose(points(widget.steps)[0], [(600, 0.01), (900, -0.12)])
     assert widget.film.row_texts(0) == ["Lines", "480.00", "498.50", "± 0.02", "1/mm"]
     assert bars(widget.held_out) == [
