@@ -12,6 +12,8 @@ from dsl_core.simulation.effects.base import LightPath, PatternView, make_view
 from dsl_core.simulation.effects.catalogue import EXTRAS, USUAL_CHOICE, Choice, with_effects
 from dsl_core.simulation.effects.planner import EffectPlan, plan_effects
 from dsl_core.simulation.effects.tolerance import ONE_DN, Tolerance
+from dsl_core.simulation.foreign.rig_changes import true_rig
+from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread
 
@@ -25,6 +27,7 @@ class Setup:
 
     ``filter`` is in front of the camera. With ``led_cycle_ms`` the projector flashes its LEDs one after the
     other, running freely on the world's clock; None is steady light. ``device`` is what torch computes on.
+    With ``foreign`` variants ``rig`` is what a calibration says, and not all that is true.
     """
 
     rig: Rig
@@ -34,6 +37,12 @@ class Setup:
     led_cycle_ms: float | None = None
     defocus_px: float = 0.0
     device: str = "cpu"
+    foreign: Foreign | None = None
+
+    @cached_property
+    def true_rig(self) -> Rig:
+        """The rig that light really goes through."""
+        return self.rig if self.foreign is None else true_rig(self.rig, self.foreign)
 
 
 @dataclass(frozen=True)
@@ -101,8 +110,8 @@ class RenderedScene:
         """What the plain renderer has."""
         seen, setup = self._seen, self._setup
         return LightPath(
-            seen.rig, seen.scene, seen.truth, setup.film, setup.device, led_cycle_ms=setup.led_cycle_ms,
-            ambient_dn_per_ms=setup.ambient_dn_per_ms, defocus_px=setup.defocus_px,
+            setup.true_rig, seen.scene, seen.truth, setup.film, setup.device, led_cycle_ms=setup.led_cycle_ms,
+            ambient_dn_per_ms=setup.ambient_dn_per_ms, defocus_px=setup.defocus_px, foreign=setup.foreign,
         )  # fmt: skip
 
     @cached_property

@@ -26,6 +26,8 @@ from dsl_core.optics.correspondence import GratingModel, zero_order
 from dsl_core.simulation.bandpass_filters import measured_transmissions
 from dsl_core.simulation.effects.catalogue import USUAL_CHOICE
 from dsl_core.simulation.effects.planner import describe
+from dsl_core.simulation.foreign.exposure import light_level
+from dsl_core.simulation.foreign.rig_changes import led_radiance
 from dsl_core.simulation.placing import TwinHand
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
@@ -173,7 +175,7 @@ def spot_light(world: World, spot: tuple[int, int], wavelengths_nm: Floats) -> F
     The zero order comes from one projector pixel, first orders (with the film) from another column at each
     wavelength.
     """
-    rig, depth_mm = world.rig, float(world.truth.depth_mm[spot])
+    rig, depth_mm = world.setup.true_rig, float(world.truth.depth_mm[spot])
     if not np.isfinite(depth_mm):
         return np.zeros(len(wavelengths_nm))
     pixel = torch.tensor([spot[0] * rig.camera.width_px + spot[1]])
@@ -191,14 +193,14 @@ def spot_light(world: World, spot: tuple[int, int], wavelengths_nm: Floats) -> F
 
 def _drive(world: World, columns: Floats, rows: Floats) -> Floats:
     """Radiance of each LED at projector pixels, shape (3, n); only the dark projector's outside its frame."""
-    response = world.rig.projector_response
+    foreign, response = world.setup.foreign, world.rig.projector_response
     height, width = world.rig.projector.height_px, world.rig.projector.width_px
     shown = np.zeros((height, width, 1), np.uint8) if world.image is None else np.atleast_3d(world.image)
     x, y = np.round(columns).astype(int), np.round(rows).astype(int)
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     levels = shown[y.clip(0, height - 1), x.clip(0, width - 1)] / 255
-    radiance = np.where(inside[:, None], response.radiance(levels), 0.0)
-    return np.broadcast_to(radiance, (len(columns), 3)).T
+    radiance = np.where(inside, led_radiance(response, levels.T, foreign), 0.0)
+    return radiance if foreign is None else radiance * light_level(foreign, world.clock.now_s)
 
 
 @with_options(TwinOptions)
@@ -220,6 +222,7 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
             led_cycle_ms=1000.0 / chosen.led_cycle_hz if chosen.led_cycle_hz else None,
             defocus_px=chosen.defocus_px,
             device=chosen.device,
+            foreign=chosen.foreigners,
         ),
         scene_at=lambda position_mm: make_scene(chosen.scene, **of_scene),
         request=EffectRequest(chosen.choice, chosen.limit),

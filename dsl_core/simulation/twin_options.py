@@ -10,7 +10,9 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 from dsl_core.errors import DeviceError
 from dsl_core.model.base import Record
 from dsl_core.simulation.effects.catalogue import Choice
+from dsl_core.simulation.effects.depth_of_field import DepthOfField
 from dsl_core.simulation.effects.tolerance import Tolerance
+from dsl_core.simulation.foreign.variants import VARIANTS, Foreign
 from dsl_core.simulation.rendered_scene import AMBIENT_DN_PER_MS
 
 
@@ -87,6 +89,11 @@ class TwinOptions(Record):
         default=None,
         description="number of a rig drawn around the published one, whose calibration is unknown",
     )
+    foreign: str = Field(
+        default="",
+        description="what the twin does and its solver does not assume: all, or some of "
+        + "; ".join(f"{name} ({summary})" for name, summary in VARIANTS.items()),
+    )
     led_cycle_hz: Number = Field(
         default=0.0, description="how often the LEDs flash in turn; 0: they shine steadily"
     )
@@ -125,13 +132,25 @@ class TwinOptions(Record):
         """
         own = {name: text for name, text in options.items() if name in cls.model_fields}
         made = cls.model_validate(own)
-        _ = made.choice, made.limit  # a wrong text is told now
+        _ = made.choice, made.limit, made.foreigners  # a wrong text is told now
         return made, {name: text for name, text in options.items() if name not in own}
 
     @property
     def choice(self) -> Choice:
         """The effects to render."""
         return Choice.of(self.effects)
+
+    @property
+    def foreigners(self) -> Foreign | None:
+        """The foreign variants, drawn for the rig; None without any."""
+        found = Foreign.of(self.foreign, self.truth or 0)
+        names = self.choice.names
+        if found is not None and (names is None or DepthOfField.name in names):
+            raise DeviceError(
+                "Foreign variants are rendered without depth of field, but effects are"
+                f" {self.effects!r}. Use usual, none, or names without {DepthOfField.name}."
+            )
+        return found
 
     @property
     def limit(self) -> Tolerance:

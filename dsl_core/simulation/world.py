@@ -15,6 +15,7 @@ from dsl_core.optics.led_cycle import led_weights
 from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.effects.base import LightPath, PatternView
 from dsl_core.simulation.effects.planner import EffectPlan
+from dsl_core.simulation.foreign.exposure import exposed
 from dsl_core.simulation.rendered_scene import EffectRequest, RenderedScene, SceneInView, Setup
 from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread
@@ -100,7 +101,7 @@ class World:
 
     @property
     def rig(self) -> Rig:
-        """The true calibration of the devices."""
+        """The calibration of the devices: true as far as nothing about the setup is foreign."""
         return self.setup.rig
 
     def show(self, image: NDArray[np.uint8]) -> None:
@@ -133,7 +134,7 @@ class World:
         seen, setup = self._in_view, self.setup
         made_from = (
             seen, setup.film, setup.device, setup.ambient_dn_per_ms, setup.led_cycle_ms, setup.defocus_px,
-            self.request,
+            setup.foreign, self.request,
         )  # fmt: skip
         return self._rendered.of(made_from, lambda: RenderedScene(seen, setup, self.request))
 
@@ -218,5 +219,10 @@ class World:
         self.request = self.request.allowing(exposure_ms, level, self.rig.projector_response)
         rng = np.random.Generator(np.random.SFC64([self.seed, shot, attempt, *self._noise_key()]))
         jitter_ms = JITTER_MS * rng.random() if self.setup.led_cycle_ms else 0.0
-        signal = self._light(exposure_ms, jitter_ms) * np.float32(exposure_ms)
+        light = self._light(exposure_ms, jitter_ms)
+        if self.setup.foreign is not None:
+            light = exposed(
+                self.setup.foreign, light, self.path.ambient_dn_per_ms, self.clock.now_s, exposure_ms
+            )
+        signal = light * np.float32(exposure_ms)
         return digitise(self.path.rig.sensor, signal, rng if self.noise else None)

@@ -27,6 +27,8 @@ from dsl_core.optics.sensor import bayer_channels, raw_variance
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.effects.cost import slowness
 from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.foreign.renderer import ForeignRenderer
+from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.rendering.renderer import ORDERS, Renderer, surface_shading
 from dsl_core.simulation.rendering.spectral_tables import NM
 from dsl_core.simulation.scenes.truth import Parts, Scene, SceneTruth
@@ -66,7 +68,7 @@ class LightPath:
     """A rig before a scene, with everything that is to be rendered.
 
     ``extras`` are the effects beyond the plain renderer, in the order in which light meets them. Leaving an
-    effect out gives another path.
+    effect out gives another path. With ``foreign`` variants ``rig`` is the true one.
     """
 
     rig: Rig
@@ -80,6 +82,7 @@ class LightPath:
     led_cycle_ms: float | None = None
     defocus_px: float = 0.0
     extras: tuple[ExtraEffect, ...] = ()
+    foreign: Foreign | None = None
 
     def extra(self, name: str) -> ExtraEffect | None:
         """An effect beyond the plain renderer, if the path has it."""
@@ -95,6 +98,15 @@ class LightPath:
         return Renderer(
             self.rig, self.truth, film=self.film, device=self.device, orders=self.orders, shaded=self.shaded,
             parts=parts,
+        )  # fmt: skip
+
+    def foreign_renderer(self) -> ForeignRenderer | None:
+        """The renderer of foreign variants, which has no depth of field, if the path has any."""
+        if self.foreign is None:
+            return None
+        return ForeignRenderer(
+            self.rig, self.scene, self.foreign, film=self.film, device=self.device, orders=self.orders,
+            shaded=self.shaded,
         )  # fmt: skip
 
 
@@ -304,7 +316,7 @@ class Limits:
 def make_view(path: LightPath) -> PatternView:
     """What the camera sees in a path."""
     own = (light for extra in path.extras if (light := extra.direct_light(path)))
-    direct = next(own, None) or path.renderer()
+    direct: PatternView = path.foreign_renderer() or next(own, None) or path.renderer()
     if not path.extras:
         return direct
     mosaic = bayer_channels(path.rig.sensor.bayer, *path.truth.depth_mm.shape)
