@@ -97,7 +97,7 @@ def export_entry(entry: LibraryEntry, target: Path, form: str, overwrite: bool =
         case "rig":
             return [save_rig(entry.rig, target, overwrite=overwrite)]
         case "published":
-            from dsl_core.io.published import export_calibration
+            from dsl_core.io.published.calibration import export_calibration
 
             return export_calibration(entry.rig, target, overwrite=overwrite)
     raise StoreError(f"--form must be {', '.join(get_args(Form))}, not {form!r}.")

@@ -13,7 +13,7 @@ from dsl_core.cli.output import Output
 from dsl_core.errors import StoreError
 
 if TYPE_CHECKING:
-    from dsl_core.io.published import FileRecord
+    from dsl_core.io.published.layout import FileRecord
     from dsl_core.model.rig import Rig
 
 
@@ -40,7 +40,7 @@ def import_(
     json: Json = False,
 ) -> None:
     """Import a published dataset or calibration; list what is missing or misnamed."""
-    from dsl_core.io.published import check_calibration, holds_calibration
+    from dsl_core.io.published.calibration import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
     from dsl_core.workflows import exchange

@@ -140,7 +140,7 @@ def _export(
     from dsl_core.io.calibration_library import load_calibration
     from dsl_core.io.export import export as export_result
     from dsl_core.io.export import export_csv
-    from dsl_core.io.published import export_calibration
+    from dsl_core.io.published.calibration import export_calibration
     from dsl_core.io.result.result_file import load_result
     from dsl_core.io.scan.folder import ScanReader
     from dsl_core.workflows import exchange

@@ -11,16 +11,9 @@ from dsl_core.capture.preflight import require_possible
 from dsl_core.devices.replay import replay_rig
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.published import (
-    PUBLISHED_SETTINGS,
-    FileRecord,
-    check_calibration,
-    check_dataset,
-    export_dataset,
-    holds_calibration,
-    load_calibration,
-    open_dataset,
-)
+from dsl_core.io.published.calibration import check_calibration, holds_calibration, load_calibration
+from dsl_core.io.published.dataset import PUBLISHED_SETTINGS, export_dataset, open_dataset
+from dsl_core.io.published.layout import FileRecord, check_dataset
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import read_manifest

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.published import export_dataset
+from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.staging import staged

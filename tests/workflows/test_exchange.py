@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import Cancelled, StoreError
-from dsl_core.io.published import export_dataset
+from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.model.rig import Rig

@@ -13,7 +13,7 @@ from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
 
 if TYPE_CHECKING:
-    from dsl_core.io.published import FileRecord
+    from dsl_core.io.published.layout import FileRecord
 
 #: Key of the published rig, whose film, sensor and scales are the default.
 PUBLISHED = ""

@@ -1,4 +1,4 @@
-"""Results for other programs: one file a format, found by name in `formats`.
+"""Results for other programs: one file a format, found by name in `FORMATS`.
 
 Every exporter writes whole files or nothing, replaces files only with ``overwrite=True``, names the scan
 and the program's version where the format has room for it, and keeps pixels without an answer
@@ -23,18 +23,7 @@ from dsl_core.solve.many import Check, never
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = [
-    "Exporter",
-    "export",
-    "export_csv",
-    "export_envi",
-    "export_exr",
-    "export_npy",
-    "export_ply",
-    "export_png",
-    "export_tiff",
-    "formats",
-]
+__all__ = ["FORMATS", "Exporter", "export", "export_csv", "export_png"]
 
 
 class Exporter(Protocol):
@@ -46,24 +35,22 @@ class Exporter(Protocol):
         """Write the result and return the files written; raises `StoreError`, and what ``check`` raises."""
 
 
-def formats() -> dict[str, Exporter]:
-    """Exporters by the name of their format."""
-    return {
-        "csv": export_csv,
-        "envi": export_envi,
-        "exr": export_exr,
-        "npy": export_npy,
-        "ply": export_ply,
-        "png": export_png,
-        "tiff": export_tiff,
-    }
+#: Exporters by the name of their format.
+FORMATS: dict[str, Exporter] = {
+    "csv": export_csv,
+    "envi": export_envi,
+    "exr": export_exr,
+    "npy": export_npy,
+    "ply": export_ply,
+    "png": export_png,
+    "tiff": export_tiff,
+}
 
 
 def export(
     result: xr.Dataset, path: Path, name: str, *, overwrite: bool = False, check: Check = never
 ) -> list[Path]:
-    """Write a result in the named format; raises `StoreError` for a name that is not in `formats`."""
-    known = formats()
-    if name not in known:
-        raise StoreError(f"There is no export format {name!r}. Choose one of {', '.join(known)}.")
-    return known[name](result, path, overwrite=overwrite, check=check)
+    """Write a result in the named format; raises `StoreError` for a name that is not in `FORMATS`."""
+    if name not in FORMATS:
+        raise StoreError(f"There is no export format {name!r}. Choose one of {', '.join(FORMATS)}.")
+    return FORMATS[name](result, path, overwrite=overwrite, check=check)

@@ -6,8 +6,6 @@ the PNG's text chunks (PNG specification, 3rd edition, section 11.3.4).
 
 from __future__ import annotations
 
-import struct
-import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +22,7 @@ from dsl_core.solve.many import Check, never
 if TYPE_CHECKING:
     import xarray as xr
 
-Image = NDArray[np.uint8]
+Picture = NDArray[np.uint8]
 
 GREY = (128, 128, 128)
 _MARGIN_PX = 110
@@ -47,7 +45,10 @@ def export_png(
     the result has no band within half a band's distance of ``band_nm``.
     """
     require_suffix(path, ".png")
-    pictures: dict[str, Image] = {}
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    pictures: dict[str, Picture] = {}
     if light != "D65" and "reflectance" in result:
         lit = relight(plane(result, "reflectance"), np.array(wavelengths_nm(result)), light, adapted)
         pictures[f"rgb_{light}" if adapted else f"rgb_{light}_unadapted"] = rgb_picture(lit)
@@ -62,11 +63,14 @@ def export_png(
         pictures["flags"] = flags_picture(result["flags"].values)
     if not pictures:
         require(result, "A picture", "rgb")
+    texts = PngInfo()
+    for key, text in provenance(result).items():
+        texts.add_itxt(key.encode("latin-1", "replace")[:79], text)
     targets = {path.with_name(f"{path.stem}_{name}.png"): picture for name, picture in pictures.items()}
     with staged(list(targets), overwrite=overwrite) as drafts:
         for draft, picture in zip(drafts, targets.values(), strict=True):
             check()
-            draft.write_bytes(png_bytes(picture, provenance(result)))
+            Image.fromarray(picture).save(draft, format="PNG", pnginfo=texts)
     return list(targets)
 
 
@@ -84,14 +88,14 @@ def nearest_band(result: xr.Dataset, band_nm: float | None) -> tuple[int, float]
     return best, centres[best]
 
 
-def rgb_picture(rgb: NDArray[np.float32]) -> Image:
+def rgb_picture(rgb: NDArray[np.float32]) -> Picture:
     """SRGB values 0..1, shape (3, rows, columns), as an 8-bit image."""
     lit: NDArray[np.bool_] = np.asarray(np.isfinite(rgb).all(axis=0))
     picture = np.rint(np.clip(np.nan_to_num(rgb), 0, 1) * 255).astype(np.uint8)
     return _blank(np.moveaxis(picture, 0, -1), lit)
 
 
-def band_picture(reflectance: NDArray[np.float32]) -> Image:
+def band_picture(reflectance: NDArray[np.float32]) -> Picture:
     """Reflectance 0..1 as grey levels, straight (no gamma); no answer is marked dark blue, not grey."""
     levels = np.rint(np.clip(np.nan_to_num(reflectance), 0, 1) * 255).astype(np.uint8)
     picture = np.repeat(levels[..., None], 3, axis=-1)
@@ -99,7 +103,7 @@ def band_picture(reflectance: NDArray[np.float32]) -> Image:
     return picture
 
 
-def depth_picture(depth_mm: NDArray[np.float32]) -> Image:
+def depth_picture(depth_mm: NDArray[np.float32]) -> Picture:
     """Depth in colours (near is red, far is blue), with a bar that says how many mm they mean.
 
     The bar spans all but the nearest and farthest half percent, so that single outliers leave colours to
@@ -122,11 +126,11 @@ def depth_picture(depth_mm: NDArray[np.float32]) -> Image:
     return np.hstack([picture, margin])
 
 
-def flags_picture(flags: NDArray[Any]) -> Image:
+def flags_picture(flags: NDArray[Any]) -> Picture:
     """The gravest flag of every pixel as a colour, white where all is well, and a legend."""
     classes = gravest_flag(flags)
     colours = np.array([(255, 255, 255), *(tuple(bytes.fromhex(FLAG_COLOURS[flag][1:])) for flag in Flag)])
-    picture: Image = colours.astype(np.uint8)[classes]
+    picture: Picture = colours.astype(np.uint8)[classes]
     counts = np.bincount(classes.ravel(), minlength=len(colours))
     present = [(flag, place) for place, flag in enumerate(Flag, 1) if counts[place]]
     if not present:
@@ -140,23 +144,7 @@ def flags_picture(flags: NDArray[Any]) -> Image:
     return np.vstack([np.pad(picture, ((0, 0), (0, padding), (0, 0)), constant_values=255), legend])
 
 
-def png_bytes(picture: Image, texts: dict[str, str]) -> bytes:
-    """A PNG file of an R, G, B image with an ``iTXt`` chunk for every text."""
-    import cv2
-
-    data = cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
-    chunks = b"".join(_text_chunk(key, text) for key, text in texts.items())
-    after_header = 8 + 25  # signature, then the header chunk IHDR of fixed length
-    return data[:after_header] + chunks + data[after_header:]
-
-
-def _text_chunk(key: str, text: str) -> bytes:
-    keyword = key.encode("latin-1", "replace")[:79]
-    body = b"iTXt" + keyword + b"\0\0\0\0\0" + text.encode("utf-8")
-    return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
-
-
-def _turbo(shares: NDArray[Any]) -> Image:
+def _turbo(shares: NDArray[Any]) -> Picture:
     import cv2
 
     levels = np.rint(np.clip(shares, 0, 1) * 255).astype(np.uint8)
@@ -164,12 +152,12 @@ def _turbo(shares: NDArray[Any]) -> Image:
     return np.ascontiguousarray(np.asarray(coloured, np.uint8).reshape(*levels.shape, 3)[..., ::-1])
 
 
-def _blank(picture: Image, lit: NDArray[np.bool_]) -> Image:
+def _blank(picture: Picture, lit: NDArray[np.bool_]) -> Picture:
     picture[~lit] = GREY
     return picture
 
 
-def _write(picture: Image, text: str, x: int, y: int) -> None:
+def _write(picture: Picture, text: str, x: int, y: int) -> None:
     import cv2
 
     cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.38, (0, 0, 0), 1, cv2.LINE_AA)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.optics.colour import observer_weights
+from dsl_core.resources import resource_path
 from dsl_core.simulation.scenes.truth import FINE_NM
 
 Spectrum = NDArray[np.float64]
@@ -88,21 +89,6 @@ def dyed_leaf() -> Spectrum:
     return np.asarray(base + heights @ dyes)
 
 
-#: Molar extinction of oxygenated haemoglobin, 1/(cm mol/l), as compiled by Prahl
-#: (omlc.org/spectra/hemoglobin) from Gratzer and Kollias; the double dip of skin is at 542 and 577 nm.
-# fmt: off
-_HBO2_NM = (
-    400, 410, 420, 430, 440, 450, 460, 470, 480, 490, 500, 510, 520, 530, 540, 550, 560, 570, 577,
-    580, 590, 600, 610, 620, 630, 640, 650, 660, 670, 680, 690, 700,
-)
-_HBO2 = (
-    266232, 466840, 480360, 246072, 102580, 62816, 44480, 33209, 26629, 23684, 20932, 20035, 24202,
-    39957, 53236, 43016, 32613, 44496, 55500, 50104, 14400, 3200, 1506, 942, 610, 442, 368, 320,
-    294, 278, 276, 290,
-)
-# fmt: on
-
-
 def skin(blood: float = 0.004, melanin: float = 0.02) -> Spectrum:
     """Human skin for volume fractions of blood in the dermis and of melanosomes in the epidermis.
 
@@ -113,7 +99,8 @@ def skin(blood: float = 0.004, melanin: float = 0.02) -> Spectrum:
     """
     from scipy.interpolate import PchipInterpolator
 
-    haemoglobin = np.exp(PchipInterpolator(_HBO2_NM, np.log(_HBO2))(FINE_NM))
+    nm, extinction = np.loadtxt(resource_path("colour/oxyhaemoglobin.csv"), delimiter=",", unpack=True)
+    haemoglobin = np.exp(PchipInterpolator(nm, np.log(extinction))(FINE_NM))
     scattering = 46.0 * (FINE_NM / 500.0) ** -1.4
     absorption = blood * haemoglobin * np.log(10.0) * 150.0 / 64500.0 + 0.2
     dermis = np.exp(-7.0 / np.sqrt(3.0 * (1.0 + scattering / absorption)))

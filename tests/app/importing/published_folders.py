@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dsl_core import pipeline
 from dsl_core.devices.registry import open_rig
-from dsl_core.io.published import export_calibration
+from dsl_core.io.published.calibration import export_calibration
 from dsl_core.io.rig_file import save_rig
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.presets import PRESETS

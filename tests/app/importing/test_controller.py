@@ -17,7 +17,7 @@ from dsl_app.shared.known_files import Kind, kind_of
 from dsl_core.cli import main
 from dsl_core.errors import Cancelled
 from dsl_core.io.calibration_library import CalibrationLibrary
-from dsl_core.io.published import FileRecord
+from dsl_core.io.published.layout import FileRecord
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.progress import CallbackProgress

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import Cancelled, StoreError
-from dsl_core.io.export import export, export_csv, export_envi, export_exr, export_ply, export_png, formats
-from dsl_core.io.export.exr import linear_from_srgb
+from dsl_core.io.export import FORMATS, export, export_csv, export_png
+from dsl_core.io.export.envi import export_envi
+from dsl_core.io.export.exr import export_exr, linear_from_srgb
+from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import GREY, flags_picture
 from dsl_core.model.result import FLAG_COLOURS, Flag, reasons
 from dsl_core.optics.relighting import relight
@@ -299,9 +301,9 @@ def test_pictures_of_nothing_and_of_the_middle_band(tmp_path: Path) -> None:
         export_png(result[["shading"]], tmp_path / "other.png")
 
 
-@pytest.mark.parametrize("name", sorted(formats()))
+@pytest.mark.parametrize("name", sorted(FORMATS))
 def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: str) -> None:
-    exporter = formats()[name]
+    exporter = FORMATS[name]
     if name == "csv":
         exporter = lambda result, path, *, overwrite=False, check=never: export_csv(  # noqa: E731
             result, path, overwrite=overwrite, pixels=[(0, 0)], check=check
@@ -319,7 +321,7 @@ def test_every_format_refuses_to_replace_unless_allowed(tmp_path: Path, name: st
     assert files[-1].read_bytes() != b"mine"
 
 
-@pytest.mark.parametrize("name", sorted(formats()))
+@pytest.mark.parametrize("name", sorted(FORMATS))
 def test_every_format_refuses_wrong_endings_and_places(tmp_path: Path, name: str) -> None:
     with pytest.raises(StoreError, match="does not end in"):
         export(small_result(), tmp_path / "x.doc", name)
@@ -340,7 +342,7 @@ def test_an_unknown_format(tmp_path: Path) -> None:
         export(small_result(), tmp_path / "x.las", "las")
 
 
-@pytest.mark.parametrize("name", sorted(set(formats()) - {"csv"}))
+@pytest.mark.parametrize("name", sorted(set(FORMATS) - {"csv"}))
 def test_who_stops_an_export_finds_nothing_half_written(tmp_path: Path, name: str) -> None:
     asked, least = list[None](), 0
 

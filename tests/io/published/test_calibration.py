@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.published import (
+from dsl_core.io.published.calibration import (
     check_calibration,
     export_calibration,
     load_calibration,

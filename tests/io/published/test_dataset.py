@@ -13,7 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import Cancelled, StoreError
-from dsl_core.io.published import FileRecord, check_dataset, export_dataset, open_dataset
+from dsl_core.io.published.dataset import export_dataset, open_dataset
+from dsl_core.io.published.layout import FileRecord, check_dataset
 from dsl_core.model.plan import CapturePlan, ScanLines, Setting, Shot
 from dsl_core.progress import CallbackProgress
 

@@ -11,8 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError, StoreError
-from dsl_core.io.published import Stereo, load_stereo, save_stereo
-from dsl_core.io.published.stereo import Dialect, essential_matrix, fundamental_matrix
+from dsl_core.io.published.stereo import (
+    Dialect,
+    Stereo,
+    essential_matrix,
+    fundamental_matrix,
+    load_stereo,
+    save_stereo,
+)
 from tests.cases.small_rig import small_rig
 
 SHARED = Path(os.environ.get("DSL_SHARED", Path(__file__).parents[4] / "shared"))

@@ -85,11 +85,11 @@ class ExportController:
         light, adapted = state.picture_light.value
 
         def work(progress: Progress) -> list[Path]:
-            from dsl_core.io.export import Exporter, export_csv, export_png, formats
+            from dsl_core.io.export import FORMATS, Exporter, export_csv, export_png
             from dsl_core.io.result.result_file import load_result
 
             exporters: dict[str, Exporter] = {
-                **formats(),
+                **FORMATS,
                 "csv": partial(export_csv, pixels=pixels),
                 "png": partial(export_png, band_nm=band_nm, light=light, adapted=adapted),
             }
