@@ -9,7 +9,6 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHeaderView, QTableWidgetItem
 
 from dsl_app.calibrate.presentation import value_words
-from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.read_table import ReadTable, cell
 from dsl_core.model.figure import Figure
 
@@ -24,7 +23,6 @@ class FiguresTable(ReadTable):
 
     def __init__(self, name: str) -> None:
         super().__init__(name, "Values with their standard deviation, against their limits", _COLUMNS)
-        self._theme, self._figures = DARK, tuple[Figure, ...]()
         header = self.horizontalHeader()
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Fixed)
         header.resizeSection(0, _MARK_PX)
@@ -32,28 +30,19 @@ class FiguresTable(ReadTable):
 
     def show_figures(self, figures: Sequence[Figure]) -> None:
         """Show figures in their order."""
-        self._figures = tuple(figures)
-        self.show_rows([self._items(figure) for figure in self._figures])
+        self.show_rows([_items(figure) for figure in figures])
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self._theme = theme
-        self.show_figures(self._figures)
 
-    def _items(self, figure: Figure) -> tuple[QTableWidgetItem, ...]:
-        theme, limited = self._theme, bool(figure.limits)
-        colour = theme.text if not limited else (theme.good if figure.passed else theme.bad)
-        mark = "" if not limited else ("✓" if figure.passed else "✗")
-        advice = "" if figure.passed else figure.advice
-        first = cell(mark, colour)
-        first.setData(
-            Qt.ItemDataRole.AccessibleTextRole,
-            "" if not limited else ("passed" if figure.passed else "missed"),
-        )
-        return (
-            first,
-            cell(_SIGN.sub("−", figure.name), theme.text),
-            cell(value_words(figure), colour if not figure.passed else theme.text),
-            cell(figure.limits.replace("-", "−"), theme.muted),
-            cell(advice, theme.text),
-        )
+def _items(figure: Figure) -> tuple[QTableWidgetItem, ...]:
+    mark, role, word = "", "text", ""
+    if figure.limits:
+        mark, role, word = ("✓", "good", "passed") if figure.passed else ("✗", "bad", "missed")
+    first = cell(mark, role)
+    first.setData(Qt.ItemDataRole.AccessibleTextRole, word)
+    return (
+        first,
+        cell(_SIGN.sub("−", figure.name), "text"),
+        cell(value_words(figure), "text" if figure.passed else role),
+        cell(figure.limits.replace("-", "−"), "muted"),
+        cell("" if figure.passed else figure.advice, "text"),
+    )

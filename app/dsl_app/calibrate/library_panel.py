@@ -24,7 +24,7 @@ from PySide6.QtWidgets import (
 from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.presentation import library_selection, version_texts
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
-from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
@@ -52,7 +52,7 @@ class LibraryPanel(QGroupBox):
 
     def __init__(self, state: CalibrateState, commands: LibraryController) -> None:
         super().__init__("Library of calibrations")
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._commands = state, commands
         self.table = _table()
         self.details = QTextBrowser()
         self.details.setAccessibleName("Details of the calibration")
@@ -132,10 +132,6 @@ class LibraryPanel(QGroupBox):
         self.restore.setEnabled(shown.can_restore)
         self.details.setHtml(shown.details)
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme for windows that are opened from now on."""
-        self._theme = theme
-
     # Actions ---------------------------------------------------------------------------------------
 
     def _restore(self) -> None:
@@ -182,7 +178,7 @@ class LibraryPanel(QGroupBox):
     def _show_drift(self, verdict: DriftVerdict | None) -> None:
         if verdict is None:
             return
-        window = DriftWindow(verdict, self._theme, self)
+        window = DriftWindow(verdict, self.table.theme, self)
         window.again_requested.connect(
             lambda: self._commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))
         )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog
 
+from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shell.main_window import MainWindow
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class ImportAction:
             return
         self._dialog = dialog = ImportDialog(self.control.state, self.control, self._window)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.apply_theme(self._window.theme)
+        apply_theme_inside(dialog, self._window.theme)
         dialog.finished.connect(self._forget)
         dialog.open()
 

@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
 from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, ImportState, import_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
-from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.dialogs import JobDialog
 from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
@@ -39,7 +38,7 @@ class ImportDialog(JobDialog):
         super().__init__(commands, parent)
         request = state.request.value
         assert request is not None
-        self._state, self._commands, self._theme = state, commands, DARK
+        self._state, self._commands = state, commands
         #: The folder whose request is shown.
         self._shown: Path | None = None
         self.setWindowTitle("Import")
@@ -134,13 +133,12 @@ class ImportDialog(JobDialog):
         self.table.show_rows([self._items(row) for row in found.rows])
 
     def _items(self, row: FileRow) -> tuple[Any, ...]:
-        theme = self._theme
         harmless = row.status in ("misnamed", "extra", "optional")
-        colour = theme.good if not row.is_odd else theme.warn if harmless else theme.bad
+        role = "good" if not row.is_odd else "warn" if harmless else "bad"
         return (
             cell(breakable(row.expected or "–")),
-            cell("as expected" if row.found == row.expected else breakable(row.found or "–"), theme.muted),
-            cell(row.status, colour),
+            cell("as expected" if row.found == row.expected else breakable(row.found or "–"), "muted"),
+            cell(row.status, role),
             cell(row.advice),
         )
 
@@ -160,11 +158,6 @@ class ImportDialog(JobDialog):
     def _judge(self) -> None:
         view = import_view(self._state)
         self.show_status(view.trouble, view.remark, view.is_busy)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Apply the colours of a theme."""
-        self._theme = theme
-        self._show_found(self._state.found.value)
 
     # Do --------------------------------------------------------------------------------------------
 

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QGraphicsRectItem, QTableWidgetItem
 from dsl_app.calibrate.evidence.base import Evidence, side_by_side, stacked
 from dsl_app.calibrate.evidence.charts import BAR, DOT, Bars, ChartBox, draw_bars, like_a_picture
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable
-from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet, set_role
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.calibration.geometry.pose_series import CELLS, GOOD_RMS_PX, MIN_POSES
@@ -76,12 +75,6 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         self._keys = {step.title: step.key for step in session.steps}
         self._unticked = frozenset(each.name for each in record.left_out if each.by_hand)
         self._fill(record)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        # Colours are changes of items too, and are not ticks.
-        with quiet(self.table):
-            super().apply_theme(theme)
 
     # Poses to leave out ----------------------------------------------------------------------------
 

@@ -6,19 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtGui import QColor, QFont
+from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QTableWidgetItem
 
-from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A number or words of a table; ``role`` is good, warn, bad or muted."""
+    """A number or words of a table; ``role`` is text, good, warn, bad or muted."""
 
     text: str
-    role: str = ""
+    role: str = "text"
 
 
 class NumberTable(ReadTable):
@@ -27,7 +26,7 @@ class NumberTable(ReadTable):
     def __init__(self, name: str, heads: Sequence[tuple[str, str]], words: Sequence[int] = (0,)) -> None:
         """``heads`` are names and tooltips of the columns; ``words`` are the columns that hold words."""
         super().__init__(name, "", [head for head, _ in heads])
-        self._theme, self._words, self._rows = DARK, set(words), list[list[Cell]]()
+        self._words = set(words)
         for column, (_, tip) in enumerate(heads):
             head = self.horizontalHeaderItem(column)
             assert head is not None
@@ -42,33 +41,18 @@ class NumberTable(ReadTable):
 
     def fill(self, rows: Sequence[Sequence[Cell | str]]) -> None:
         """Show other rows, with typographic minus signs."""
-        self._rows = [[each if isinstance(each, Cell) else Cell(each) for each in row] for row in rows]
-        self.show_rows([[self._item(each, i) for i, each in enumerate(row)] for row in self._rows])
-        self._colour()
+        self.show_rows([[self._item(each, i) for i, each in enumerate(row)] for row in rows])
 
-    def _item(self, each: Cell, column: int) -> QTableWidgetItem:
+    def _item(self, each: Cell | str, column: int) -> QTableWidgetItem:
+        known = Cell(each) if isinstance(each, str) else each
         if column in self._words:
-            return cell(each.text)
-        return cell(each.text.replace("-", "−"), side=RIGHT)
+            return cell(known.text, known.role)
+        return cell(known.text.replace("-", "−"), known.role, RIGHT)
 
     def row_texts(self, row: int) -> list[str]:
         """The texts of a row."""
         found = [self.item(row, column) for column in range(self.columnCount())]
         return [each.text() if each is not None else "" for each in found]
-
-    def _colour(self) -> None:
-        theme = self._theme
-        colours = {"": theme.text, "good": theme.good, "warn": theme.warn, "bad": theme.bad}
-        for i, row in enumerate(self._rows):
-            for column, each in enumerate(row):
-                item = self.item(i, column)
-                if item is not None:
-                    item.setForeground(QColor(colours.get(each.role, theme.muted)))
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self._theme = theme
-        self._colour()
 
 
 def with_spread(value: float, std: float) -> str:

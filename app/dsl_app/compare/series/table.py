@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesKind, SeriesState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from dsl_core.evaluation.time_sweep import FIGURES, best_points
@@ -40,7 +39,7 @@ class SeriesTable(ReadTable):
     def __init__(self, state: SeriesState, control: SeriesController) -> None:
         tip = "Results of the series. Double-click a position to change it."
         super().__init__("Results of the series", tip, STAGE_HEADS)
-        self._state, self._control, self._theme = state, control, DARK
+        self._state, self._control = state, control
         triggers = QAbstractItemView.EditTrigger
         self.setEditTriggers(triggers.DoubleClicked | triggers.EditKeyPressed)
         self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -72,8 +71,7 @@ class SeriesTable(ReadTable):
         items = [cell(texts.name), *map(_number, texts.numbers)]
         if self._state.kind.value is SeriesKind.STAGE:
             items[POSITION].setFlags(items[POSITION].flags() | Qt.ItemFlag.ItemIsEditable)
-        colour = self._theme.warn if texts.is_trouble else self._theme.muted
-        return [*items, _fixed(cell(texts.remark, colour))]
+        return [*items, _fixed(cell(texts.remark, "warn" if texts.is_trouble else "muted"))]
 
     def _typed(self, item: QTableWidgetItem) -> None:
         if item.column() != POSITION or self._state.kind.value is not SeriesKind.STAGE:
@@ -96,11 +94,6 @@ class SeriesTable(ReadTable):
         rows = self.selectionModel().selectedRows()
         if rows:
             self._control.select(self._state.rows.value[rows[0].row()].path)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Apply the colours of a theme."""
-        self._theme = theme
-        self.show_series()
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QPushButton, QTableWidgetItem, QWidget
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.state import EffectChoice, EffectsState, EffectsView
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
@@ -42,7 +41,7 @@ class EffectsPanel(QWidget):
 
     def __init__(self, state: EffectsState, controller: EffectsController) -> None:
         super().__init__()
-        self._state, self._controller, self._theme = state, controller, DARK
+        self._state, self._controller = state, controller
         self.choice = ChoiceBox("Effects", "Which effects of light the simulated rig renders")
         for wanted, title, what in _CHOICES:
             self.choice.addItem(title, wanted.value)
@@ -140,18 +139,18 @@ class EffectsPanel(QWidget):
         self._show_state()
 
     def _cells(self, row: Decision) -> tuple[QTableWidgetItem, ...]:
-        colour = self._theme.text if row.on else self._theme.muted
-        first = cell(row.effect.name, colour)
+        role = "text" if row.on else "muted"
+        first = cell(row.effect.name, role)
         first.setToolTip(row.effect.summary)
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         first.setFlags(flags if row.effect.needed else flags | Qt.ItemFlag.ItemIsUserCheckable)
         first.setCheckState(Qt.CheckState.Checked if row.on else Qt.CheckState.Unchecked)
         cost = f"{1e3 * row.cost_s:.1f} ms" if row.cost_s else "–"
         numbers = tuple(
-            cell(text, colour, RIGHT)
+            cell(text, role, RIGHT)
             for text in (f"{number(row.bound.dn)} DN", f"{number(row.bound.sigmas)} σ", cost)
         )
-        return (first, *numbers, cell(row.why, colour))
+        return (first, *numbers, cell(row.why, role))
 
     def _show_state(self) -> None:
         state, view = self._state, self._state.view.value
@@ -172,11 +171,6 @@ class EffectsPanel(QWidget):
             return
         self._summary.setText(view.summary)
         self._saved.setText(view.saved)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self._theme = theme
-        self._show(self._state.view.value)
 
 
 def number(value: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QResizeEvent
@@ -15,12 +16,12 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
+from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 
 LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-
-
+_ROLE = Qt.ItemDataRole.UserRole + 1
 #: Space between rows with wrapped lines, px: without it two rows look like one.
 ROOM_PX = 6
 #: Least width of a column with wrapped lines, px: a few words.
@@ -35,11 +36,15 @@ class _Roomy(QStyledItemDelegate):
 
 
 class ReadTable(QTableWidget):
-    """Whole rows are selected, Tab leaves the table, columns are as wide as their contents."""
+    """Whole rows are selected, Tab leaves the table, columns are as wide as their contents.
+
+    Cells with a role have its colour in the ``theme``.
+    """
 
     def __init__(self, name: str, tip: str, heads: Sequence[str], rows: int = 0) -> None:
         super().__init__(rows, len(heads))
         self._wrapped: int | None = None
+        self.theme = DARK
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.setHorizontalHeaderLabels(heads)
@@ -90,17 +95,29 @@ class ReadTable(QTableWidget):
         with quiet(self.model()):
             for number, row in enumerate(rows):
                 for column, item in enumerate(row):
+                    self._colour(item)
                     self.setItem(number, column, item)
         self.model().layoutChanged.emit()
         if self._wrapped is not None:
             self._fit_wrapped()
 
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme to the cells; nobody is told that they changed."""
+        self.theme = theme
+        with quiet(self):
+            for row, column in product(range(self.rowCount()), range(self.columnCount())):
+                self._colour(self.item(row, column))
 
-def cell(text: str, colour: str = "", side: Qt.AlignmentFlag = LEFT) -> QTableWidgetItem:
-    """An item with its whole text as tooltip."""
+    def _colour(self, item: QTableWidgetItem | None) -> None:
+        role = "" if item is None else item.data(_ROLE)
+        if item is not None and role:
+            item.setForeground(QColor(getattr(self.theme, role)))
+
+
+def cell(text: str, role: str = "", side: Qt.AlignmentFlag = LEFT) -> QTableWidgetItem:
+    """An item with its whole text as tooltip; ``role`` names a colour of the theme, such as muted."""
     item = QTableWidgetItem(text)
-    if colour:
-        item.setForeground(QColor(colour))
+    item.setData(_ROLE, role)
     item.setTextAlignment(side)
     item.setToolTip(text)
     return item

@@ -11,7 +11,7 @@ from dsl_app.scan.effects.panel import EffectsPanel
 from dsl_app.scan.effects.state import EffectsState
 from dsl_app.scan.state import Phase
 from dsl_app.shared.theme import LIGHT
-from dsl_app.shared.widgets.inside import stop_following
+from dsl_app.shared.widgets.inside import apply_theme_to, stop_following
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
@@ -39,7 +39,7 @@ def control(bench: ScanBench) -> EffectsController:
 def panel(qtbot: QtBot, control: EffectsController) -> Iterator[EffectsPanel]:
     made = EffectsPanel(control.state, control)
     qtbot.addWidget(made)
-    made.apply_theme(LIGHT)
+    apply_theme_to(made, LIGHT)
     made.resize(700, 500)
     made.show()
     yield made

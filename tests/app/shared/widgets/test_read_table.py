@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from dsl_app.shared.theme import DARK, LIGHT
 from dsl_app.shared.widgets.read_table import LEAST_WRAPPED_PX, ReadTable, cell
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 
@@ -23,3 +25,26 @@ def test_a_narrow_table_scrolls_instead_of_wrapping_single_words(
     assert header.sectionSize(2) >= LEAST_WRAPPED_PX
     if not scrolls:
         assert header.length() == table.viewport().width()
+
+
+def test_cells_with_a_role_follow_the_theme_and_tell_nobody(qtbot: QtBot) -> None:
+    table = ReadTable("Figures", "What was found", ("Name", "Verdict"))
+    qtbot.addWidget(table)
+    told: list[object] = []
+    table.itemChanged.connect(told.append)
+    table.show_rows([[cell("depth"), cell("missed", "bad")], [cell("angle", "muted"), cell("good", "good")]])
+
+    def colours() -> list[str]:
+        items = [table.item(row, column) for row, column in ((0, 1), (1, 0), (1, 1))]
+        return [item.foreground().color().name() for item in items if item is not None]
+
+    assert colours() == [DARK.bad, DARK.muted, DARK.good]
+    table.apply_theme(LIGHT)
+    assert colours() == [LIGHT.bad, LIGHT.muted, LIGHT.good]
+    table.show_rows([[cell("depth"), cell("missed", "warn")]])
+    plain, late = table.item(0, 0), table.item(0, 1)
+    assert plain is not None
+    assert late is not None
+    assert late.foreground().color().name() == LIGHT.warn
+    assert plain.data(Qt.ItemDataRole.ForegroundRole) is None, "the usual colour, selected or not"
+    assert told == []
