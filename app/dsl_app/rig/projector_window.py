@@ -38,11 +38,6 @@ class ScreenId:
         """Identity of a screen."""
         return cls(screen.manufacturer(), screen.model(), screen.serialNumber(), screen.name())
 
-    @property
-    def text(self) -> str:
-        """How settings remember the screen."""
-        return "|".join((self.manufacturer, self.model, self.serial, self.name))
-
 
 def pixel_size(screen: QScreen) -> tuple[int, int]:
     """Width and height of a screen in real pixels, whatever the display scaling."""

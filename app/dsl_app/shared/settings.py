@@ -31,7 +31,6 @@ class Settings(BaseModel):
     rig_options: dict[str, str] = Field(default_factory=dict)
     recent: list[str] = Field(default_factory=list)
     output_folder: str = ""
-    projector_screen: str = ""
     #: The campaign that was open, the folder of new ones, and when calibrations count as ageing.
     campaign: str = ""
     campaigns_folder: str = ""

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QWidget
 from dsl_app.compare.series.controller import SeriesController
 from dsl_app.compare.series.state import SeriesState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_app.shared.widgets.pictures import DIFFERENCE, RegionBox, colour_map, spread_of
@@ -23,7 +23,7 @@ class SeriesPicture(QWidget):
 
     def __init__(self, state: SeriesState, control: SeriesController) -> None:
         super().__init__()
-        self._state, self._control, self._theme = state, control, DARK
+        self._state, self._control = state, control
         self.title = label("", "heading")
         self.part = push_button(
             "Re&gion", "Use only the pixels in a rectangle, which you can drag on the picture", self._switch
@@ -100,7 +100,6 @@ class SeriesPicture(QWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
-        self._theme = theme
         self.canvas.setBackground(theme.base)
         self.rectangle.apply_theme(theme)
         theme_bar(self.bar, theme)

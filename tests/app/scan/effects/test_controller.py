@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -91,7 +92,7 @@ def test_a_choice_is_put_in_force_by_options_that_scans_note(
     bench.scans.start()
     assert bench.state.phase.value is Phase.DONE
     notes = ScanReader(tmp_path / "first.dsl").manifest.notes
-    assert '"choice": "auto"' in notes["effects"]
+    assert json.loads(notes["effects"])["choice"] == "auto"
     control.apply("usual", ONE_DN)
     assert bench.rig.state.choice.value == TWIN
 
