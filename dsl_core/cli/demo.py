@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dsl_core.cli.guidance import resumed_by
 from dsl_core.cli.options import Effects, Json, Tolerance, parse_size, with_effects
 from dsl_core.cli.output import Output
 from dsl_core.cli.results import print_figures
-from dsl_core.errors import Cancelled
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.io import MANIFEST_NAME
 
@@ -43,11 +43,9 @@ def demo(
     width, height = parse_size("--size", size)
     options = with_effects({"scene": scene, "size": f"{width}x{height}"}, effects, tolerance)
     folder = _choose_folder(out, options)
-    try:
+    with resumed_by(f"dsl-scan demo --out {out}"):
         _capture(output, timer, folder, options)
         result = _reconstruct(output, timer, folder)
-    except (KeyboardInterrupt, Cancelled):
-        raise Cancelled(f"Stopped; 'dsl-scan demo --out {out}' resumes.") from None
     figures = _evaluate(output, timer, folder, result)
     output.costs(timer.stages)
     for name, line in _lines(folder).items():

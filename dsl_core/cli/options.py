@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from dsl_core.model.spectral import WavelengthGrid
 
 T = TypeVar("T")
+N = TypeVar("N", int, float)
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
@@ -118,10 +119,10 @@ class PlanChoice:
         if self.lines is not None and self.comb is not None:
             raise PlanError("--lines and --comb cannot be combined; choose one.")
         if self.lines is not None:
-            width, step = _numbers("--lines", self.lines, "WIDTHxSTEP", 2)
+            width, step = _lengths("--lines", self.lines, "WIDTHxSTEP")
             return _checked("--lines", lambda: ScanLines(width_px=width, step_px=step))
         if self.comb is not None:
-            width, step, period = _numbers("--comb", self.comb, "WIDTHxSTEPxPERIOD", 3)
+            width, step, period = _lengths("--comb", self.comb, "WIDTHxSTEPxPERIOD")
             return _checked("--comb", lambda: LineComb(width_px=width, step_px=step, period_px=period))
         return None
 
@@ -162,10 +163,7 @@ def parse_bands(text: str) -> WavelengthGrid:
     """Bands from ``START:STOP:STEP`` in nm; raises `PlanError`."""
     from dsl_core.model.spectral import WavelengthGrid
 
-    try:
-        start, stop, step = (float(part) for part in text.split(":"))
-    except ValueError as error:
-        raise PlanError(f"--bands must be START:STOP:STEP in nm, like 430:660:5, not {text!r}.") from error
+    start, stop, step = _parts("--bands", text, "START:STOP:STEP in nm, like 430:660:5", float, ":", 3)
     return _checked("--bands", lambda: WavelengthGrid(start_nm=start, stop_nm=stop, step_nm=step))
 
 
@@ -175,19 +173,13 @@ def parse_pixels(texts: Sequence[str]) -> list[tuple[int, int]]:
     >>> parse_pixels(["120,80"])
     [(120, 80)]
     """
-    pixels = []
-    for text in texts:
-        try:
-            x, y = (int(part) for part in text.split(","))
-        except ValueError as error:
-            raise PlanError(f"--pixel must be x,y in whole pixels, like 120,80, not {text!r}.") from error
-        pixels.append((x, y))
-    return pixels
+    wanted = "x,y in whole pixels, like 120,80"
+    return [(x, y) for x, y in (_parts("--pixel", text, wanted, int, ",", 2) for text in texts)]
 
 
 def parse_size(name: str, text: str) -> tuple[int, int]:
     """Width and height from ``890x580``; raises `PlanError`."""
-    width, height = _numbers(name, text, "WIDTHxHEIGHT", 2)
+    width, height = _lengths(name, text, "WIDTHxHEIGHT")
     return width, height
 
 
@@ -197,40 +189,44 @@ def parse_numbers(name: str, text: str) -> list[float]:
     >>> parse_numbers("--positions", "695.2, 707")
     [695.2, 707.0]
     """
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not numbers or not all(math.isfinite(number) for number in numbers):
-        raise PlanError(f"{name} must be numbers separated by commas, like 695.2,707,719, not {text!r}.")
-    return numbers
+    wanted = "numbers separated by commas, like 695.2,707,719"
+    return _parts(name, text, wanted, float, ",", accept=math.isfinite)
 
 
 def parse_region(name: str, text: str) -> tuple[int, int, int, int]:
     """Column, row, width and height from ``10,20,300,200``; raises `PlanError`."""
-    try:
-        x, y, width, height = (int(part) for part in text.split(","))
-    except ValueError as error:
-        raise PlanError(f"{name} must be X,Y,WIDTH,HEIGHT in whole pixels, not {text!r}.") from error
+    x, y, width, height = _parts(name, text, "X,Y,WIDTH,HEIGHT in whole pixels", int, ",", 4)
     return x, y, width, height
 
 
-def _numbers(name: str, text: str, form: str, count: int) -> list[int]:
-    try:
-        numbers = [int(part) for part in text.lower().split("x")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or min(numbers) < 1:
-        raise PlanError(f"{name} must be {form} in whole pixels of at least 1, not {text!r}.")
-    return numbers
+def _lengths(name: str, text: str, form: str) -> list[int]:
+    """Whole pixels separated by x, as many as their ``form`` has."""
+    wanted = f"{form} in whole pixels of at least 1"
+    return _parts(name, text, wanted, int, "x", form.count("x") + 1, lambda length: length >= 1)
 
 
 def _setting(text: str) -> dict[str, float]:
-    try:
-        exposure, level = (float(part) for part in text.split("@"))
-    except ValueError as error:
-        raise PlanError(f"--setting must be EXPOSURE_MS@LEVEL, like 166.7@0.2, not {text!r}.") from error
+    exposure, level = _parts("--setting", text, "EXPOSURE_MS@LEVEL, like 166.7@0.2", float, "@", 2)
     return {"exposure_ms": exposure, "level": level}
+
+
+def _parts(
+    name: str,
+    text: str,
+    wanted: str,
+    kind: type[N],
+    separator: str,
+    count: int = 0,
+    accept: Callable[[N], bool] = lambda part: True,
+) -> list[N]:
+    """A text's numbers, ``count`` of them (0: any); raises `PlanError` that says what is ``wanted``."""
+    try:
+        parts = [kind(part) for part in text.lower().split(separator)]
+    except ValueError:
+        parts = []
+    if not parts or count not in (0, len(parts)) or not all(map(accept, parts)):
+        raise PlanError(f"{name} must be {wanted}, not {text!r}.")
+    return parts
 
 
 def _checked(name: str, make: Callable[[], T]) -> T:

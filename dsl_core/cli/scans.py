@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dsl_core.cli.guidance import resumed_by
 from dsl_core.cli.options import (
     CalibrationName,
     Code,
@@ -29,7 +28,7 @@ from dsl_core.cli.options import (
     with_effects,
 )
 from dsl_core.cli.output import Output
-from dsl_core.errors import Cancelled, StoreError
+from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 
 if TYPE_CHECKING:
@@ -131,7 +130,7 @@ def scan(
         _require_patterns(fitted)
         _state(output, fitted, target, calibrated)
         notes = rig_notes(rig, options) | overridden
-        with output.progress() as progress, _resumable(target):
+        with output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
             status = pipeline.scan(calibrated, fitted, target, progress, notes)
     _done(output, target, status.total, status.elapsed_s)
 
@@ -154,7 +153,7 @@ def resume(
     output = Output(json)
     _say_gaps(output, target)
     opened = open_rig(rig, parse_options(option)) if rig else scans.reopen_rig(target)
-    with opened as devices, output.progress() as progress, _resumable(target):
+    with opened as devices, output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
         status = scans.resume(devices, target, progress, drift)
     _done(output, target, status.total, status.elapsed_s)
 
@@ -210,14 +209,3 @@ def _done(output: Output, target: Path, frames: int, seconds: float) -> None:
     )
     output.put(session=target, frames=frames, seconds=round(seconds, 2), state="finished")
     output.finish()
-
-
-@contextmanager
-def _resumable(target: Path) -> Iterator[None]:
-    """Turn Ctrl-C into a sentence with the command that resumes."""
-    try:
-        yield
-    except (KeyboardInterrupt, Cancelled):
-        raise Cancelled(
-            f"Stopped; every frame captured so far is saved. Resume with: dsl-scan resume {target}"
-        ) from None
