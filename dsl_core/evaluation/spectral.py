@@ -15,12 +15,24 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class SpectralErrors:
-    """Errors of n spectra, each array of shape (n,); ``scaled`` errors are those left after a free scale.
+class SpectrumErrors:
+    """Errors of one spectrum; ``scaled`` errors are those left after a free scale.
 
     ``rmse`` over bands on the reflectance scale; ``angle_rad`` does not depend on scale; ``delta_e`` is
     CIEDE2000 under D65; ``scale`` is the factor that brings the measurement closest to the truth.
     """
+
+    rmse: float
+    angle_rad: float
+    delta_e: float
+    scale: float
+    rmse_scaled: float
+    delta_e_scaled: float
+
+
+@dataclass(frozen=True)
+class SpectralErrors:
+    """Errors of n spectra as those of `SpectrumErrors`, each array of shape (n,)."""
 
     rmse: Floats
     angle_rad: Floats
@@ -28,6 +40,11 @@ class SpectralErrors:
     scale: Floats
     rmse_scaled: Floats
     delta_e_scaled: Floats
+
+    @property
+    def first(self) -> dict[str, float]:
+        """Those of the first spectrum, by name."""
+        return {name: float(values[0]) for name, values in vars(self).items()}
 
 
 def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> SpectralErrors:
@@ -117,19 +134,9 @@ MIN_BANDS = 5
 
 
 @dataclass(frozen=True)
-class SpectrumComparison:
-    """How a spectrum differs from a reference over the bands they share.
+class SpectrumComparison(SpectrumErrors):
+    """How a spectrum differs from a reference over the bands they share."""
 
-    ``rmse`` on the reflectance scale, ``delta_e`` CIEDE2000 under D65; ``_scaled`` after the factor ``scale``
-    that brings the spectrum closest to the reference. The angle does not depend on scale.
-    """
-
-    rmse: float
-    angle_rad: float
-    delta_e: float
-    scale: float
-    rmse_scaled: float
-    delta_e_scaled: float
     bands: int
     range_nm: tuple[float, float]
 
@@ -152,13 +159,4 @@ def compare(
     bands = np.asarray(wavelengths_nm[shared], np.float64)
     wanted = np.interp(bands, nm, np.asarray(reference.values))
     found = spectral_errors(np.asarray(spectrum[shared], np.float64)[:, None], wanted[:, None], bands)
-    return SpectrumComparison(
-        rmse=float(found.rmse[0]),
-        angle_rad=float(found.angle_rad[0]),
-        delta_e=float(found.delta_e[0]),
-        scale=float(found.scale[0]),
-        rmse_scaled=float(found.rmse_scaled[0]),
-        delta_e_scaled=float(found.delta_e_scaled[0]),
-        bands=count,
-        range_nm=(float(bands[0]), float(bands[-1])),
-    )
+    return SpectrumComparison(**found.first, bands=count, range_nm=(float(bands[0]), float(bands[-1])))

@@ -72,8 +72,10 @@ def as_published(records: Sequence[FileRecord]) -> tuple[int, int]:
 
 @dataclass
 class FolderSurvey:
-    """The usable file of every place, and the table of all files."""
+    """The usable file of every place of a plan below ``root``, and the table of all files."""
 
+    root: Path
+    plan: CapturePlan
     files: dict[Place, Path] = field(default_factory=dict)
     records: list[FileRecord] = field(default_factory=list)
     by_place: dict[Place, FileRecord] = field(default_factory=dict)
@@ -86,6 +88,47 @@ class FolderSurvey:
             if path is not None and record.status in {"ok", "misnamed"}:
                 self.files[place] = path
 
+    def look_at_folder(self, role: Role, setting: int, count: int) -> None:
+        """Look for the ``count`` frames of a role at a setting."""
+        folder = find_folder(self.root, role, setting, self.plan.settings[setting])
+        if folder is None:
+            name = f"{folder_name(role, setting)}/"
+            images = "1 image" if count == 1 else f"{count} images"
+            record = FileRecord(name, None, "missing", f"{_loss(role)} ({images})")
+            self.add(record)
+            self.by_place |= {(role, setting, pattern): record for pattern in range(count)}
+            return
+        numbered, stray = _numbered(folder, count)
+        shift = 1 if count > 1 and 0 not in numbered and count in numbered else 0
+        for pattern in range(count):
+            candidates = numbered.pop(pattern + shift, [])
+            self._look_at_frame((role, setting, pattern), folder, candidates, shift)
+            stray += candidates[1:]
+        stray += [path for paths in numbered.values() for path in paths]
+        for path in sorted(stray):
+            name = path.relative_to(self.root).as_posix()
+            advice = "not a frame of the plan, ignored; check that the plan is the scan's"
+            self.add(FileRecord("", name, "extra", advice))
+
+    def _look_at_frame(self, place: Place, folder: Path, candidates: list[Path], shift: int) -> None:
+        role, setting, pattern = place
+        wanted = folder_name(role, setting)
+        expected = f"{wanted}/{file_name(role, pattern)}"
+        if not candidates:
+            self.add(FileRecord(expected, None, "missing", _loss(role)), place)
+            return
+        path = candidates[0]
+        found = path.relative_to(self.root).as_posix()
+        status, advice = _judge(probe_png(path), self.plan)
+        if status == "ok":
+            if shift:
+                status, advice = "misnamed", "the numbers start at 1; used as if they started at 0"
+            elif role in {"spectral", "code"} and not _is_named(path, role, pattern):
+                status, advice = "misnamed", f"used by its number; rename it to {file_name(role, pattern)}"
+            elif folder.name != wanted and _bare(folder.name) == _bare(wanted):
+                status, advice = "misnamed", f"used; rename the folder to {wanted}"
+        self.add(FileRecord(expected, found, status, advice), place, path)
+
 
 def check_dataset(root: Path, plan: CapturePlan) -> list[FileRecord]:
     """The table of a dataset folder: a line for every file that a plan needs or that is in its way.
@@ -97,10 +140,10 @@ def check_dataset(root: Path, plan: CapturePlan) -> list[FileRecord]:
 
 def survey(root: Path, plan: CapturePlan) -> FolderSurvey:
     """Look for every shot of a plan below ``root``."""
-    result = FolderSurvey()
+    result = FolderSurvey(root, plan)
     counts = Counter((shot.role, shot.setting) for shot in plan.shots())
     for (role, setting), count in counts.items():
-        _survey_folder(result, root, plan, role, setting, count)
+        result.look_at_folder(role, setting, count)
     points = root / DEPTH_NAME
     if points.is_file():
         result.add(FileRecord(DEPTH_NAME, DEPTH_NAME, "ok", ""))
@@ -137,30 +180,6 @@ def _bare(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def _survey_folder(
-    result: FolderSurvey, root: Path, plan: CapturePlan, role: Role, setting: int, count: int
-) -> None:
-    folder = find_folder(root, role, setting, plan.settings[setting])
-    if folder is None:
-        name = f"{folder_name(role, setting)}/"
-        images = "1 image" if count == 1 else f"{count} images"
-        record = FileRecord(name, None, "missing", f"{_loss(role)} ({images})")
-        result.add(record)
-        result.by_place |= {(role, setting, pattern): record for pattern in range(count)}
-        return
-    numbered, stray = _numbered(folder, count)
-    shift = 1 if count > 1 and 0 not in numbered and count in numbered else 0
-    for pattern in range(count):
-        candidates = numbered.pop(pattern + shift, [])
-        _survey_frame(result, root, plan, (role, setting, pattern), folder, candidates, shift)
-        stray += candidates[1:]
-    stray += [path for paths in numbered.values() for path in paths]
-    for path in sorted(stray):
-        name = path.relative_to(root).as_posix()
-        advice = "not a frame of the plan, ignored; check that the plan is the scan's"
-        result.add(FileRecord("", name, "extra", advice))
-
-
 def _numbered(folder: Path, count: int) -> tuple[dict[int, list[Path]], list[Path]]:
     """PNG files by the last number in their names, well-named ones first, and those without a number."""
     numbered: dict[int, list[Path]] = {}
@@ -182,34 +201,6 @@ def _numbered(folder: Path, count: int) -> tuple[dict[int, list[Path]], list[Pat
 
 def _is_named(path: Path, role: Role, pattern: int) -> bool:
     return path.name in {name.format(n=pattern) for name in _FILE_NAMES[role]}
-
-
-def _survey_frame(
-    result: FolderSurvey,
-    root: Path,
-    plan: CapturePlan,
-    place: Place,
-    folder: Path,
-    candidates: list[Path],
-    shift: int,
-) -> None:
-    role, setting, pattern = place
-    wanted = folder_name(role, setting)
-    expected = f"{wanted}/{file_name(role, pattern)}"
-    if not candidates:
-        result.add(FileRecord(expected, None, "missing", _loss(role)), place)
-        return
-    path = candidates[0]
-    found = path.relative_to(root).as_posix()
-    status, advice = _judge(probe_png(path), plan)
-    if status == "ok":
-        if shift:
-            status, advice = "misnamed", "the numbers start at 1; used as if they started at 0"
-        elif role in {"spectral", "code"} and not _is_named(path, role, pattern):
-            status, advice = "misnamed", f"used by its number; rename it to {file_name(role, pattern)}"
-        elif folder.name != wanted and _bare(folder.name) == _bare(wanted):
-            status, advice = "misnamed", f"used; rename the folder to {wanted}"
-    result.add(FileRecord(expected, found, status, advice), place, path)
 
 
 def _judge(info: PngInfo | str, plan: CapturePlan) -> tuple[Status, str]:
