@@ -1,7 +1,9 @@
 """Normals and shading from a depth map.
 
 A plane's inverse depth is affine in the normalised image coordinates, ``1/z = (n . ray) / d``, so a
-weighted plane fit in a window is a 3 x 3 system of box-filtered sums.
+weighted plane fit in a window is a 3 x 3 system of box-filtered sums. Each pixel takes the window, of several
+sizes and places, that promises the smallest error: a large one on a plane, where noise counts, a small one
+where the surface curves, and one on the pixel's own side of a jump or a crease.
 """
 
 from __future__ import annotations
@@ -17,6 +19,21 @@ from dsl_core.optics.sensor import relative_gain
 
 Map = NDArray[np.float64]
 
+#: Smallest window, and the ratio of one size to the next.
+LEAST_PX, RATIO = 3, 1.7
+#: Error of a slope that a misfit causes, relative to that of as much noise in a single sample: a curved
+#: surface tilts the plane of a window next to the pixel far more than one around it.
+CENTRED, BESIDE = 1.0, 4.0
+#: A further window must promise this share of the variance: noise alone should not choose it.
+CLEARLY_BETTER = 0.7
+#: A misfit this many deviations of its own noise counts by itself; others are averaged with those around.
+CLEAR_MISFIT = 10.0
+#: A jump is this many deviations of the step to a neighbour, and this share of the inverse depth.
+JUMP_SIGMAS, JUMP_SHARE = 5.0, 0.004
+#: Relative error of the light of a pixel next to a jump. One of the two pixels there sees both sides, by a
+#: share that nobody knows: at least half of it its own, evenly distributed.
+MIXED_REL_STD = (0.5 / 12) ** 0.5
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -30,32 +47,45 @@ class Surface:
 
 
 def default_window_px(rig: Rig) -> int:
-    """Window of the plane fits: about 1/45 of the image width, odd, at least 5."""
+    """Largest window of the plane fits: about 1/45 of the image width, odd, at least 5."""
     return max(5, rig.camera.width_px // 45 | 1)
 
 
+def windows_px(largest: int) -> list[int]:
+    """Sizes of windows, odd, from the largest to the smallest.
+
+    >>> windows_px(19)
+    [19, 11, 7, 5, 3]
+    """
+    sizes = [largest]
+    while (smaller := int(sizes[-1] / RATIO) | 1) >= LEAST_PX and smaller < sizes[-1]:
+        sizes.append(smaller)
+    return sizes
+
+
 def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: int | None = None) -> Surface:
-    """Fit planes around every pixel with a depth (NaN elsewhere) and derive normal and shading."""
+    """Fit planes around every pixel with a depth (NaN elsewhere) and derive normal and shading.
+
+    ``window_px`` is the size of the largest window. The deviation of a normal holds the noise of depth and
+    what the misfit of the plane says about curvature; next to a jump that of shading holds mixed pixels.
+    """
     rays = pixel_rays(rig.camera)
-    window = window_px or default_window_px(rig)
     valid = np.isfinite(depth_mm)
     inverse = np.where(valid, 1 / np.where(valid, depth_mm, 1), 0.0)
     std = np.where(valid, depth_std_mm, 1.0) * np.where(valid, inverse, 1.0) ** 2
-    weight = np.where(valid, 1 / np.maximum(std, 1e-9) ** 2, 0.0)
-    weight = weight / (weight.max(initial=0) or 1.0)
-    fit, covariance, mean_square, count = _plane_fits(rays, inverse, weight, window)
-    fit, covariance, mean_square, count = _best_window(
-        rays, inverse, window // 2, fit, covariance, mean_square, count
-    )
-    noise = np.sqrt(np.maximum(_box(weight * std**2, window), 0) / np.maximum(_box(weight, window), 1e-30))
-    normal, spread = _normals(fit, covariance, noise)
-    # Curvature bends smooth surfaces away from their tangent plane; a jump is many times that and the noise.
-    jump = np.sqrt(np.maximum(mean_square, 0)) > 5 * noise + 0.004 * inverse
-    bad = ~valid | (count < max(6, 0.15 * window**2))
+    best = _Best(rays, inverse, std)
+    for window in windows_px(window_px or default_window_px(rig)):
+        best.offer(_plane_fits(rays, inverse, std, valid, window), window)
+    bad = ~valid | ~np.isfinite(best.variance)
+    length = np.maximum(np.linalg.norm(best.fit, axis=0), 1e-12)
+    normal = -best.fit / length
     normal[:, bad] = np.nan
+    spread = np.where(bad, np.nan, np.sqrt(best.variance) / length)
+    edge = (_beside_jump(rays, inverse, best.fit[:2], std, valid) | bad) & valid
     shading, incidence_tan = _shading(rig, rays * np.where(valid, depth_mm, np.nan), normal)
     relative = np.hypot(incidence_tan * spread, 2 * np.where(valid, depth_std_mm * inverse, np.nan))
-    return Surface(normal, np.where(bad, np.nan, spread), shading, relative, (jump | bad) & valid)
+    relative = np.where(edge, np.hypot(relative, MIXED_REL_STD), relative)
+    return Surface(normal, spread, shading, relative, edge)
 
 
 def _box(values: Map, window: int) -> Map:
@@ -66,9 +96,27 @@ def _box(values: Map, window: int) -> Map:
     )
 
 
-def _plane_fits(rays: Map, inverse: Map, weight: Map, window: int) -> tuple[Map, Map, Map, Map]:
-    """Coefficients (3, ...), unit covariance (xx, xy, yy), weighted mean square residual, pixel count."""
+@dataclass(frozen=True)
+class _Fits:
+    """Planes of the windows around every pixel, maps of (rows, columns).
+
+    ``fit`` (3, rows, columns) are the coefficients of the rays, ``variance`` that of a slope by the noise
+    of depth, ``misfit`` the square of a slope's error by what the plane leaves, relative to `CENTRED`;
+    ``unit`` the variance of a slope for noise of one; ``count`` the pixels, zero where they are too few.
+    """
+
+    fit: Map
+    variance: Map
+    misfit: Map
+    unit: Map
+    count: Map
+
+
+def _plane_fits(rays: Map, inverse: Map, std: Map, valid: NDArray[np.bool_], window: int) -> _Fits:
+    """Weighted least squares in every window; the noise is ``std`` of the inverse depth."""
     x, y = rays[0], rays[1]
+    weight = np.where(valid, 1 / np.maximum(std, 1e-15) ** 2, 0.0)
+    weight = weight / (weight.max(initial=0) or 1.0)
     total = np.maximum(_box(weight, window), 1e-30)
 
     def mean(values: Map) -> Map:
@@ -82,52 +130,85 @@ def _plane_fits(rays: Map, inverse: Map, weight: Map, window: int) -> tuple[Map,
     alpha, beta = (c * rx - b * ry) / determinant, (a * ry - b * rx) / determinant
     residual = mean(inverse**2) - level**2 - alpha * rx - beta * ry
     count = _box((weight > 0).astype(float), window) * window**2
-    unit = np.stack([c, -b, a]) / (determinant * np.maximum(count, 1))
-    return np.stack([alpha, beta, level - alpha * mx - beta * my]), unit, residual, count
+    count = np.where(count >= max(6, 0.15 * window**2), count, 0.0)
+    unit = np.maximum(a, c) / (determinant * np.maximum(count, 1))
+    noise = np.maximum(mean(std**2), 0)
+    misfit = _beyond_noise(residual, noise, count, window)
+    fit = np.stack([alpha, beta, level - alpha * mx - beta * my])
+    return _Fits(fit, noise * unit, misfit * unit * count, unit, count)
 
 
-def _best_window(
-    rays: Map, inverse: Map, shift: int, fit: Map, unit: Map, residual: Map, count: Map
-) -> tuple[Map, Map, Map, Map]:
-    """For each pixel the window, centred or next to it, whose plane explains it best (Kuwahara's idea).
+def _beyond_noise(residual: Map, noise: Map, count: Map, window: int) -> Map:
+    """Mean square that planes leave beyond the noise's.
 
-    A centred window mixes both sides of a depth jump; one that is on the pixel's own side does not.
+    A window alone would not see a curvature that tilts its plane by several deviations; surfaces curve alike
+    in the neighbourhood, so that its mean does.
     """
-    stack = np.concatenate([fit, unit, residual[None], count[None]])
-    best = stack.copy()
-    enough = 0.5 * count.max(initial=1)
-
-    def cost(maps: Map) -> Map:
-        miss = maps[0] * rays[0] + maps[1] * rays[1] + maps[2] - inverse
-        return np.where(maps[7] >= enough, miss**2 + np.maximum(maps[6], 0), np.inf)
-
-    # A window next to the pixel must be clearly better: noise alone should not choose it.
-    lowest = 0.5 * cost(stack)
-    for dy, dx in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-        moved = _moved(stack, dy * shift, dx * shift)
-        here = cost(moved)
-        better = here < lowest
-        lowest = np.where(better, here, lowest)
-        best[:, better] = moved[:, better]
-    return best[:3], best[3:6], best[6], best[7]
+    many = np.maximum(count, 4)
+    excess = residual * many / (many - 3) - noise
+    clear = excess > CLEAR_MISFIT * noise * np.sqrt(2 / many)
+    counted = ((count > 0) & ~clear).astype(float)
+    wide = 2 * window + 1
+    smooth = _box(excess * counted, wide) / np.maximum(_box(counted, wide), 1e-9)
+    return np.maximum(np.where(clear, excess, smooth), 0)
 
 
-def _moved(stack: Map, down: int, right: int) -> Map:
-    """Maps shifted by whole pixels; windows from beyond the image count no pixels."""
-    moved = np.roll(stack, (down, right), axis=(1, 2))
-    count = moved[-1]
-    if down:
-        count[slice(0, down) if down > 0 else slice(down, None)] = 0
-    if right:
-        count[:, slice(0, right) if right > 0 else slice(right, None)] = 0
-    return moved
+class _Best:
+    """For each pixel the plane of the smallest expected error among all that were offered.
+
+    A window around a pixel mixes both sides of a depth jump; one next to it that is on the pixel's own side
+    does not (Kuwahara's idea).
+    """
+
+    def __init__(self, rays: Map, inverse: Map, std: Map) -> None:
+        self.rays, self.inverse, self.std = rays, inverse, std
+        self.fit = np.zeros((3, *inverse.shape))
+        #: Expected square of the error of a slope of inverse depth, infinite without a plane.
+        self.variance = np.full(inverse.shape, np.inf)
+
+    def offer(self, fits: _Fits, window: int) -> None:
+        """Take the planes of windows of one size where they promise more, around pixels and next to them."""
+        everywhere = np.arange(self.inverse.size)
+        self._take(fits, everywhere, everywhere, CENTRED, 0.0)
+        # Next to a pixel only where the window around it does not fit.
+        doubtful = np.flatnonzero(self.variance > 4 * fits.variance)
+        row, column = np.divmod(doubtful, self.inverse.shape[1])
+        shift, enough = window // 2, 0.5 * window**2
+        for down, right in ((0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+            y, x = row - down * shift, column - right * shift
+            inside = (y >= 0) & (y < self.inverse.shape[0]) & (x >= 0) & (x < self.inverse.shape[1])
+            source = y[inside] * self.inverse.shape[1] + x[inside]
+            self._take(fits, doubtful[inside], source, BESIDE, enough)
+
+    def _take(
+        self, fits: _Fits, pixels: NDArray[np.intp], source: NDArray[np.intp], tilt: float, enough: float
+    ) -> None:
+        """Offer pixels (flat) the planes of the windows around other pixels."""
+        fit = fits.fit.reshape(3, -1)[:, source]
+        unit, count = fits.unit.ravel()[source], fits.count.ravel()[source]
+        off = (fit * self.rays.reshape(3, -1)[:, pixels]).sum(0) - self.inverse.ravel()[pixels]
+        # The pixel itself has to be on the plane.
+        off = np.maximum(off**2 - 9 * self.std.ravel()[pixels] ** 2, 0) * unit * count
+        variance = fits.variance.ravel()[source] + tilt**2 * fits.misfit.ravel()[source] + BESIDE**2 * off
+        known = self.variance.ravel()[pixels]
+        better = (count > enough) & (variance < CLEARLY_BETTER * known)
+        self.variance.reshape(-1)[pixels[better]] = variance[better]
+        self.fit.reshape(3, -1)[:, pixels[better]] = fit[:, better]
 
 
-def _normals(fit: Map, unit: Map, noise: Map) -> tuple[Map, Map]:
-    """Unit normals towards the camera and a standard deviation (rad) from the fit's covariance."""
-    length = np.maximum(np.linalg.norm(fit, axis=0), 1e-12)
-    normals = -fit / length
-    return normals, noise * np.sqrt(np.maximum(np.maximum(unit[0], unit[2]), 0)) / length
+def _beside_jump(
+    rays: Map, inverse: Map, slope: Map, std: Map, valid: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Pixels one of whose eight neighbours is off their plane by more than noise and curvature explain."""
+    rows, columns = inverse.shape
+    around = [np.pad(each, 1) for each in (rays[0], rays[1], inverse, std, valid.astype(float))]
+    found = np.zeros_like(valid)
+    for place in range(9):
+        down, right = divmod(place, 3)
+        x, y, there, spread, known = (each[down : down + rows, right : right + columns] for each in around)
+        step = there - inverse - slope[0] * (x - rays[0]) - slope[1] * (y - rays[1])
+        found |= (np.abs(step) > JUMP_SIGMAS * np.hypot(std, spread) + JUMP_SHARE * inverse) & (known > 0)
+    return found & valid
 
 
 def _shading(rig: Rig, points: Map, normals: Map) -> tuple[Map, Map]:

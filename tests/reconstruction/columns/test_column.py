@@ -7,15 +7,12 @@ import pytest
 import torch
 
 from dsl_core.model.plan import CapturePlan, Columns, LineComb, ScanLines
-from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.correspondence import triangulate, zero_order
 from dsl_core.optics.line_profile import halo_of_line, zero_order_profile
 from dsl_core.optics.line_set import LineSet
-from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.reconstruction.columns.column import dark_offset, refine
-from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
-from dsl_core.simulation.scenes.catalogue import make_scene
 
 LINES = LineSet(width_px=5, step_px=2, first_px=2.0, lines=318, frames=318)
 RESPONSE = ProjectorResponse(blur_px=0.6, halo_peak_per_px=1e-3, halo_decay_px=31.0)
@@ -150,61 +147,6 @@ def test_rays_that_miss_the_column_have_no_depth() -> None:
     rig = published_rig()
     found, _ = triangulate(rig, torch.tensor([0]), torch.tensor([3000.0], dtype=torch.float64))
     assert torch.isnan(found).all()
-
-
-def small_rig() -> Rig:
-    rig = published_rig()
-    return rig.model_copy(update={"camera": rig.camera.resized(120, 80)})
-
-
-@pytest.mark.parametrize(
-    ("scene", "options", "limit_deg"),
-    [("plane", {"tilt_x_deg": 20.0, "tilt_y_deg": -15.0}, 0.02), ("sphere", {}, 3.5)],
-)
-def test_normals_of_known_surfaces(scene: str, options: dict[str, float], limit_deg: float) -> None:
-    rig = small_rig()
-    truth = make_scene(scene, **options).render(rig.camera, rig.pose.projector_centre_mm)
-    surface = reconstruct_surface(rig, truth.depth_mm, np.full(truth.depth_mm.shape, 0.3), 5)
-    length = np.linalg.norm(surface.normals, axis=0)
-    cosine = (surface.normals * truth.normals).sum(0)
-    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-    known = np.isfinite(angle) & ~surface.edge
-    # Steep slopes at a sphere's rim are not planes within a window.
-    known &= truth.normals[2] < -0.6
-    assert known.sum() > 300
-    assert length[known] == pytest.approx(1.0)
-    assert np.percentile(angle[known], 75) < limit_deg
-
-
-def test_shading_of_a_plane_is_cosine_over_squared_distance() -> None:
-    rig = small_rig()
-    truth = make_scene("plane", tilt_y_deg=25.0).render(rig.camera, rig.pose.projector_centre_mm)
-    surface = reconstruct_surface(rig, truth.depth_mm, np.full(truth.depth_mm.shape, 0.3))
-    points = pixel_rays(rig.camera) * truth.depth_mm
-    to_light = rig.pose.projector_centre_mm[:, None, None] - points
-    distance = np.linalg.norm(to_light, axis=0)
-    expected = (truth.normals * to_light).sum(0) / distance * (700.0 / distance) ** 2
-    assert surface.shading == pytest.approx(expected, rel=1e-3)
-    assert not surface.edge.any()
-
-
-def test_planes_beside_a_step_are_those_of_their_own_side() -> None:
-    rig = small_rig()
-    depth = np.full((80, 120), 700.0)
-    depth[:, 60:] = 750.0
-    surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.3), 5)
-    inner = surface.normals[:, 4:-4, 4:-4]
-    assert np.isfinite(inner).all()
-    assert inner[2].max() < -0.999
-
-
-def test_a_lonely_pixel_has_no_normal() -> None:
-    rig = small_rig()
-    depth = np.full((80, 120), np.nan)
-    depth[10, 10], depth[40:60, 40:60] = 700.0, 700.0
-    surface = reconstruct_surface(rig, depth, np.full(depth.shape, 0.3), 5)
-    assert np.isnan(surface.normals[:, 10, 10]).all()
-    assert np.isfinite(surface.normals[:, 50, 50]).all()
 
 
 def test_a_saturated_line_is_as_bright_as_its_flanks_say() -> None:
