@@ -107,10 +107,6 @@ class CalibrationSession:
         except StoreError as error:
             return StepStatus(step, "refused", str(error))
 
-    def next_step(self) -> Step | None:
-        """The first step without accepted captures, None when all are captured."""
-        return next((each.step for each in self.statuses() if each.state != "captured"), None)
-
     def place(self, step: Step) -> bool:
         """Let the rig place the target of a step; False when a person has to."""
         if self.devices.place is None:

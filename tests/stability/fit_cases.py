@@ -49,7 +49,7 @@ def _fitted(values: Floats, depths: Floats = DEPTHS, limit_px: float = 0.02) -> 
         if not np.isfinite(fit.grid.array).all():
             return Outcome("wrong", "a coefficient is no finite number")
         worst = float(np.nanmax(np.abs(fit.residual_px)))
-        said = f"{worst:.0e} px at most, {fit.used_share:.0%} used"
+        said = f"{worst:.0e} px at most, {np.isfinite(fit.residual_px).mean():.0%} used"
         return Outcome("right" if worst < limit_px else "wrong", said)
 
     return run

@@ -67,11 +67,6 @@ class GridFit:
         """Root mean square of the used residuals."""
         return float(np.sqrt(np.nanmean(self.residual_px**2)))
 
-    @property
-    def used_share(self) -> float:
-        """Share of the samples that the fit used."""
-        return float(np.isfinite(self.residual_px).mean())
-
 
 def fit_grid(samples: GridSamples) -> GridFit:
     """Fit Eq. (2) of the seed at every node, order and wavelength, leaving wrong samples out.

@@ -13,7 +13,6 @@ from dsl_core.optics.sensor import bayer_channels
 #: Limits: scatter of blocks in the middle (%), tilt (degrees).
 UNEVEN_PERCENT, MAX_TILT_DEG = 1.0, 15.0
 LOOK_UNEVEN_PERCENT = 25.0
-_LEDS = ("red", "green", "blue")
 
 
 def unevenness_of_middle(picture: NDArray[np.float64], rig: Rig) -> Figure:

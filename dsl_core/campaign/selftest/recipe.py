@@ -13,13 +13,12 @@ from dsl_core.campaign.common.recipe import Bench, Recipe, Step, naming
 from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SEED, SelfTestRun, load_capture, save_capture
 from dsl_core.campaign.selftest.recorder import Recorder
 from dsl_core.campaign.selftest.survey import survey
-from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError
 from dsl_core.model.calibration.selftest import SelfTest
 from dsl_core.model.figure import Figure
 from dsl_core.model.placement import Placement
 from dsl_core.model.rig import Rig
-from dsl_core.progress import NoProgress, Progress
+from dsl_core.progress import Progress
 
 #: Share of the camera's pixels that the picture should light well.
 _LIT_SHARE = 0.2
@@ -109,17 +108,3 @@ class SelfTestRecipe(Recipe[SelfTest]):
         if record.cycle.period_ms is not None:
             changes["frame_period_ms"] = record.cycle.period_ms.value
         return rig.model_copy(update=changes)
-
-
-def run_selftest(
-    devices: DeviceRig, progress: Progress | None = None, recipe: SelfTestRecipe | None = None
-) -> tuple[SelfTest, tuple[Figure, ...]]:
-    """The self-test alone, on the target that is in place or that the rig can place; nothing is kept.
-
-    Returns what was found and its figures; raises `CalibrationError` and `DeviceError`.
-    """
-    recipe, progress = recipe or SelfTestRecipe(), progress or NoProgress()
-    if devices.place is not None:
-        devices.place(_STEP.placement)
-    found = analyse(SelfTestRun(devices, progress, recipe.wanted_ms).capture())
-    return found, recipe.figures(found)

@@ -14,8 +14,6 @@ from dsl_core.io.result.result_file import load_result
 from dsl_core.model.result import VARIABLES
 from dsl_core.progress import NoProgress, Progress
 
-Floats = NDArray[np.float32]
-
 
 @dataclass(frozen=True)
 class ResultArrays:

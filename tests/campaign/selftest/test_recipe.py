@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dsl_core.calibration.selftest.record import analyse
 from dsl_core.campaign.common.recipe import Bench
 from dsl_core.campaign.recipes import load_recipe
-from dsl_core.campaign.selftest.capture import ARCHIVE_NAME
-from dsl_core.campaign.selftest.recipe import SelfTestRecipe, run_selftest
+from dsl_core.campaign.selftest.capture import ARCHIVE_NAME, SelfTestRun
+from dsl_core.campaign.selftest.recipe import SelfTestRecipe
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DeviceError, StoreError
 from dsl_core.model.calibration.selftest import Measured, SelfTest
 from dsl_core.model.figure import Figure, failures
-from dsl_core.progress import CallbackProgress, CancelToken, NoProgress
+from dsl_core.progress import CallbackProgress, CancelToken, NoProgress, Progress
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import open_twin
 from tests.cases.faults import FaultPlan, with_faults
@@ -35,6 +36,15 @@ def score(measured: Measured, truth: float) -> float:
 
 def failed(figures: tuple[Figure, ...]) -> list[str]:
     return [figure.name.split(",")[0] for figure in failures(figures)]
+
+
+def run_selftest(
+    devices: DeviceRig, progress: Progress | None = None, recipe: SelfTestRecipe | None = None
+) -> tuple[SelfTest, tuple[Figure, ...]]:
+    """The self-test alone, on the target that is in place: what was found, and its figures."""
+    recipe = recipe or SelfTestRecipe()
+    found = analyse(SelfTestRun(devices, progress or NoProgress(), recipe.wanted_ms).capture())
+    return found, recipe.figures(found)
 
 
 @pytest.fixture(scope="module")
