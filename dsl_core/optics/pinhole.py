@@ -17,6 +17,8 @@ from dsl_core.model.geometry import Lens
 
 #: How far beyond the image circle the radial factor still changes (squared radius, unit focal length).
 FADE_RADIUS_SQ = 0.3
+#: Places along each side of the image where the distortion is inverted to find the image circle.
+GRID_POINTS = 17
 
 
 def distort(
@@ -89,10 +91,17 @@ def rays_at(lens: Lens, columns_px: NDArray[np.float64], rows_px: NDArray[np.flo
     return np.stack([x, y, np.ones_like(x)])
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)
 def max_radius_sq(lens: Lens) -> float:
-    """Squared radius of the image circle, a tenth beyond the farthest corner (unit focal length)."""
-    corners = pixel_rays(lens)[:2, [0, 0, -1, -1], [0, -1, 0, -1]]
+    """Squared radius of the image circle, a tenth beyond the farthest corner (unit focal length).
+
+    Raises `CalibrationError` when the distortion cannot be inverted inside the image.
+    """
+    # A coarse grid with all corners: fits ask for another lens at every step.
+    columns, rows = np.meshgrid(
+        np.linspace(0, lens.width_px - 1, GRID_POINTS), np.linspace(0, lens.height_px - 1, GRID_POINTS)
+    )
+    corners = rays_at(lens, columns, rows)[:2, [0, 0, -1, -1], [0, -1, 0, -1]]
     return float(1.21 * (corners**2).sum(0).max())
 
 

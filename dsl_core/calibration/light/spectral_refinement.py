@@ -108,18 +108,22 @@ class SpectralModel:
         level = self.rig.white_scale * np.exp(unknowns[-1] * data.own_level)
         density = np.einsum("cw,lw->clw", response, emission)
         reflected = data.reflectance * level[:, None]
-        signal = np.einsum("clw,pw,ml->pcm", density, reflected, data.lights, optimize=True)
+        by_light = data.lights @ density  # (3, lights, wavelengths)
+        signal = np.moveaxis(by_light @ reflected.T, 2, 0)
         slope = np.zeros((*signal.shape, self.size))
         n = UNKNOWNS
         for c in range(3):
-            by_light = np.einsum("lw,ml->mw", density[c], data.lights)
-            slope[:, c, :, c * n : (c + 1) * n] = np.einsum(
-                "mw,pw,nw->pmn", by_light, reflected, self.basis[c], optimize=True
-            )
-            of_led = np.einsum("cw,pw,nw->pcn", density[:, c], reflected, self.basis[3 + c], optimize=True)
+            slope[:, c, :, c * n : (c + 1) * n] = _moments(reflected, by_light[c], self.basis[c])
+            of_led = _moments(reflected, density[:, c], self.basis[3 + c])
             slope[..., (3 + c) * n : (4 + c) * n] = of_led[:, :, None] * data.lights[:, c, None]
         slope[..., -1] = signal * data.own_level[:, None, None]
         return signal, slope
+
+
+def _moments(reflected: Floats, light: Floats, basis: Floats) -> Floats:
+    """Sums over wavelengths of surfaces (p, w), lights (m, w) and basis functions (n, w), (p, m, n)."""
+    pairs = (light[:, None] * basis).reshape(-1, basis.shape[1])
+    return np.asarray((reflected @ pairs.T).reshape(len(reflected), len(light), len(basis)))
 
 
 def refine(

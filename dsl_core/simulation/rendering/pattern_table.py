@@ -33,16 +33,17 @@ class PatternTable:
     """A pattern of which samples are kept, ``oversample`` a pixel across and down.
 
     ``blurred`` (LEDs, rows, samples) is what the zero order brings, with blur and halo; its rows are kept
-    only when the pattern has any structure along them. First orders have no halo. ``integrals`` are the
-    integral (px) of what they bring, (LEDs, rows, samples + 1) along columns, or (LEDs, 1, samples + 1)
-    ``along_rows`` where the pattern varies along them only; and, where it varies along columns only, that
-    integral's own (px^2).
+    only when the pattern has any structure along them. Where it varies along rows only, it is (LEDs, 1,
+    samples) along them, and has the factor ``across`` (samples) along columns, which differs from 1 near the
+    sides of the frame. First orders have no halo. ``integrals`` are the integral (px) of what they bring,
+    (LEDs, rows, samples + 1) along columns, or (LEDs, 1, samples + 1) where the pattern varies along rows
+    only; and, where it varies along columns only, that integral's own (px^2).
     """
 
     blurred: Tensor
+    across: Tensor | None
     integrals: tuple[Tensor, Tensor | None]
     oversample: tuple[int, int]
-    along_rows: bool
     width_px: int
 
     @classmethod
@@ -57,23 +58,23 @@ class PatternTable:
         source = torch.as_tensor(
             np.moveaxis(radiance[:1] if flat else radiance, 2, 0), device=device, dtype=torch.float32
         )
-        blurred = source @ _spread(width, kx, response, True).to(device).T
-        if not flat:
-            blurred = _spread(height, ky, response, False).to(device) @ blurred
+        sides = _spread(width, kx, response, True).to(device)
+        pixels, kept = (height, ky) if upright else (width, kx)
+        fine, step = _spread(pixels, kept, response, False).to(device), 1 / kept
+        sharp = (source[:, :, :1].mT if upright else source) @ fine.T
+        first = torch.nn.functional.pad((sharp * step).cumsum(2), (1, 0))
         if upright:
-            sharp, fine = source[:, :, :1].mT, _spread(height, ky, response, False)
-        else:
-            sharp, fine = source, _spread(width, kx, response, False)
-        step = 1 / (ky if upright else kx)
-        first = torch.nn.functional.pad((sharp @ fine.to(device).T * step).cumsum(2), (1, 0))
-        second = None
+            # Blur along columns only matters at the sides: the table of both ways is a product.
+            return cls(sharp.contiguous(), sides.sum(1), (first.contiguous(), None), (kx, ky), width)
+        blurred, second = source @ sides.T, None
         if flat:
             # By trapezoids, summed in double precision: stretches are short, the sums long.
             middle = 0.5 * (first[..., 1:] + first[..., :-1]).double() * step
             second = torch.nn.functional.pad(middle.cumsum(2), (1, 0)).float()
-        elif not upright:
+        else:
+            blurred = _spread(height, ky, response, False).to(device) @ blurred
             first = first.repeat_interleave(ky, 1)
-        return cls(blurred.contiguous(), (first.contiguous(), second), (kx, ky), upright, width)
+        return cls(blurred.contiguous(), None, (first.contiguous(), second), (kx, ky), width)
 
     @property
     def leds(self) -> int:
@@ -81,16 +82,24 @@ class PatternTable:
         return len(self.blurred)
 
     @property
+    def along_rows(self) -> bool:
+        """Whether the pattern varies along rows only."""
+        return self.across is not None
+
+    @property
     def has_rows(self) -> bool:
         """Whether the pattern varies along rows."""
-        return self.blurred.shape[1] > 1
+        return self.along_rows or self.blurred.shape[1] > 1
 
     def at(self, led: int, column: Tensor, row: Tensor) -> Tensor:
         """Zero-order light at projector positions (px), linear between samples."""
         blurred, across = self.blurred[led], (column + 0.5) * self.oversample[0] - 0.5
         if not self.has_rows:
             return _lookup(blurred, across, None)
-        down = ((row + 0.5) * self.oversample[1] - 0.5).clip(0, blurred.shape[0] - 1.001)
+        down = (row + 0.5) * self.oversample[1] - 0.5
+        if self.across is not None:
+            return _lookup(blurred, down, None) * _lookup(self.across[None], across, None)
+        down = down.clip(0, blurred.shape[0] - 1.001)
         above = down.int()
         offset = above * blurred.shape[1]
         upper = _lookup(blurred, across, offset)
@@ -157,6 +166,11 @@ def _spread(pixels: int, oversample: int, response: ProjectorResponse, halo: boo
     """Matrix from pixel radiances to blurred samples, shape (pixels * oversample, pixels)."""
     if not halo:
         response = response.model_copy(update={"halo_peak_per_px": 0.0})
-    at = (torch.arange(pixels * oversample, dtype=torch.float64)[:, None] + 0.5) / oversample - 0.5
-    pixel = torch.arange(pixels, dtype=torch.float64)
-    return zero_order_profile(at - pixel, -0.5, 0.5, response).float()
+    # Only the distance between sample and pixel counts: one profile, shifted from column to column.
+    apart = torch.arange(-oversample * (pixels - 1), oversample * pixels, dtype=torch.float64)
+    profile = zero_order_profile((apart + 0.5) / oversample - 0.5, -0.5, 0.5, response).float().numpy()
+    (size,) = profile.strides
+    shifted = np.lib.stride_tricks.as_strided(
+        profile[oversample * (pixels - 1) :], (pixels * oversample, pixels), (size, -oversample * size)
+    )
+    return torch.from_numpy(shifted.copy())
