@@ -67,8 +67,13 @@ class Clock:
 
 def _only(led: int) -> Callable[[NDArray[np.uint8]], NDArray[np.uint8]]:
     """Takes the other LEDs out of an image."""
-    kept = (np.arange(3) == led).astype(np.uint8)
-    return lambda image: image * kept
+
+    def choose(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        kept = np.zeros_like(image)
+        kept[..., led] = image[..., led]
+        return kept
+
+    return choose
 
 
 @dataclass

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.optics.pinhole import distort, pixel_rays, project, undistort
+from dsl_core.optics.pinhole import distort, max_radius_sq, pixel_rays, project, undistort
 from dsl_core.simulation.published_rig import published_rig
 
 LENS = published_rig().camera
@@ -41,3 +41,11 @@ def test_distortion_that_folds_back_is_refused() -> None:
     x = np.linspace(0.0, 2.0, 11)
     with pytest.raises(CalibrationError, match="cannot be inverted"):
         undistort(x, np.zeros_like(x), (-2.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def test_image_circle_reaches_a_tenth_beyond_the_farthest_corner() -> None:
+    x, y, _ = pixel_rays(LENS)
+    assert max_radius_sq(LENS) == pytest.approx(1.1**2 * float((x**2 + y**2).max()), rel=1e-9)
+    folded = LENS.model_copy(update={"distortion": (-20.0, 0.0, 0.0, 0.0, 0.0)})
+    with pytest.raises(CalibrationError, match="cannot be inverted"):
+        max_radius_sq(folded)

@@ -47,6 +47,20 @@ class PatternTable:
     width_px: int
 
     @classmethod
+    def of_levels(
+        cls, colour: NDArray[np.uint8], response: ProjectorResponse, device: torch.device
+    ) -> PatternTable:
+        """Table of drive levels, (height, width, 3); those of patterns that vary one way only are kept."""
+        levels = colour[..., :1] if (colour == colour[..., :1]).all() else colour
+        if (levels == levels[:1]).all():
+            levels = levels[:1]
+        elif (levels == levels[:, :1]).all():
+            levels = levels[:, :1]
+        else:
+            return cls.of(_radiance(levels, response), response, device)
+        return _of_strip(levels.tobytes(), levels.shape, colour.shape[:2], response, device)
+
+    @classmethod
     def of(
         cls, radiance: NDArray[np.float64], response: ProjectorResponse, device: torch.device
     ) -> PatternTable:
@@ -55,13 +69,12 @@ class PatternTable:
         upright = not flat and bool((radiance == radiance[:, :1]).all())
         height, width = radiance.shape[:2]
         kx, ky = (FINE, 1) if flat else (COARSE, FINE if upright else COARSE)
-        source = torch.as_tensor(
-            np.moveaxis(radiance[:1] if flat else radiance, 2, 0), device=device, dtype=torch.float32
-        )
+        strip = radiance[:1] if flat else radiance[:, :1] if upright else radiance
+        source = torch.from_numpy(np.moveaxis(strip, 2, 0).astype(np.float32)).to(device)
         sides = _spread(width, kx, response, True).to(device)
         pixels, kept = (height, ky) if upright else (width, kx)
         fine, step = _spread(pixels, kept, response, False).to(device), 1 / kept
-        sharp = (source[:, :, :1].mT if upright else source) @ fine.T
+        sharp = (source.mT if upright else source) @ fine.T
         first = torch.nn.functional.pad((sharp * step).cumsum(2), (1, 0))
         if upright:
             # Blur along columns only matters at the sides: the table of both ways is a product.
@@ -159,6 +172,27 @@ def _lookup(table: Tensor, position: Tensor, offset: Tensor | None) -> Tensor:
         index += offset
     flat = table.reshape(-1)
     return torch.lerp(flat.index_select(0, index), flat.index_select(0, index + 1), p)
+
+
+def _radiance(levels: NDArray[np.uint8], response: ProjectorResponse) -> NDArray[np.float64]:
+    """Light of drive levels beyond that of a dark projector, same shape."""
+    return np.asarray(response.radiance(np.arange(256) / 255)[levels] - response.black_fraction)
+
+
+@lru_cache(maxsize=64)
+def _of_strip(
+    levels: bytes,
+    shape: tuple[int, ...],
+    size: tuple[int, int],
+    response: ProjectorResponse,
+    device: torch.device,
+) -> PatternTable:
+    """Table of one row or column of levels that is repeated over the frame (height, width).
+
+    Calibrations show the same codes at every pose and position.
+    """
+    strip = _radiance(np.frombuffer(levels, np.uint8).reshape(shape), response)
+    return PatternTable.of(np.broadcast_to(strip, (*size, shape[2])), response, device)
 
 
 @lru_cache(maxsize=12)

@@ -131,7 +131,9 @@ class Renderer:
         """A few bands of white, or any other pattern as a table."""
         runs = white_runs(colour)
         most = MAX_RUNS if self.slicing is BROAD else MAX_RUNS_FILTERED
-        return self._table(colour) if runs is None or len(runs) > most else runs
+        if runs is None or len(runs) > most:
+            return PatternTable.of_levels(colour, self.response, self.device)
+        return runs
 
     def _signal(self, light: Runs | PatternTable) -> Tensor:
         if isinstance(light, PatternTable):
@@ -170,14 +172,6 @@ class Renderer:
         signal += radiance * zero * zero_order_profile(self.column, start, stop, self.response)
         for tables in self.orders:
             add_band(signal, tables, self.material_channel, start, stop, radiance)
-
-    def _table(self, colour: NDArray[np.uint8]) -> PatternTable:
-        response = self.rig.projector_response
-        radiance = response.radiance(np.arange(256) / 255)[colour] - response.black_fraction
-        grey = np.array_equal(colour[..., 0], colour[..., 1]) and np.array_equal(
-            colour[..., 0], colour[..., 2]
-        )
-        return PatternTable.of(radiance[..., :1] if grey else radiance, self.response, self.device)
 
     def _sliced(self, table: PatternTable) -> Tensor:
         leds = [slice(0, 3)] if table.leds == 1 else [slice(i, i + 1) for i in range(3)]

@@ -26,7 +26,7 @@ def test_a_day_at_the_rig_by_mouse_and_keys(tmp_path: Path) -> None:
                 "QT_QPA_PLATFORM": "xcb",
                 "HOME": str(tmp_path),
                 "DSL_SCAN_HOME": str(home),
-                "PYTHONPATH": str(ROOT),
+                "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "app")]),
             },
             cwd=ROOT,
             capture_output=True,

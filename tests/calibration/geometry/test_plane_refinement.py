@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -68,13 +69,19 @@ def column_error_px(truth: Rig, rig: Rig) -> float:
     return float((zero_order(rig, pixels, depth)[0] - column)[inside].square().mean().sqrt())
 
 
+@cache
+def board_said(seed: int) -> tuple[Rig, NDArray[np.float64]]:
+    """What a board says of a drawn rig, and the covariance of it."""
+    board = board_calibrated(random_rig(seed, small_rig()), small_rig(), seed)
+    assert board.geometry_covariance is not None
+    return board, np.array(board.geometry_covariance).reshape(24, 24)
+
+
 def refined(seed: int) -> tuple[Rig, Rig, PlaneRefinement]:
     """Truth, what the board said, and what the planes made of it."""
     truth, rng = random_rig(seed, small_rig()), np.random.default_rng(seed)
-    board = board_calibrated(truth, small_rig(), seed)
+    board, covariance = board_said(seed)
     samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
-    assert board.geometry_covariance is not None
-    covariance = np.array(board.geometry_covariance).reshape(24, 24)
     return truth, board, refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
 
 
@@ -99,10 +106,8 @@ def test_a_bulge_at_all_positions_is_measured(several: list[tuple[Rig, Rig, Plan
     for _, _, flat in several:
         assert abs(flat.bow_mm) < 3 * flat.bow_std_mm < 0.3
     truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)
-    board = board_calibrated(truth, small_rig(), 6)
+    board, covariance = board_said(6)
     samples = [seen(truth, distance, rng, rim_mm=0.4) for distance in distances_mm(rng)]
-    assert board.geometry_covariance is not None
-    covariance = np.array(board.geometry_covariance).reshape(24, 24)
     found = refine_planes(board, POSITIONS_MM, samples, covariance, STAGE_STD_MM)
     assert found.bow_mm == pytest.approx(0.4, abs=3 * found.bow_std_mm)
     # The planes themselves look as flat as ever: lenses bend them straight.
@@ -145,10 +150,8 @@ def test_a_bowed_plane_misses_its_limit_and_no_plane_at_all_is_refused() -> None
 
 def test_a_target_that_bulges_everywhere_contradicts_the_board() -> None:
     truth, rng = random_rig(6, small_rig()), np.random.default_rng(0)
-    board = board_calibrated(truth, small_rig(), 6)
+    board, covariance = board_said(6)
     samples = [seen(truth, distance, rng, bow_mm=1.5) for distance in distances_mm(rng)]
-    assert board.geometry_covariance is not None
-    covariance = np.array(board.geometry_covariance).reshape(24, 24)
     with pytest.raises(
         CalibrationError,
         match=r"planes contradict the geometry .* bulge towards the camera by -?\d\.\d\d ± 0\.0\d mm",
@@ -182,10 +185,8 @@ def test_a_stage_of_another_scale_is_noticed() -> None:
 
 def test_steps_a_little_too_long_are_told_by_their_ratio() -> None:
     truth, rng = random_rig(6, small_rig()), np.random.default_rng(6)
-    board = board_calibrated(truth, small_rig(), 6)
+    board, covariance = board_said(6)
     samples = [seen(truth, distance, rng) for distance in distances_mm(rng)]
-    assert board.geometry_covariance is not None
-    covariance = np.array(board.geometry_covariance).reshape(24, 24)
     said = tuple(700 + (p - 700) / 1.01 for p in POSITIONS_MM)
     with pytest.raises(CalibrationError, match=r"steps are 1\.0(09|10|11) times as long"):
         refine_planes(board, said, samples, covariance, STAGE_STD_MM)

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from dsl_core.model.rig import Rig
+from dsl_core.optics.line_profile import zero_order_profile
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendering.pattern_table import PatternTable, between
 
@@ -62,3 +63,41 @@ def test_rows_are_averaged_as_columns_are() -> None:
     assert float(rows[2]) == pytest.approx(float(flat.at(0, stop[2:], stop[2:])), abs=0.01)
     inside = upright.inside(torch.tensor([-3.5, 2.0, 7.0]), torch.tensor([2.5, 4.0, 9.0]))
     assert inside.numpy() == pytest.approx([0.5, 1.0, 0.0])
+
+
+def test_light_of_rows_falls_off_at_the_sides_of_the_frame() -> None:
+    response = small_rig(halo_decay_px=8.0, halo_peak_per_px=0.01).projector_response
+    levels = np.random.default_rng(0).random((30, 1, 1)).repeat(40, 1)
+    table = PatternTable.of(levels, response, torch.device("cpu"))
+    columns = (torch.tensor([0, 3, 70, 158]) + 0.5) / table.oversample[0] - 0.5
+    rows = (torch.tensor([0, 100, 121, 230]) + 0.5) / table.oversample[1] - 0.5
+    without = response.model_copy(update={"halo_peak_per_px": 0.0})
+    pixels = torch.arange(40.0)
+    across = zero_order_profile(columns[:, None] - pixels, -0.5, 0.5, response).sum(1)
+    spread = zero_order_profile(rows[:, None] - pixels[:30], -0.5, 0.5, without)
+    expected = across * (spread @ torch.tensor(levels[:, 0, 0], dtype=torch.float32))
+    assert table.at(0, columns, rows).numpy() == pytest.approx(expected.numpy(), rel=1e-4)
+    assert across[0] < 0.8 * across[2]
+
+
+def test_levels_that_vary_one_way_only_are_tabulated_once() -> None:
+    response, device = small_rig().projector_response, torch.device("cpu")
+    drawn = np.random.default_rng(0).integers(0, 256, (30, 40, 3)).astype(np.uint8)
+    across, down = drawn[:1].repeat(30, 0), drawn[:, :1].repeat(40, 1)
+    column, row = torch.tensor([2.25, 17.5, 31.0]), torch.tensor([3.5, 11.25, 22.0])
+    for colour in (across, down, across[..., :1].repeat(3, 2), drawn):
+        radiance = response.radiance(colour / 255) - response.black_fraction
+        kept, own = (
+            PatternTable.of_levels(colour, response, device),
+            PatternTable.of(radiance, response, device),
+        )
+        assert kept.oversample == own.oversample
+        for led in range(kept.leds):
+            found, expected = (table.at(led, column, row).numpy() for table in (kept, own))
+            assert found == pytest.approx(expected, rel=1e-5)
+    assert PatternTable.of_levels(across.copy(), response, device) is PatternTable.of_levels(
+        across, response, device
+    )
+    wider = small_rig(blur_px=1.5).projector_response
+    again = PatternTable.of_levels(across, wider, device)
+    assert not torch.equal(again.blurred, PatternTable.of_levels(across, response, device).blurred)
