@@ -31,7 +31,8 @@ def run(arguments: list[str]) -> int:
         code = app(arguments, prog_name="dsl-scan", standalone_mode=False)
         sys.stdout.flush()
     except BaseException as error:
-        if isinstance(error, BrokenPipeError):
+        # Click turns a closed pipe into an exit of its own.
+        if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
             return _leave_quietly()
         code, sentence = _judge(error)
         if debug:
@@ -85,7 +86,10 @@ def _of_system(error: OSError) -> str:
 
 def _complain(code: int, sentence: str, kind: str, as_json: bool) -> int:
     if as_json:
-        print(json.dumps({"error": {"kind": kind, "message": sentence}, "exit_code": code}))
+        try:
+            print(json.dumps({"error": {"kind": kind, "message": sentence}, "exit_code": code}), flush=True)
+        except BrokenPipeError:
+            _leave_quietly()
     if sentence:
         print(sentence, file=sys.stderr)
     return code

@@ -46,7 +46,8 @@ class Figure(Record):
 
     def __str__(self) -> str:
         """The figure as people write it, such as ``gamma 2.210 ± 0.004``."""
-        digits = _decimals(self.std if self.std else abs(self.value) / 100)
+        counted = self.std is None and float(self.value).is_integer()
+        digits = 0 if counted else _decimals(self.std if self.std else abs(self.value) / 100)
         spread = "" if self.std is None else f" ± {self.std:.{digits}f}"
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
         return f"{self.name} {self.value:.{digits}f}{spread}{unit}"

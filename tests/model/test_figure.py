@@ -28,6 +28,7 @@ def test_a_figure_without_limits_passes_and_says_none() -> None:
         (Figure(name="gamma", value=2.21, std=0.004, unit="1"), "gamma 2.2100 ± 0.0040"),
         (Figure(name="shift", value=-1.25, std=0.3, unit="px"), "shift -1.25 ± 0.30 px"),
         (Figure(name="frames", value=4000, unit=""), "frames 4000"),
+        (Figure(name="frames", value=400, unit=""), "frames 400"),
         (Figure(name="tilt", value=12.3456, unit="degrees"), "tilt 12.35 degrees"),
         (Figure(name="nothing", value=0.0, std=0.0, unit="px"), "nothing 0 ± 0 px"),
     ],

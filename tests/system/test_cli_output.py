@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import io
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -32,3 +36,24 @@ def test_bars_give_way_to_what_is_said_and_asked(
     assert capsys.readouterr().out == "found\n"
     shown = terminal.getvalue()
     assert shown.index("step 0") < shown.index("Placed? ") < shown.index("fit")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pipe that breaks")
+@pytest.mark.parametrize(("arguments", "code"), [(["scenes"], 0), (["info", "/no/such/scan"], 2)])
+def test_a_reader_that_leaves_early_causes_no_traceback(arguments: list[str], code: int) -> None:
+    ours, theirs = os.pipe()
+    # Nobody reads: like "| head", but sure to have left before anything is printed.
+    os.close(ours)
+    found = subprocess.run(
+        [sys.executable, "-u", "-m", "dsl_core.cli", *arguments, "--json"],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        stdout=theirs,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    os.close(theirs)
+    assert "Traceback" not in found.stderr
+    assert "BrokenPipe" not in found.stderr
+    assert found.returncode == code
