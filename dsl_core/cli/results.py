@@ -173,10 +173,16 @@ def print_figures(output: Output, evaluation: Evaluation) -> None:
 
 
 def print_fit(output: Output, result: xr.Dataset) -> None:
-    """What the result says about the fit of its model; nothing for one that does not say."""
+    """What the result says about its calibration and the fit of its model; nothing if it does not say."""
+    from dsl_core.model.calibration.accepted import read_missed
     from dsl_core.model.fit import Fit
 
-    fit = Fit.read({str(name): value for name, value in result.attrs.items()})
+    attributes = {str(name): value for name, value in result.attrs.items()}
+    fit, missed = Fit.read(attributes), read_missed(attributes)
+    for sentence in missed:
+        output.say(sentence)
+    if missed:
+        output.put(calibration_missed=missed)
     if fit is not None:
         output.say(fit.words)
         output.put(fit={"words": fit.words, "findings": [f.model_dump() for f in fit.findings]})

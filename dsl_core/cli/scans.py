@@ -176,10 +176,16 @@ def _calibrate(
     """The rig with the calibration named, if any; what was overridden, as notes of the scan."""
     from dsl_core.devices.conditions import with_calibration
     from dsl_core.io.calibration_library import load_calibration
+    from dsl_core.model.calibration.accepted import missed_limits
 
     if name is None:
         return devices, {}
-    calibrated, overridden = with_calibration(devices, load_calibration(name), override)
+    rig = load_calibration(name)
+    calibrated, overridden = with_calibration(devices, rig, override)
+    missed = missed_limits(rig.calibrations)
+    for sentence in missed:
+        output.say(sentence)
+    output.put(calibration_missed=missed)
     for clause in overridden:
         output.say(f"Overridden: {clause}.")
     return calibrated, {"calibration_overridden": "; ".join(overridden)} if overridden else {}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core import __version__
+from dsl_core.model.calibration.accepted import missed_attributes
 from dsl_core.model.fit import ATTRIBUTE
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
@@ -72,6 +73,7 @@ def assemble(
     arrays["flags"] = flags
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
     attributes[ATTRIBUTE] = fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra).model_dump_json()
+    attributes |= missed_attributes(rig.calibrations)
     return build_result(arrays, grid.centres_nm, attributes)
 
 

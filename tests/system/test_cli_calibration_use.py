@@ -9,8 +9,11 @@ import pytest
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.devices.registry import open_rig
 from dsl_core.io.calibration_library import CalibrationLibrary
+from dsl_core.io.result.result_file import load_result
 from dsl_core.io.rig_file import save_rig
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, CalibrationNote, read_missed
+from dsl_core.model.figure import Figure
 from dsl_core.model.rig import Rig
 
 from .conftest import SMALL_RIG, Give
@@ -69,6 +72,26 @@ def test_a_reconstruction_refuses_it_as_well(
     assert "the camera's gain (dB) was 12 and is 0 in the scan" in give(*command, file).sentence
     assert give(*command, file, "--override-calibration").code == 0
     assert give(*command, "lab", "--force").code == 0
+
+
+def test_what_a_calibration_missed_travels_with_the_rig(
+    give: Give, tmp_path: Path, scan_copy: Path, calibrated: Rig
+) -> None:
+    figures = (Figure(name="camera error", value=0.6, unit="px", high=0.5),)
+    note = CalibrationNote(name="geometry", title="Geometry", accepted="2026-05-04", figures=figures)
+    file = save_rig(calibrated.model_copy(update={"calibrations": (note,)}), tmp_path / "missed.json")
+    told = "This rig's calibration 'Geometry' missed its limit: camera error 0.6000 px (limit: at most 0.5)."
+    scan = give("scan", tmp_path / "scan.dsl", *SMALL_RIG, *QUICK, "--calibration", file)
+    assert scan.code == 0, scan.err
+    assert told in scan.out
+    result = tmp_path / "a.zarr"
+    made = give("reconstruct", scan_copy, "-o", result, "--depth-only", "--calibration", file, "--json")
+    assert made.json["calibration_missed"] == [told]
+    assert read_missed(load_result(result).attrs) == (told,)
+    # A rig that reached all its limits says nothing.
+    made = give("reconstruct", scan_copy, "-o", result, "--depth-only", "--calibration", "lab", "--force")
+    assert "missed its limit" not in made.out
+    assert MISSED_ATTRIBUTE not in load_result(result).attrs
 
 
 def test_a_name_of_the_library_is_exported(give: Give, tmp_path: Path, calibrated: Rig) -> None:

@@ -8,6 +8,7 @@ from enum import IntEnum
 from pathlib import Path
 
 from dsl_core.io.result.result_arrays import ResultArrays
+from dsl_core.model.calibration.accepted import read_missed
 from dsl_core.model.fit import Fit
 from dsl_core.model.rendered_effects import RenderedEffects
 
@@ -25,7 +26,8 @@ class Summary:
     """What the page shows: texts of its head, and which buttons can be used.
 
     ``message`` stands in place of a result; ``can_reconstruct`` means that a scan is offered. ``warning``
-    says what of the model does not fit, ``advice`` what to do; both are empty where all of it fits.
+    says which limits the rig's calibrations missed and what of the model does not fit, ``advice`` what to do;
+    both are empty where all is well.
     """
 
     content: Content
@@ -55,18 +57,21 @@ def summarise(result: ResultArrays | None, offer: Path | None, busy: str) -> Sum
     captured = str(result.attributes.get("captured", ""))[:16].replace("T", " ")
     effects, details = effects_text(result.attributes)
     fit = Fit.read(result.attributes)
-    doubts = fit is not None and bool(fit.significant)
+    missed = read_missed(result.attributes)
+    doubted = fit if fit is not None and fit.significant else None
     parts = (f"{width} × {height} px{bands}", captured, effects, str(result.path))
     return Summary(
         content,
         title=result.path.stem,
         about=" · ".join(part for part in parts if part),
-        details="\n\n".join(part for part in (str(result.path), fit.words if fit else "", details) if part),
+        details="\n\n".join(
+            part for part in (str(result.path), "\n".join(missed), fit.words if fit else "", details) if part
+        ),
         message=message,
         can_reconstruct=can_reconstruct,
         has_result=True,
-        warning=fit.headline if fit and doubts else "",
-        advice=fit.words if fit and doubts else "",
+        warning=" ".join([*missed, *([doubted.headline] if doubted else [])]),
+        advice="\n".join([*missed, *([doubted.words] if doubted else [])]),
     )
 
 

@@ -60,6 +60,8 @@ LINEAR_SCALE, SCALE_ROUNDS = 3e-4, 4
 #: Parts of the image (down, across) between which the scatter is taken.
 PARTS = (3, 4)
 MIN_PIXELS = 50
+#: Wavelengths with less than this share of the brightest one's light say little of a correction.
+BRIGHT_SHARE = 0.05
 #: What geometry, film and bands of finite width leave, relative: the rms error of drawn rigs of the twin that
 #: were calibrated from what their camera sees alone was 0.2 to 0.3 % (0.05 to 0.12 % with the true geometry).
 MODEL_STD = 2.5e-3
@@ -105,7 +107,24 @@ def chain_correction(
             scale = _refined_scale(rig, scans, model, target, solved.scale)
         record = _record(factors, solved, scale)
         corrected = apply_chain(record, rig)
-    return record
+    return record.model_copy(update={"largest_correction": largest_correction(rig, corrected)})
+
+
+def largest_correction(before: Rig, after: Rig) -> float:
+    """Largest relative change of the chain, orders apart, at wavelengths that are bright enough to matter.
+
+    Of response, efficiency and white scale only the product counts, and where a colour is dark its factor
+    takes up stray light, however large it gets.
+    """
+    largest = 0.0
+    for order in ORDERS:
+        old, new = (chain_response(rig, order, UNKNOWNS.nodes_nm).sum(1) for rig in (before, after))
+        light = old.sum(0)
+        bright = light > BRIGHT_SHARE * light.max()
+        weight = old**2
+        change = (weight * (new / old.clip(min=1e-30) - 1)).sum(0) / weight.sum(0).clip(min=1e-30)
+        largest = max(largest, float(np.abs(change[bright]).max()))
+    return largest
 
 
 def _solve(rig: Rig, scans: list[LineScan], model: Correspondence, target: SpectralCurve) -> _Solved:
@@ -245,7 +264,7 @@ def _record(factors: Floats, solved: _Solved, scale: tuple[float, float]) -> Cha
         white_scale_factor=float(factors[UNKNOWNS.white]),
         white_scale_rel_std=solved.ratio_std,
         chain_rel_std=SpectralCurve.of(UNKNOWNS.nodes_nm, both),
-        largest_correction=float(np.abs(factors - 1).max()),
+        largest_correction=0.0,  # known when all rounds are done
         wavelength_scale=scale[0],
         wavelength_scale_std=scale[1],
         pixels=solved.pixels,

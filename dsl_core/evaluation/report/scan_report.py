@@ -23,6 +23,7 @@ from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import ReportPicture, colour_picture, flag_picture, value_picture
 from dsl_core.evaluation.summary import Evaluation, PatchScore, Truth
 from dsl_core.evaluation.verdict import Goal, Verdict, verdicts
+from dsl_core.model.calibration.accepted import MISSED_ATTRIBUTE, read_missed
 from dsl_core.model.fit import ATTRIBUTE, Fit
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rendered_effects import RenderedEffects
@@ -39,7 +40,8 @@ class ReportContent:
     """What a report is made of; everything but title and result may be absent.
 
     ``pixels`` are (row, column) whose spectra are shown; ``effects`` is what a twin rendered; ``provenance``
-    lists facts by name, ``fit`` says how well the model fits.
+    lists facts by name, ``fit`` says how well the model fits, ``missed`` which limits the rig's calibrations
+    missed.
     """
 
     title: str
@@ -54,6 +56,7 @@ class ReportContent:
     provenance: Mapping[str, str] = field(default_factory=dict)
     pixels: Sequence[tuple[int, int]] = ()
     fit: Fit | None = None
+    missed: Sequence[str] = ()
 
 
 def render_report(content: ReportContent) -> str:
@@ -70,6 +73,7 @@ def render_report(content: ReportContent) -> str:
         title=content.title,
         summary=content.summary,
         fit=content.fit,
+        missed=content.missed,
         verdicts=content.verdicts,
         pictures=_pictures(content, pixels),
         spectra=_spectra(content, pixels),
@@ -222,7 +226,9 @@ def report_content(
     costs = [StageCost(**cost) for cost in json.loads(attributes.pop("stage_costs", "[]"))]
     plan = attributes.pop("capture_plan", None)
     fit = Fit.read(attributes)
-    attributes.pop(ATTRIBUTE, None)
+    missed = read_missed(attributes)
+    for name in (ATTRIBUTE, MISSED_ATTRIBUTE):
+        attributes.pop(name, None)
     effects = RenderedEffects.of_note(str(attributes.get("effects", "")))
     if effects is not None:
         del attributes["effects"]
@@ -237,5 +243,6 @@ def report_content(
         plan=CapturePlan.model_validate_json(plan) if plan else None,
         effects=effects,
         fit=fit,
+        missed=missed,
         provenance={str(key).replace("_", " "): str(value) for key, value in attributes.items()},
     )

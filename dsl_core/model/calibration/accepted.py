@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
 from pydantic import Field
@@ -9,6 +11,9 @@ from pydantic import Field
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.figure import Figure, failures
+
+#: Name of the attribute of a result that holds what its rig's calibrations missed, as JSON.
+MISSED_ATTRIBUTE = "calibration_missed"
 
 
 class CalibrationNote(Record):
@@ -23,6 +28,40 @@ class CalibrationNote(Record):
     def failed(self) -> tuple[Figure, ...]:
         """The figures outside their limits."""
         return failures(self.figures)
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """A sentence for each figure that missed its limit and was accepted all the same.
+
+        >>> from dsl_core.model.figure import Figure
+        >>> error = Figure(name="camera error", value=0.6, unit="px", high=0.5)
+        >>> CalibrationNote(name="geometry", title="Geometry", accepted="", figures=(error,)).missed
+        ("This rig's calibration 'Geometry' missed its limit: camera error 0.6000 px (limit: at most 0.5).",)
+        """
+        return tuple(
+            f"This rig's calibration {self.title!r} missed its limit: {figure} (limit: {figure.limits})."
+            for figure in self.failed
+        )
+
+
+def missed_limits(notes: Iterable[CalibrationNote]) -> tuple[str, ...]:
+    """Sentences on all figures of a rig's calibrations that are outside their limits."""
+    return tuple(sentence for note in notes for sentence in note.missed)
+
+
+def missed_attributes(notes: Iterable[CalibrationNote]) -> dict[str, str]:
+    """The attributes by which a result remembers them; none where all limits were reached."""
+    found = missed_limits(notes)
+    return {MISSED_ATTRIBUTE: json.dumps(found, ensure_ascii=False)} if found else {}
+
+
+def read_missed(attributes: Mapping[str, object]) -> tuple[str, ...]:
+    """The sentences that a result's attributes hold, none where there are none that can be read."""
+    try:
+        found = json.loads(str(attributes.get(MISSED_ATTRIBUTE, "[]")))
+    except ValueError:
+        return ()
+    return tuple(map(str, found)) if isinstance(found, list) else ()
 
 
 class AcceptedCalibration(Record):

@@ -16,7 +16,7 @@ class ChainCorrection(Record):
     ``efficiency_factors`` (by order) and ``response_factors`` (R, G, B) multiply the rig's curves;
     ``white_scale_factor`` multiplies its white scale. ``chain_rel_std`` is the relative deviation that a
     reflectance keeps from the corrected chain, the scatter over the image included.
-    ``largest_correction`` is the largest relative change of any curve where it was measured;
+    ``largest_correction`` is the largest relative change of their product where there is light;
     ``wavelength_scale`` is by which share light is of a longer wavelength than the film's fit says, by the
     steep flanks of the emission (None in older records; nothing is corrected by it). ``pixels`` is how many
     were used and ``chi_square`` their reduced chi-square.

@@ -101,6 +101,22 @@ def test_the_head_tells_size_bands_time_and_path() -> None:
     assert summarise(depth, None, "").about == "64 × 48 px · depth only · a.zarr"
 
 
+def test_what_the_calibration_missed_stands_before_what_does_not_fit() -> None:
+    missed = (
+        "This rig's calibration 'Geometry' missed its limit: camera error 0.60 px (limit: at most 0.5).",
+    )
+    found = summarise(result(calibration_missed=json.dumps(missed)), None, "")
+    assert found.warning == found.advice == missed[0]
+    assert missed[0] in found.details
+    finding = FitFinding(
+        part="film", name="shift", value=0.1, unit="mm", limit=0.02, significant=True, sentence="It moved.",
+    )  # fmt: skip
+    fit = Fit.of([finding]).model_dump_json()
+    both = summarise(result(calibration_missed=json.dumps(missed), fit=fit), None, "")
+    assert both.warning.startswith(missed[0])
+    assert "the place of the film" in both.warning
+
+
 def test_a_model_that_does_not_fit_is_told_in_a_line_of_its_own(qtbot: QtBot, tmp_path: Path) -> None:
     found = FitFinding(
         part="film", name="shift", value=0.1, unit="mm", limit=0.02, significant=True,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.light.chain import LineScan, chain_correction
+from dsl_core.calibration.light.chain import LineScan, chain_correction, largest_correction
 from dsl_core.campaign.common.flat_target import diffuser_lines
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
@@ -86,6 +86,22 @@ def test_errors_of_percents_become_tenths(corrected: tuple[Rig, Rig, ChainCorrec
     stated = np.hypot(record.chain_rel_std.at(NM), record.white_scale_rel_std)
     assert np.sqrt(np.mean((left / stated) ** 2)) < 1.8
     assert stated.max() < 0.01
+
+
+def test_the_largest_correction_is_that_of_the_product_where_there_is_light(
+    corrected: tuple[Rig, Rig, ChainCorrection],
+) -> None:
+    truth, before, record = corrected
+    expected = max(np.abs(chain_error(before, truth, order)).max() for order in (1, -1))
+    assert record.largest_correction == pytest.approx(expected, abs=0.03)
+    # Factors of curves that cancel in the product, and of colours where they are dark, do not count.
+    red, green, blue = truth.response
+    nm = np.array(green.wavelengths_nm)
+    dark = SpectralCurve.of(nm, np.array(green.values) * np.where(nm > 665, 0.4, 1.0) / 2)
+    halved = SpectralCurve.of(red.wavelengths_nm, np.array(red.values) / 2)
+    less = SpectralCurve.of(blue.wavelengths_nm, np.array(blue.values) / 2)
+    same = truth.model_copy(update={"response": (halved, dark, less), "white_scale": 2 * truth.white_scale})
+    assert largest_correction(truth, same) < 0.02
 
 
 def test_zero_order_is_put_right_too(corrected: tuple[Rig, Rig, ChainCorrection]) -> None:

@@ -17,6 +17,8 @@ from dsl_core.evaluation.report.pictures import flag_picture, value_picture
 from dsl_core.evaluation.report.scan_report import ReportContent, render_report, report_content
 from dsl_core.evaluation.summary import evaluate
 from dsl_core.evaluation.verdict import Goal, verdicts
+from dsl_core.model.calibration.accepted import CalibrationNote, missed_attributes
+from dsl_core.model.figure import Figure
 from dsl_core.model.fit import Fit, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import REASONS, Flag
@@ -113,6 +115,19 @@ def test_what_does_not_fit_is_told_with_its_figure(known: Any) -> None:
     for words in ("Look at the light of the diffraction orders", "0.08 ± 0.01", "brighter", "orders again"):
         assert words in text
     assert "findings" not in text
+
+
+def test_what_a_calibration_missed_is_told_and_not_as_provenance(known: Any) -> None:
+    missed = CalibrationNote(
+        name="geometry",
+        title="Geometry",
+        accepted="2026",
+        figures=(Figure(name="camera error", value=0.6, unit="px", high=0.5),),
+    )
+    noted = known.result.assign_attrs(**missed_attributes([missed]))
+    text = Page(render_report(report_content("x", noted, known.truth, evaluate(noted, known.truth)))).text
+    assert "'Geometry' missed its limit: camera error 0.6000 px (limit: at most 0.5)" in text
+    assert "calibration missed" not in text
 
 
 def test_both_themes_are_there(full: ReportContent) -> None:
