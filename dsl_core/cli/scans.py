@@ -185,7 +185,8 @@ def _calibrate(
     missed = missed_limits(rig.calibrations)
     for sentence in missed:
         output.say(sentence)
-    output.put(calibration_missed=missed)
+    if missed:
+        output.put(calibration_missed=missed)
     for clause in overridden:
         output.say(f"Overridden: {clause}.")
     return calibrated, {"calibration_overridden": "; ".join(overridden)} if overridden else {}
