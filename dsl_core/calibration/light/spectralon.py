@@ -208,6 +208,8 @@ def fit_evenness(relative: Floats, usable: Mask) -> Evenness:
     left = np.concatenate([design * weight[:, None], rough])
     right = np.concatenate([value * weight, np.zeros(len(rough))])
     gain, *_ = np.linalg.lstsq(left, right, rcond=None)
+    # A node that few blocks hold may be extrapolated far below them all, even below zero.
+    gain = np.maximum(gain, 0.5 * value.min())
     residual = (value - design @ gain) * weight
     freedom = max(len(value) - gain.size, 1)
     variance = float((residual**2).sum() / freedom)
