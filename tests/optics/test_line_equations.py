@@ -64,6 +64,36 @@ def test_banded_equations_are_those_of_the_full_model(order: int) -> None:
     assert (system.offset - offset).abs().max() < 0.01 * offset.abs().max()
 
 
+@pytest.mark.parametrize("order", ORDERS)
+def test_misfit_and_samples_are_those_of_the_lines_that_light_a_pixels_bands(order: int) -> None:
+    model = model_of(published_rig(), WavelengthGrid(step_nm=10.0), CapturePlan())
+    pixels = 290 * 890 + torch.linspace(60, 830, PIXELS).long()
+    traced = model.trace(pixels, torch.full((PIXELS,), 700.0, dtype=torch.float64), orders=(order,))
+    columns = traced.orders[order].columns
+    inside = model.inside(traced.orders[order])
+    operator = model.operator(traced, torch.ones_like(columns[0]), orders=(order,))
+    spectrum = 0.5 + 0.3 * torch.sin(torch.arange(model.bands.count, dtype=torch.float64))
+    spectra = spectrum[:, None].expand(-1, PIXELS)
+    light = operator.forward(spectra)
+    # What is saturated has no weight, whatever it says.
+    weight, frames = torch.ones_like(light), light.clone()
+    weight[0], frames[0] = 0.0, 7.0
+    system = model.line_equations(columns[0])
+    system.add(order, columns, inside, frames, weight, 0)
+    seen = banded.to_dense(system.matrix)
+    spread = torch.einsum("jp,pjk,kp->p", spectra, seen, spectra)
+    misfit = system.square - 2 * (spectra * system.right).sum(0) + spread
+    used = inside.any(0)
+    assert used.sum() >= 3
+    assert (misfit[used].abs() < 0.01 * system.square[used]).all()
+    assert system.square == pytest.approx((light**2 * weight).sum((0, 1)), rel=1e-4)
+    bright, faint = ((light[1] > share * light[1].amax(0)).sum(0)[used] for share in (1e-2, 1e-6))
+    assert (system.samples[used] >= 2 * bright).all()
+    # Half a column of the table's ends is without light: at most a line more on either side.
+    assert (system.samples[used] <= 2 * (faint + 2)).all()
+    assert not system.samples[~used].any()
+
+
 def bright_equations(step_nm: float) -> LineEquations:
     """Lines so bright that the data weigh far more than any prior."""
     rig, plan = published_rig(), CapturePlan()

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.solve.smooth_functions import Equations, SmoothPrior, solve_given, solve_smooth
+from dsl_core.solve.smooth_functions import (
+    AMPLITUDES,
+    LENGTHS,
+    Equations,
+    SmoothPrior,
+    hat_functions,
+    matern,
+    solve_given,
+    solve_smooth,
+)
 
 NODES = np.linspace(400.0, 700.0, 31)
 
@@ -74,3 +83,62 @@ def test_parts_of_the_equations_add_up() -> None:
     np.testing.assert_allclose(rest.right, first.right, rtol=1e-9, atol=1e-6)
     assert rest.square == pytest.approx(first.square)
     assert rest.count == first.count
+
+
+def bessel_matern(distance: np.ndarray) -> np.ndarray:
+    """Matern correlation of smoothness 5/2 from its general definition by a Bessel function."""
+    from scipy.special import gamma, kv
+
+    d = np.sqrt(5.0) * np.abs(distance) + 1e-12
+    return np.asarray(2**-1.5 / gamma(2.5) * d**2.5 * kv(2.5, d))
+
+
+def test_correlation_is_that_of_smoothness_five_halves() -> None:
+    distance = np.array([-3.0, -0.4, 0.02, 0.5, 1.0, 2.0, 7.0])
+    np.testing.assert_allclose(matern(distance), bessel_matern(distance), rtol=1e-6)
+    assert matern(np.zeros(1)) == 1.0
+
+
+def evidence_of(amplitude: float, length: float) -> tuple[Equations, list[SmoothPrior]]:
+    """Ten functions drawn with an amplitude and a length on nodes 10 apart, and seen with little noise."""
+    nodes, std = 10.0 * np.arange(31), 0.02 * amplitude
+    correlation = bessel_matern(np.subtract.outer(nodes, nodes) / length)
+    root = np.linalg.cholesky(correlation + 1e-9 * np.eye(len(nodes)))
+    unit = np.random.default_rng(7).standard_normal((2, 10, len(nodes)))
+    seen = (amplitude * unit[0] @ root.T + std * unit[1]).ravel()
+    equations = Equations.of(np.eye(seen.size), seen, np.full(seen.size, std))
+    return equations, [SmoothPrior(nodes, 0.01 * amplitude, 0.01 * amplitude)] * 10
+
+
+@pytest.mark.parametrize("length", [15.0, 30.0, 60.0, 120.0, 240.0])
+def test_evidence_finds_the_length_that_functions_were_drawn_with(length: float) -> None:
+    found = solve_smooth(*evidence_of(0.1, length), amplitudes=(0.1,), noise_factors=(1.0,))
+    assert found.length == length
+
+
+@pytest.mark.parametrize("amplitude", [0.001, 0.003, 0.01, 0.03, 0.1, 0.3])
+def test_evidence_finds_the_amplitude_that_functions_were_drawn_with(amplitude: float) -> None:
+    found = solve_smooth(*evidence_of(amplitude, 60.0), lengths=(60.0,), noise_factors=(1.0,))
+    assert found.amplitude == amplitude
+
+
+def test_lengths_are_an_octave_apart_and_amplitudes_half_a_decade() -> None:
+    """Between two candidates the evidence differs little, so finer ones would cost time for nothing."""
+    assert np.diff(np.log2(LENGTHS)) == pytest.approx(1.0)
+    assert np.diff(np.log10(AMPLITUDES)) == pytest.approx(0.5, abs=0.03)
+
+
+def test_hats_interpolate_between_nodes_and_hold_their_ends() -> None:
+    at = np.array([395.0, 400.0, 402.5, 555.0, 700.0, 730.0])
+    values = np.sin(NODES / 30)
+    np.testing.assert_allclose(hat_functions(at, NODES) @ values, np.interp(at, NODES, values), atol=1e-12)
+
+
+def test_level_and_rise_are_as_unsure_as_stated() -> None:
+    covariance = SmoothPrior(NODES, 0.5, 0.2).covariance(0.0, 60.0)
+    ends = np.zeros(len(NODES))
+    ends[[0, -1]] = -1, 1
+    assert ends @ covariance @ ends == pytest.approx(0.2**2)
+    middle = np.zeros(len(NODES))
+    middle[[0, -1]] = 0.5
+    assert middle @ covariance @ middle == pytest.approx(0.5**2)
