@@ -30,7 +30,7 @@ from dsl_core.optics.line_profile import step_edge
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS, chain_response, hat_moments
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps, blurred_mask
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
 from dsl_core.solve.many import Check, work_through
 from dsl_core.solve.threads import one_kernel_thread
@@ -151,12 +151,9 @@ class PublishedReconstruction:
 
     def _first_order_weight(self, flat: NDArray[np.intp], reached: Tensor) -> Tensor:
         """Kappa 1: the mask of completely reached pixels, Gaussian-blurred (seed section 7.1)."""
-        import cv2
-
         complete = np.ones(self.pixels.valid.shape, np.float32)
         complete.ravel()[flat] = reached.all(0).numpy()
-        sigma = max(self.rig.camera.width_px / 90, 1.0)
-        return torch.as_tensor(cv2.GaussianBlur(complete, (0, 0), sigma).ravel()[flat])
+        return torch.as_tensor(blurred_mask(complete).ravel()[flat])
 
     def _nearest_intensities(self, flat: NDArray[np.intp], columns: Tensor) -> Tensor:
         """Colours (3, bands, pixels) of the frame whose line is nearest to each column; NaN if saturated."""

@@ -124,8 +124,6 @@ class SpectralReconstruction:
 
     def _colour_weight(self) -> NDArray[np.float32]:
         """Weight of the zero-order colour: one minus the blurred mask of complete pixels (seed 7.1)."""
-        import cv2
-
         valid = np.flatnonzero(self.pixels.valid)
         complete = np.ones(self.pixels.valid.shape, np.float32)
         if valid.size:
@@ -134,8 +132,7 @@ class SpectralReconstruction:
             for order in ORDERS:
                 reached |= self.model.reached(order, *self._pixels_and_depth(valid), nm).cpu()
             complete.ravel()[valid] = reached.all(0).numpy()
-        sigma = max(self.rig.camera.width_px / 90, 1.0)
-        return np.asarray(1 - cv2.GaussianBlur(complete, (0, 0), sigma), np.float32).clip(0, 1)
+        return (1 - blurred_mask(complete)).clip(0, 1)
 
     def _pixels_and_depth(self, flat: NDArray[np.intp]) -> tuple[Tensor, Tensor]:
         return torch.as_tensor(flat, device=self.device), self._map(self.pixels.depth_mm, flat)
@@ -291,6 +288,13 @@ def with_offset(spectra: Spectra, matrix: Tensor, variance: Tensor, prior: Prior
     """
     grey = multiply(matrix, torch.ones_like(spectra.std)) + prior.level_std**-2
     return replace(spectra, std=torch.hypot(spectra.std, variance.sqrt() / grey))
+
+
+def blurred_mask(mask: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A mask (rows, columns) whose edges are as soft as a ninetieth of the picture's width (seed 7.1)."""
+    import cv2
+
+    return np.asarray(cv2.GaussianBlur(mask, (0, 0), max(mask.shape[1] / 90, 1.0)), np.float32)
 
 
 def tile_shape(bands: int) -> tuple[int, int]:

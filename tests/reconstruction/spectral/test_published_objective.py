@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
 import torch
 
-from dsl_core.reconstruction.spectral.published_objective import AdamOptions, LineData, fit, objective
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.reconstruction.spectral.published_objective import (
+    AdamOptions,
+    LineData,
+    PublishedReconstruction,
+    fit,
+    objective,
+)
+from dsl_core.reconstruction.spectral.spectra import model_of_plan
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
+from dsl_core.simulation.published_rig import published_rig
+
+SHADING, GREY = 1.7, 0.4
+#: Pixels of the middle row, from left to right, of a picture of 112 x 72.
+FLAT = 36 * 112 + np.arange(6, 112, 10)
 
 
 def measured(truth: torch.Tensor, kappa: float) -> LineData:
@@ -56,3 +75,57 @@ def test_gradient_of_the_objective_agrees_with_differences() -> None:
     spectra = torch.full((24, 3), 0.31, dtype=torch.float64, requires_grad=True)
     double = LineData(*(part.double() if part.is_floating_point() else part for part in vars(data).values()))
     assert torch.autograd.gradcheck(lambda x: objective(x, double, 0.3), spectra, eps=1e-7, atol=1e-5)
+
+
+def a_plane() -> tuple[PublishedReconstruction, PixelModel]:
+    """The reconstruction of a plane whose pixels are all known, and the forward model of its frames."""
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(112, 72)})
+    plan, grid, model = CapturePlan(), WavelengthGrid(step_nm=10.0), correspondence(rig)
+    depth, shading = (np.full((72, 112), value, np.float32) for value in (700.0, SHADING))
+    none, frames = np.zeros_like(depth), np.zeros((plan.spectral_count, 72, 112), np.float32)
+    known = Pixels(none, depth, shading, none, none, none, none, none, depth > 0)
+    solver = PublishedReconstruction(rig, plan, grid, model, frames, np.ones_like(frames), known)
+    return solver, model_of_plan(rig, plan, grid, model)
+
+
+def test_pixels_are_compared_through_the_order_that_reaches_more_of_their_bands() -> None:
+    solver, _ = a_plane()
+    order, reached, columns = solver._valid_order(FLAT)
+    assert order[0] == 1
+    assert order[-1] == -1
+    assert (order.diff() <= 0).all(), "each side of the picture has its order"
+    for m in (1, -1):
+        own = solver.model.trace(
+            torch.as_tensor(FLAT), torch.full((len(FLAT),), 700.0), m, solver.grid.centres_nm
+        )
+        many = own.inside(*solver.plan.projector_size_px)
+        assert (reached.sum(0) >= many.sum(0)).all()
+        assert torch.equal(columns[:, order == m], own.columns[:, order == m])
+
+
+def test_a_grey_pixel_is_its_reflectance_in_units_of_white_however_bright_it_is_lit() -> None:
+    solver, model = a_plane()
+    order, reached, columns = solver._valid_order(FLAT)
+    pixels, depth = torch.as_tensor(FLAT), torch.full((len(FLAT),), 700.0, dtype=torch.float64)
+    traced = model.trace(pixels, depth)
+    grey = torch.full((model.bands.count, len(FLAT)), GREY, dtype=torch.float64)
+    shading = torch.full((len(FLAT),), SHADING, dtype=torch.float64)
+    first = torch.empty((3, *columns.shape))
+    frame = solver.lines.nearest(columns).clip(0, solver.lines.lines - 1)
+    for m in (1, -1):
+        seen = model.operator(traced, shading, orders=(m,)).forward(grey)
+        own = order == m
+        first[..., own] = seen[:, frame, torch.arange(len(FLAT))][..., own].float()
+    moments = torch.as_tensor(model.bands.moments[0].sum((1, 2)), dtype=torch.float32)
+    zero = SHADING * GREY * moments[:, None].expand(-1, len(FLAT))
+    data = solver._measured(FLAT, order, columns, reached, torch.ones(len(FLAT)), first, zero)
+    assert data.zero_white.sum(1).max() == pytest.approx(1.0)
+    assert data.zero == pytest.approx(GREY * data.zero_white.sum(1)[:, None].expand(-1, len(FLAT)), rel=0.02)
+    assert data.first_white.max() == pytest.approx(1.0)
+    bright = data.reached & (data.first_white > 0.2)
+    assert bright.sum() > 100
+    found = (data.first / data.first_white)[bright]
+    assert float(found.median()) == pytest.approx(GREY, rel=0.03)
+    # The line that is nearest to a band is up to a column off it, which the method leaves at that.
+    assert found == pytest.approx(GREY, rel=0.2)

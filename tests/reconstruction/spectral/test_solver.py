@@ -15,6 +15,7 @@ from dsl_core.reconstruction.spectral.solver import (
     Prior,
     band_mean,
     gradient,
+    parabola_peak,
     roughness,
     solve_spectra,
     within_band,
@@ -208,3 +209,16 @@ def test_a_prior_means_the_same_spectra_on_other_bands() -> None:
     assert Prior().at_step(5.0) == Prior()
     assert fine.taus == pytest.approx([tau / 8**0.5 for tau in Prior().taus])
     assert (fine.level, fine.level_std, fine.bounds) == (Prior().level, Prior().level_std, Prior().bounds)
+
+
+def test_the_peak_of_a_parabola_is_found_between_its_samples() -> None:
+    positions = torch.linspace(-4.0, 4.0, 5, dtype=torch.float64)
+    tops = torch.tensor([-2.7, -0.4, 0.0, 1.1, 2.9], dtype=torch.float64)
+    samples = 5.0 - 0.3 * (positions[:, None] - tops) ** 2
+    assert parabola_peak(samples, positions) == pytest.approx(tops, abs=1e-12)
+
+
+def test_a_peak_is_at_the_better_end_where_samples_only_rise_fall_or_sag() -> None:
+    positions = torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64)
+    samples = torch.tensor([[0.0, 9.0, 3.0, 2.0], [4.0, 4.0, 0.0, 0.0], [9.0, 0.0, 2.0, 3.0]])
+    assert parabola_peak(samples.double(), positions).tolist() == [3.0, 1.0, 1.0, 3.0]
