@@ -140,3 +140,13 @@ def test_a_plane_takes_the_largest_windows_for_the_least_noise() -> None:
 def test_windows_shrink_to_three_pixels() -> None:
     assert windows_px(19) == [19, 11, 7, 5, 3]
     assert windows_px(3) == [3]
+
+
+def test_a_narrow_piece_beside_a_step_has_the_plane_of_its_own_side() -> None:
+    depth = np.full((80, 120), 700.0)
+    depth[20:60, 40:60] = np.nan
+    depth[20:60, 46:50], depth[20:60, 50:54] = 700.0, 750.0
+    surface = reconstruct_surface(small_rig(), depth, np.full(depth.shape, 0.3), 5)
+    piece = surface.normals[:, 24:56, 46:54]
+    assert np.isfinite(piece).all()
+    assert piece[2].max() < -0.999

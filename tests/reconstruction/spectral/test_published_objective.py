@@ -127,5 +127,5 @@ def test_a_grey_pixel_is_its_reflectance_in_units_of_white_however_bright_it_is_
     assert bright.sum() > 100
     found = (data.first / data.first_white)[bright]
     assert float(found.median()) == pytest.approx(GREY, rel=0.03)
-    # The line that is nearest to a band is up to a column off it, which the method leaves at that.
-    assert found == pytest.approx(GREY, rel=0.2)
+    # Of bands at the edge of what the LEDs emit, the mean dispersion of many pixels says little.
+    assert found == pytest.approx(GREY, rel=0.3)
