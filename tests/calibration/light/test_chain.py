@@ -7,7 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.light.chain import LineScan, chain_correction, largest_correction
+from dsl_core.calibration.light.chain import (
+    SCALE_STD,
+    UNKNOWNS,
+    LineScan,
+    _scale,
+    chain_correction,
+    largest_correction,
+)
 from dsl_core.campaign.common.flat_target import diffuser_lines
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.chain import ChainCorrection, apply_chain
@@ -15,6 +22,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.spectra import chain_response
+from dsl_core.solve.smooth_functions import Equations, solve_given
 from tests.cases.twin_scan import MemoryScan, twin_scan
 
 NM = np.arange(440.0, 651.0, 10.0)
@@ -143,3 +151,35 @@ def test_scan_without_lines_is_refused(scanned: tuple[Rig, MemoryScan]) -> None:
     comb = MemoryScan(scan.plan.model_copy(update={"spectral": LineComb()}), scan.frames)
     with pytest.raises(CalibrationError, match="has no scan lines"):
         diffuser_lines(comb, rig)
+
+
+def parts_that_see_the_scale(values: np.ndarray, std: float) -> list[Equations]:
+    """Parts of the image that know of nothing but the scale of wavelengths, each its own value."""
+    n = UNKNOWNS.count + 1
+    normal, right = np.zeros((n, n)), np.zeros((len(values), n))
+    normal[-1, -1], right[:, -1] = std**-2, values / std**2
+    return [Equations(normal, r, float((v / std) ** 2), 1) for r, v in zip(right, values, strict=True)]
+
+
+@pytest.mark.parametrize(("noise", "scatter"), [(1e-5, 4e-3), (4e-3, 1e-9)])
+def test_the_scale_is_as_unsure_as_its_noise_and_as_parts_of_the_image_differ(
+    noise: float, scatter: float
+) -> None:
+    values = 0.003 + scatter * np.random.default_rng(2).standard_normal(12)
+    parts = parts_that_see_the_scale(values, noise)
+    total = sum(parts[1:], parts[0])
+    n = UNKNOWNS.count
+    alone = Equations(total.normal[:n, :n], total.right[:n], total.square, total.count)
+    scale, std = _scale(solve_given(alone, np.eye(n), 1.0), total, parts)
+    # Twelve samples: the deviation of their mean, or that of their own noise.
+    error = np.std(values, ddof=1) / np.sqrt(12)
+    assert scale == pytest.approx(values.mean(), abs=0.02 * error + noise * 0.02)
+    assert std == pytest.approx(np.hypot(error, noise / np.sqrt(12)), rel=0.02)
+
+
+def test_without_data_the_scale_is_as_unsure_as_it_was_before() -> None:
+    parts = parts_that_see_the_scale(np.zeros(3), 1e6)
+    n = UNKNOWNS.count
+    alone = Equations(np.zeros((n, n)), np.zeros(n), 0.0, 3)
+    scale, std = _scale(solve_given(alone, np.eye(n), 1.0), sum(parts[1:], parts[0]), parts)
+    assert (scale, std) == (0.0, pytest.approx(SCALE_STD))

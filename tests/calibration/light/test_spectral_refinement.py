@@ -12,6 +12,7 @@ from dsl_core.calibration.light.spectral_refinement import (
     WEIGHTS,
     SpectralModel,
     SurfaceSignals,
+    _unit,
     refine,
     refined_curves,
     residuals,
@@ -81,6 +82,32 @@ def test_the_evidence_has_no_gap_of_more_than_a_decade_among_its_weights() -> No
     assert (decades > 0).all()
     assert decades.max() < 1.01
     assert PUBLISHED_WEIGHT in WEIGHTS
+
+
+def test_intensities_count_relative_to_the_white_of_their_channel() -> None:
+    """So that the published weight means what it does for intensities between zero and one."""
+    data = surfaces(published_rig(), 1e-3)
+    white = data.signal.max((0, 2), keepdims=True) * np.ones(data.signal.shape)
+    assert _unit(data, 0.01 * white) == pytest.approx(1e-4)
+    # A channel that is brighter, with its noise, has no more to say; less noise anywhere has.
+    gain = np.array([10.0, 1.0, 0.1])[:, None]
+    bright = SurfaceSignals(gain * data.signal, data.std, data.reflectance, data.lights, data.own_level)
+    assert _unit(bright, 0.01 * gain * white) == pytest.approx(1e-4)
+    half = np.where(np.arange(len(white)) % 2, 0.01, 0.02)[:, None, None] * white
+    assert 1e-4 < _unit(data, half) < 2.5e-4
+
+
+@pytest.mark.parametrize("weight", [1e-5, 1.0])
+def test_a_weight_smooths_alike_whatever_unit_signals_are_in(weight: float) -> None:
+    true = random_rig(1, published_rig())
+    data = surfaces(true, 1e-3)
+    start = published_rig().model_copy(update={"emission": known_emission(true)})
+    dim = start.model_copy(update={"white_scale": 1e-3 * start.white_scale})
+    scaled = SurfaceSignals(
+        1e-3 * data.signal, 1e-3 * data.std, data.reflectance, data.lights, data.own_level
+    )
+    one, other = refine(start, data, weight), refine(dim, scaled, weight)
+    np.testing.assert_allclose(one.deviation, other.deviation, atol=1e-6)
 
 
 def test_derivatives_are_those_of_the_signals() -> None:

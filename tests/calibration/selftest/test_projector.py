@@ -91,3 +91,11 @@ def test_a_ramp_is_the_frames_of_exactly_its_leds_and_a_dark_one_is_refused() ->
     lost = replace(readings, clipped=np.where((readings.drive[:, [0]] > 0), 1.0, readings.clipped))
     with pytest.raises(CalibrationError, match="white ramp of the projector gives too little"):
         check_projector(lost, dark(), TRANSFER, SIZES)
+
+
+def test_the_distance_from_the_power_law_is_stated_in_percent_with_its_deviation() -> None:
+    found, _ = check_projector(ramps(noise=0.02), dark(), TRANSFER, SIZES)
+    for ramp in found.ramps:
+        # Noise of two percent at nine levels in three channels, of which blue, green and red see one LED well.
+        assert 1.0 < ramp.residual_percent.value < 3.0
+        assert 0.05 < ramp.residual_percent.std / ramp.residual_percent.value < 0.25
