@@ -19,7 +19,7 @@ from dsl_core.errors import Cancelled, DeviceError, PlanError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Setting, Shot
-from dsl_core.progress import CallbackProgress
+from dsl_core.progress import CallbackProgress, CancelToken
 from tests.cases.memory_sink import MemorySink
 
 Pattern = Callable[..., Any]
@@ -188,6 +188,7 @@ def test_cancel_acts_between_shots_and_keeps_what_is_stored(
         runner.run()
     assert sorted(sink.frames) == [0, 1, 2, 3, 4, 5], "the shot under way is finished"
     assert states[-2:] == [State.CANCELLING, State.CANCELLED]
+    assert f"after 6 of {plan.shot_count} frames" in runner.status.message
     assert _is_dark(bench)
     Runner(rig, plan, sink, pattern).run()
     assert len(sink.frames) == plan.shot_count
@@ -276,6 +277,44 @@ def test_time_is_counted_without_pauses_and_estimated(
     assert halfway.elapsed_s + halfway.remaining_s == pytest.approx(total_s, abs=2e-3)
 
 
+def test_before_the_first_frame_the_plan_says_how_long_a_scan_takes(
+    rig: DeviceRig, plan: CapturePlan, pattern: Pattern
+) -> None:
+    runner = Runner(rig, plan, MemorySink(plan), pattern, clock=lambda: 0.0)
+    seen: list[Status] = []
+    runner.listen(seen.append)
+    runner.run()
+    first = next(status for status in seen if status.state is State.RUNNING)
+    assert first.remaining_s == pytest.approx(plan.duration_s(latency_ms=5.0), abs=2e-3)
+
+
+def test_a_paused_scan_sleeps_until_anybody_cancels_it(
+    rig: DeviceRig, bench: Any, plan: CapturePlan, pattern: Pattern, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also a token that is cancelled without telling the runner, as a signal handler does."""
+    token = CancelToken()
+    runner = Runner(rig, plan, MemorySink(plan), pattern, token=token)
+    asked, must_wait, ended = list[bool](), runner._must_wait, threading.Event()
+
+    def count() -> bool:
+        asked.append(True)
+        return must_wait()
+
+    def run() -> None:
+        with pytest.raises(Cancelled):
+            runner.run()
+        ended.set()
+
+    monkeypatch.setattr(runner, "_must_wait", count)
+    runner.pause()
+    threading.Thread(target=run, daemon=True).start()
+    assert not ended.wait(0.35)
+    token.cancel()
+    assert ended.wait(10)
+    assert 0 < len(asked) < 20
+    assert bench.snapped == []
+
+
 def test_a_broken_listener_or_progress_never_stops_a_scan(
     rig: DeviceRig, plan: CapturePlan, pattern: Pattern, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -337,6 +376,7 @@ def test_ctrl_c_leaves_a_resumable_session(
         with pytest.raises(KeyboardInterrupt):
             runner.run()
         assert runner.status.state is State.CANCELLED
+        assert runner.status.message == "Interrupted; saved frames are kept. Resume the scan."
     bench.before_snap, bench.before_show = lambda shot, attempt: None, lambda: None
     with ScanWriter.resume(folder, plan, rig) as sink:
         assert next(sink.missing()).index == 7
