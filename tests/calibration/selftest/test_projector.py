@@ -96,6 +96,6 @@ def test_a_ramp_is_the_frames_of_exactly_its_leds_and_a_dark_one_is_refused() ->
 def test_the_distance_from_the_power_law_is_stated_in_percent_with_its_deviation() -> None:
     found, _ = check_projector(ramps(noise=0.02), dark(), TRANSFER, SIZES)
     for ramp in found.ramps:
-        # Noise of two percent at nine levels in three channels, of which blue, green and red see one LED well.
+        # Noise of two percent at nine levels in three channels.
         assert 1.0 < ramp.residual_percent.value < 3.0
         assert 0.05 < ramp.residual_percent.std / ramp.residual_percent.value < 0.25

@@ -89,8 +89,10 @@ def test_deleted_values_are_neither_shown_nor_bridged(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("unit", "in_nm"),
-    [("Nanometers", 1), ("nanometres", 1), ("nm", 1), ("Micrometers", 1000), ("micrometres", 1000)]
-    + [("um", 1000), ("\u00b5m", 1000), ("\u03bcm", 1000), ("Microns", 1000)],
+    [
+        *(("Nanometers", 1), ("nanometres", 1), ("nm", 1), ("Micrometers", 1000), ("micrometres", 1000)),
+        *(("um", 1000), ("\u00b5m", 1000), ("\u03bcm", 1000), ("Microns", 1000)),
+    ],
 )
 def test_wavelengths_are_read_in_any_unit_of_length_that_libraries_use(
     tmp_path: Path, unit: str, in_nm: int
