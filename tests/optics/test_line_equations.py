@@ -74,11 +74,12 @@ def test_misfit_and_samples_are_those_of_the_lines_that_light_a_pixels_bands(ord
     operator = model.operator(traced, torch.ones_like(columns[0]), orders=(order,))
     spectrum = 0.5 + 0.3 * torch.sin(torch.arange(model.bands.count, dtype=torch.float64))
     spectra = spectrum[:, None].expand(-1, PIXELS)
-    light = operator.forward(spectra)
+    colour = torch.arange(PIXELS) % 3
+    light = operator.forward(spectra)[colour, :, torch.arange(PIXELS)].T
     # What is saturated has no weight, whatever it says.
     weight, frames = torch.ones_like(light), light.clone()
-    weight[0], frames[0] = 0.0, 7.0
-    system = model.line_equations(columns[0])
+    weight[::2], frames[::2] = 0.0, 7.0
+    system = model.line_equations(colour, columns[0])
     system.add(order, columns, inside, frames, weight, 0)
     seen = banded.to_dense(system.matrix)
     spread = torch.einsum("jp,pjk,kp->p", spectra, seen, spectra)
@@ -86,11 +87,11 @@ def test_misfit_and_samples_are_those_of_the_lines_that_light_a_pixels_bands(ord
     used = inside.any(0)
     assert used.sum() >= 3
     assert (misfit[used].abs() < 0.01 * system.square[used]).all()
-    assert system.square == pytest.approx((light**2 * weight).sum((0, 1)), rel=1e-4)
-    bright, faint = ((light[1] > share * light[1].amax(0)).sum(0)[used] for share in (1e-2, 1e-6))
-    assert (system.samples[used] >= 2 * bright).all()
+    assert system.square == pytest.approx((light**2 * weight).sum(0), rel=1e-3)
+    bright, faint = (((light > share * light.amax(0)) & (weight > 0)).sum(0)[used] for share in (1e-2, 1e-6))
+    assert (system.samples[used] >= bright).all()
     # Half a column of the table's ends is without light: at most a line more on either side.
-    assert (system.samples[used] <= 2 * (faint + 2)).all()
+    assert (system.samples[used] <= faint + 2).all()
     assert not system.samples[~used].any()
 
 
