@@ -77,7 +77,7 @@ def test_misfit_and_samples_are_those_of_the_lines_that_light_a_pixels_bands(ord
     colour = torch.arange(PIXELS) % 3
     light = operator.forward(spectra)[colour, :, torch.arange(PIXELS)].T
     # What is saturated has no weight, whatever it says.
-    weight, frames = torch.ones_like(light), light.clone()
+    weight, frames = torch.full_like(light, 3.0), light.clone()
     weight[::2], frames[::2] = 0.0, 7.0
     system = model.line_equations(colour, columns[0])
     system.add(order, columns, inside, frames, weight, 0)
