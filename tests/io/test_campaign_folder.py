@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.campaign_folder import CampaignFolder, CampaignInfo, read_record
+from dsl_core.io.campaign_folder import CampaignFolder, CampaignInfo
+from dsl_core.io.records import read_record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 
 

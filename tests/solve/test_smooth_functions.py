@@ -101,7 +101,7 @@ def test_correlation_is_that_of_smoothness_five_halves() -> None:
 
 def evidence_of(amplitude: float, length: float) -> tuple[Equations, list[SmoothPrior]]:
     """Ten functions drawn with an amplitude and a length on nodes 10 apart, and seen with little noise."""
-    nodes, std = 10.0 * np.arange(31), 0.02 * amplitude
+    nodes, std = np.arange(0.0, 301.0, 10.0), 0.02 * amplitude
     correlation = bessel_matern(np.subtract.outer(nodes, nodes) / length)
     root = np.linalg.cholesky(correlation + 1e-9 * np.eye(len(nodes)))
     unit = np.random.default_rng(7).standard_normal((2, 10, len(nodes)))
