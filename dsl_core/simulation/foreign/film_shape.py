@@ -15,8 +15,9 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.grating import FilmFrame, Vectors
 from dsl_core.simulation.foreign.variants import Foreign
 
-#: Largest slope of the S at the frame's side, and of the twist at the frame's top and bottom.
-S_SLOPE, TWIST_SLOPE = 0.02, 0.02
+#: Largest slope of the S at the frame's side, and of the twist at the frame's top and bottom: as steep as the
+#: strongest usual bend of a drawn rig is there.
+S_SLOPE, TWIST_SLOPE = 0.04, 0.04
 #: The film is close and the scene far: each step shrinks the error about twentyfold.
 STEPS = 12
 

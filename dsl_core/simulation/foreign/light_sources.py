@@ -69,7 +69,7 @@ def trace(rig: Rig, foreign: Foreign, order: int, pixels: Tensor, depth_mm: Tens
         point = projector_points(rig, pixels, depth_mm)
         direction = BentFilm(rig, foreign).incoming(point, order, nm)
     column, row = project(lens, *direction)
-    magnified = torch.as_tensor(projector_magnification(lens, traced_nm(), foreign))[:, None]
+    magnified = torch.as_tensor(projector_magnification(traced_nm(), foreign))[:, None]
     column = lens.cx_px + (column - lens.cx_px) * magnified
     row = lens.cy_px + (row - lens.cy_px) * magnified
     margin = 20.0

@@ -20,7 +20,7 @@ VARIANTS: Mapping[str, str] = MappingProxyType(
         "response-curve": "LEDs whose light leaves the power law of the drive level by up to 2 %",
         "prnu": "pixel gains that differ by 1 %, and hot pixels",
         "light-drift": "light of the projector that falls by 3 % in five minutes and comes back",
-        "lateral-colour": "red and blue magnified differently, half a pixel at the side, by both lenses",
+        "lateral-colour": "red and blue apart by half a full-size pixel at the side, in both lenses",
         "vignetting": "gain of the camera that falls by 8 % to the corner",
         "second-order": "second orders brighter than the calibration says by 4 % of the first",
         "curves": "smooth deviations of up to 5 % of all curves of camera and LEDs",
