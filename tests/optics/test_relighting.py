@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.optics.relighting import LIGHTS, relight
+from dsl_core.optics.colour import colour_library
+from dsl_core.optics.relighting import LIGHTS, adaptation, relight
 
 NM = np.arange(430.0, 661.0, 5.0)
 
@@ -17,3 +18,13 @@ def test_white_stays_white_to_adapted_eyes(light: str) -> None:
 def test_a_lamp_is_yellow_beside_daylight() -> None:
     rgb = relight(np.full((NM.size, 1, 1), 0.5, np.float32), NM, "A", adapted=False)
     assert rgb[0, 0, 0] > rgb[1, 0, 0] > rgb[2, 0, 0]
+
+
+def test_adaptation_is_that_of_another_library() -> None:
+    lamp, daylight = np.array([1.0985, 1.0, 0.3558]), np.array([0.9505, 1.0, 1.0888])
+    expected = colour_library().adaptation.matrix_chromatic_adaptation_VonKries(
+        lamp, daylight, transform="Bradford"
+    )
+    found = adaptation(lamp, daylight)
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+    np.testing.assert_allclose(found @ lamp, daylight, rtol=1e-12)

@@ -80,6 +80,31 @@ def test_inverse_variance_beats_either_setting_and_the_trapezoid() -> None:
     assert np.var(best.radiance) < np.var(seed.radiance)
 
 
+@pytest.mark.parametrize(
+    ("weak_dn", "strong_raw", "share"),
+    [
+        (0.01, 0.91, 0.5),  # both halfway along their ramps
+        (0.01, 0.5, 1 / 3),
+        (0.3, 0.94, 0.8),
+        (0.3, 0.5, 0.5),
+        (0.0, 0.5, 0.0),
+        (0.3, 0.975, 1.0),
+    ],
+)
+def test_the_trapezoid_rises_to_two_percent_and_falls_from_85_to_97(
+    weak_dn: float, strong_raw: float, share: float
+) -> None:
+    """Shares of full scale in two settings that disagree; ``share`` is the weak one's part of the answer."""
+    full = float(SENSOR.full_scale_dn)
+    black = SENSOR.black_level_dn
+    raws = [np.full(SHAPE, round(value), np.uint16) for value in (black + weak_dn * full, strong_raw * full)]
+    radiances = [(raw.astype(float) - black) / gain for raw, gain in zip(raws, GAINS_MS, strict=True)]
+    merger = HdrMerger(GAINS_MS, [exact_black()] * 2, SENSOR, weighting="trapezoid", saturation_margin_dn=20)
+    merged = merger.merge(raws).radiance
+    expected = share * radiances[0] + (1 - share) * radiances[1]
+    assert merged == pytest.approx(expected, rel=0.01)
+
+
 def test_black_keeps_its_sign_and_its_place() -> None:
     """Below black stays negative; each setting has its own black, pixel by pixel."""
     rng = np.random.default_rng(3)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,20 @@ def test_fits_from_a_few_columns_off_are_within_their_deviations(order: int) -> 
     assert np.sqrt(np.mean(error**2)) < 0.05
     # Where tiles are small, the model's own course over them adds to the noise.
     assert 0.4 < np.sqrt(np.median((error / found.std_px) ** 2)) < 1.6
+
+
+def test_what_the_model_does_not_explain_makes_columns_less_sure() -> None:
+    frames = line_frames(TRUTH, PLANE, 540.0)
+    rng = np.random.default_rng(5)
+    rough = replace(frames, radiance=frames.radiance + 4 * frames.std * rng.standard_normal(frames.std.shape))
+    calm, wild = (
+        fit_columns(TRUTH, PLANE, each, passband(TRUTH, 540.0, 1), GratingModel(TRUTH))
+        for each in (frames, rough)
+    )
+    # Noise four times as strong as stated, besides the stated one.
+    assert np.median(wild.std_px) / np.median(calm.std_px) > 1.5
+    error = wild.column_px - true_columns(wild)
+    assert 0.4 < np.sqrt(np.median((error / wild.std_px) ** 2)) < 1.6
 
 
 def test_a_search_comes_near_from_twenty_columns_off() -> None:

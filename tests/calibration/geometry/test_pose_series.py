@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from dsl_core.calibration.geometry.pose_series import (
     doubts,
     largest_angle_deg,
     largest_tilt_deg,
+    picture_gamma,
 )
 from dsl_core.calibration.geometry.solve import calibrate_geometry
 from dsl_core.errors import CalibrationError
@@ -102,3 +105,33 @@ def test_another_known_length_tells_a_wrong_printed_size(found: GeometryCalibrat
     assert not any("printed squares" in each for each in doubts(found, 40.0, 1.05 * baseline))
     (sentence,) = (each for each in doubts(found, 40.0, 1.2 * baseline) if "printed squares" in each)
     assert "probably 36.0 mm, not 30 mm" in sentence
+
+
+@pytest.mark.parametrize("gamma", [1.0, 0.45])
+def test_the_gamma_is_that_of_bright_places_where_stripes_cross_a_pixel(gamma: float) -> None:
+    linear = case.board_frames()
+
+    def pictured(picture: np.ndarray) -> np.ndarray:
+        light = (picture - 4.0).clip(0) / 200.0
+        # A camera that loses its darkest counts: dark squares would say nothing of its gamma.
+        return np.asarray(1000 * np.where(light < 0.15, 0.0, light**gamma) + 10)
+
+    frames = replace(
+        linear,
+        pairs=[pictured(picture) for picture in linear.pairs],
+        white=pictured(linear.white) + np.where(linear.white < 40, 3.0, 0.0),
+        black=pictured(linear.black),
+    )
+    assert picture_gamma(frames, case.SMALL_PROJECTOR_PX) == pytest.approx(gamma, abs=0.06)
+
+
+@pytest.mark.parametrize(("tilt_deg", "enough"), [(4.0, False), (7.0, True)])
+def test_poses_five_degrees_apart_are_enough(tilt_deg: float, enough: bool) -> None:
+    turn = np.radians(tilt_deg)
+    tilts = ((0.0, 0.0), (turn, 0.0), (0.0, 0.0), (turn, 0.0), (0.0, 0.0), (turn, 0.0))
+    poses = case.poses_seen(0.0, tilts=tilts)
+    if enough:
+        check_poses(poses, case.CAMERA_PX)
+    else:
+        with pytest.raises(CalibrationError, match="nearly parallel"):
+            check_poses(poses, case.CAMERA_PX)

@@ -48,6 +48,14 @@ def test_plain_xarray_reads_it_without_this_package(tmp_path: Path) -> None:
         assert plain["depth_mm"].attrs["units"] == "mm"
 
 
+def test_maps_take_single_precision_on_disk_and_axes_keep_theirs(tmp_path: Path) -> None:
+    result = small_result()
+    result["depth_mm"] = result["depth_mm"].astype(np.float64)
+    path = save_result(result, tmp_path / "result.zarr")
+    assert load_result(path)["depth_mm"].dtype == np.float32
+    assert load_result(path)["wavelength_nm"].dtype == result["wavelength_nm"].dtype
+
+
 def test_one_band_is_read_without_its_neighbours(tmp_path: Path) -> None:
     import zarr
 
