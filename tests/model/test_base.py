@@ -20,3 +20,13 @@ def test_what_is_no_record_at_all_is_the_file() -> None:
     with pytest.raises(ValidationError) as caught:
         CapturePlan.model_validate_json("{")
     assert problems_in_words(caught.value).startswith("the file: Invalid JSON")
+
+
+@pytest.mark.parametrize("length", [37, 38, 39, 200])
+def test_long_values_are_cut_to_forty_characters(length: int) -> None:
+    with pytest.raises(ValidationError) as caught:
+        CapturePlan.model_validate({"settings": "x" * length})
+    told = problems_in_words(caught.value).split("(given ")[1].removesuffix(")")
+    whole = repr("x" * length)
+    assert told == (whole if len(whole) <= 40 else whole[:37] + "...")
+    assert len(told) <= 40
