@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.optics.pinhole import distort, max_radius_sq, pixel_rays, project, undistort
+from dsl_core.optics.pinhole import FADE_RADIUS_SQ, distort, max_radius_sq, pixel_rays, project, undistort
 from dsl_core.simulation.published_rig import published_rig
 
 LENS = published_rig().camera
@@ -49,3 +49,19 @@ def test_image_circle_reaches_a_tenth_beyond_the_farthest_corner() -> None:
     folded = LENS.model_copy(update={"distortion": (-20.0, 0.0, 0.0, 0.0, 0.0)})
     with pytest.raises(CalibrationError, match="cannot be inverted"):
         max_radius_sq(folded)
+
+
+def test_beyond_the_image_circle_the_radial_factor_fades_into_a_constant() -> None:
+    limit, bent = 0.09, (-0.3, 0.1, 0.0, 0.0, 0.5)
+    r2 = np.array([0.0899, 0.0901, limit + FADE_RADIUS_SQ, limit + 999 * FADE_RADIUS_SQ, 1e9])
+    r = np.sqrt(r2)
+    radial = distort(r, 0 * r, bent, limit)[0] / r
+    free = distort(r, 0 * r, bent)[0] / r
+    assert radial[0] == free[0]
+    # Value and slope continue; then half of the change comes within one fading distance, and it ends.
+    assert radial[1] == pytest.approx(free[1], abs=1e-8)
+    end = radial[-1] - 0.5 * (free[0] + free[1])
+    slope = (free[1] - free[0]) / (r2[1] - r2[0])
+    assert end == pytest.approx(slope * FADE_RADIUS_SQ, rel=1e-4)
+    assert radial[2] == pytest.approx(radial[-1] - end / 2, abs=1e-5)
+    assert radial[3] == pytest.approx(radial[-1] - end / 1000, abs=1e-5)

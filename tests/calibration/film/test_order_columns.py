@@ -42,7 +42,8 @@ def test_fits_from_a_few_columns_off_are_within_their_deviations(order: int) -> 
 def test_what_the_model_does_not_explain_makes_columns_less_sure() -> None:
     frames = line_frames(TRUTH, PLANE, 540.0)
     rng = np.random.default_rng(5)
-    rough = replace(frames, radiance=frames.radiance + 4 * frames.std * rng.standard_normal(frames.std.shape))
+    noise = 4 * frames.std * rng.standard_normal(frames.std.shape).astype(np.float32)
+    rough = replace(frames, radiance=frames.radiance + noise)
     calm, wild = (
         fit_columns(TRUTH, PLANE, each, passband(TRUTH, 540.0, 1), GratingModel(TRUTH))
         for each in (frames, rough)

@@ -54,6 +54,27 @@ def test_corners_are_numbered_along_rows_and_found_below_a_tenth_of_a_pixel() ->
     assert np.linalg.norm(steps, axis=2) == pytest.approx(np.full((4, 4), 30.0), abs=0.15)
 
 
+def test_markers_close_to_a_corner_do_not_draw_it() -> None:
+    """Squares of 18 px leave two pixels between a corner and the markers beside it."""
+    import cv2
+
+    board = Charuco(columns=8, rows=6, square_mm=20.0, marker_mm=15.0, dictionary="DICT_5X5_100")
+    drawn = cv2.aruco.CharucoBoard(
+        (8, 6), 20.0, 15.0, cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_5X5_100)
+    )
+    large, fine, scale = drawn.generateImage((1280, 960), None, 0).astype(np.float32), 8, 18 / 160
+    to_picture = np.array([[scale, 0.02 * scale, 12.9], [-0.02 * scale, scale, 15.0]])
+    to_fine = fine * to_picture
+    to_fine[:, 2] += (fine - 1) / 2
+    seen = cv2.warpAffine(large, to_fine, (171 * fine, 135 * fine), borderValue=(255.0,))
+    grey = cv2.GaussianBlur(seen.reshape(135, fine, 171, fine).mean((1, 3)), (0, 0), 0.6)
+    found = find_corners(np.asarray(grey, np.float32), board, "the picture")
+    corners = np.stack([found.ids % 7 + 1, found.ids // 7 + 1], 1) * 160 - 0.5
+    error = found.points_px - (corners @ to_picture[:, :2].T + to_picture[:, 2])
+    assert len(found.ids) >= 12
+    assert np.sqrt((error**2).mean()) < 0.1
+
+
 def test_refining_brings_corners_to_where_edges_cross(frames: PoseFrames) -> None:
     truth, _ = true_corners(TILTED, TILTED_SIZE_PX)
     rough = Corners(np.arange(77), truth + np.random.default_rng(0).uniform(-0.3, 0.3, truth.shape))
