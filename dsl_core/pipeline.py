@@ -78,6 +78,8 @@ def reconstruct(
     timer: StageTimer | None = None,
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
+    from dsl_core.optics.line_set import LineSet
+    from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
@@ -93,6 +95,8 @@ def reconstruct(
     with timer.stage("read and merge the line frames"):
         stack = stack_lines(merged, progress)
     with timer.stage("columns, depth, normals"):
+        if options.refine_columns and not options.as_calibrated:
+            rig = with_own_spread(rig, own_spread(rig, LineSet.of(plan), code, white, stack))
         geometry = reconstruct_geometry(
             rig,
             plan,

@@ -52,7 +52,8 @@ class Options:
 
     ``solver`` is ``best`` or, to compare with it, ``published`` (Adam on the published objective),
     ``nearest-line`` or ``colour-basis``. ``surface_window_px`` is the window of normals; None takes it from
-    the image's width, which is wrong for a piece cut out of a larger image.
+    the image's width, which is wrong for a piece cut out of a larger image. ``as_calibrated`` corrects
+    nothing in the calibration by what the scan itself shows.
     """
 
     grid: WavelengthGrid = field(default_factory=WavelengthGrid)
@@ -62,3 +63,4 @@ class Options:
     device: str = "cpu"
     surface_window_px: int | None = None
     solver: str = "best"
+    as_calibrated: bool = False

@@ -13,10 +13,13 @@ from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.line_spread import LineSpread, Spread
 from dsl_core.model.spectral import SpectralCurve
 
 Range = tuple[float, float]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
+#: Relative difference granted between the stated width of a measured line spread and its own.
+WIDTH_MISMATCH = 1e-3
 
 
 class FlatField(Record):
@@ -119,7 +122,8 @@ class ProjectorResponse(Record):
     """From drive level to light: ``radiance = level ** gamma``, black level, blur and halo.
 
     The halo is light of the zero order scattered sideways in the film: a column at distance ``d``
-    px contributes ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance.
+    px contributes ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance. Without a measured
+    ``spread`` the blur is a Gaussian of rms width ``blur_px``; with one, that is the curve's rms width.
     """
 
     gamma: float = Field(default=2.2, gt=0)
@@ -127,6 +131,35 @@ class ProjectorResponse(Record):
     blur_px: float = Field(default=0.6, gt=0)
     halo_peak_per_px: float = Field(default=0.0, ge=0)
     halo_decay_px: float = Field(default=30.0, gt=0)
+    spread: LineSpread | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.spread is not None and abs(self.spread.rms_px / self.blur_px - 1) > WIDTH_MISMATCH:
+            raise ValueError(
+                f"blur_px must be the rms width of the spread, {self.spread.rms_px:.4f} px, given"
+                f" {self.blur_px:.4f} px"
+            )
+        return self
+
+    @property
+    def line_spread(self) -> Spread:
+        """The measured curve, or the rms width of the Gaussian that stands for it (px)."""
+        return self.blur_px if self.spread is None else self.spread
+
+    def with_gaussian(self, blur_px: float) -> Self:
+        """The same with a Gaussian blur of this rms width instead of any measured curve."""
+        return self.model_copy(update={"blur_px": blur_px, "spread": None})
+
+    def with_spread(self, spread: LineSpread) -> Self:
+        """The same with a measured curve of the line spread."""
+        return self.model_copy(update={"blur_px": spread.rms_px, "spread": spread})
+
+    def blurred(self, blur_px: float) -> Self:
+        """The same after a further Gaussian blur."""
+        if self.spread is not None:
+            return self.with_spread(self.spread.blurred(blur_px))
+        return self.with_gaussian(float(np.hypot(self.blur_px, blur_px)))
 
     def radiance(self, level: float | NDArray[np.float64]) -> NDArray[np.float64]:
         """Radiance relative to full drive, black included, for a level in 0..1, after 8 bit rounding."""

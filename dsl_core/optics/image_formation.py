@@ -62,7 +62,7 @@ class BlurredProfiles:
         if band_px == 0:
             light = zero_order_profile(torch.as_tensor(distance), -0.5, 0.5, response)
         else:
-            light = torch.as_tensor(band_profile(distance, 1.0, response.blur_px, band_px))
+            light = torch.as_tensor(band_profile(distance, 1.0, response.line_spread, band_px))
         # From the last column to the first, a column's light begins one column of samples later.
         spread = light.to(other).unfold(0, OVERSAMPLE * (width - 1) + 1, 1)[:, ::OVERSAMPLE]
         self.table = torch.einsum("sx,fxl->slf", spread, like(profiles, other).flip(1))

@@ -12,6 +12,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from dsl_core.model.line_spread import Spread
 from dsl_core.optics.correspondence import like
 from dsl_core.optics.line_profile import SAMPLES, ProfileTable
 from dsl_core.optics.line_set import LineSet
@@ -27,7 +28,7 @@ DROPPED = 2e-5
 GROUP = 3
 
 
-#: A tabulated profile of a width, blur and half width of a band (px), shared by all that ask for it.
+#: A tabulated profile of a width, spread and half width of a band (px), shared by all that ask for it.
 _table = lru_cache(maxsize=64)(ProfileTable)
 
 
@@ -38,16 +39,16 @@ class LineEquations:
         self,
         bands: Bands,
         lines: LineSet,
-        blur_px: float,
+        spread: Spread,
         colour: Tensor,
         other: Tensor,
         offsets: bool = False,
     ) -> None:
-        """``blur_px`` is that of a line, ``colour`` (pixels,) 0 to 2 for red, green and blue.
+        """``spread`` is that of a line, ``colour`` (pixels,) 0 to 2 for red, green and blue.
 
         ``other`` gives device and precision; ``offsets`` adds up as well what an offset of all frames does.
         """
-        self.bands, self.lines, self.blur_px, self.colour = bands, lines, blur_px, colour
+        self.bands, self.lines, self.spread, self.colour = bands, lines, spread, colour
         self.matrix = torch.zeros((1, bands.count, len(colour)), device=other.device, dtype=other.dtype)
         self.right = torch.zeros_like(self.matrix[0])
         #: Right side of an offset of one DN per ms, (bands, pixels), if it is asked for.
@@ -71,8 +72,7 @@ class LineEquations:
         Bands are taken in groups that share one window of lines, so that data are gathered once a group.
         """
         half = self.bands.half_width_px(columns)
-        blur = round(self.blur_px, 2)
-        table = _table(self.lines.width_px, blur, half, columns.device, columns.dtype)
+        table = _table(self.lines.width_px, self.spread, half, columns.device, columns.dtype)
         # On the table's grid a band has the same profile in every group, and the matrix is a true square.
         columns = (columns * SAMPLES).round() / SAMPLES
         spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(

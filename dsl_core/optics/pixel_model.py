@@ -136,8 +136,7 @@ class PixelModel:
 
     def response(self, blur_px: float) -> ProjectorResponse:
         """The projector's response, blurred further: demosaicing averages neighbours, which widens lines."""
-        own = self.rig.projector_response
-        return own.model_copy(update={"blur_px": float(np.hypot(own.blur_px, blur_px))})
+        return self.rig.projector_response.blurred(blur_px)
 
     def operator(
         self, traced: Traced, shading: Tensor, blur_px: float = 0.0, orders: Sequence[int] | None = None
@@ -180,8 +179,8 @@ class PixelModel:
         `LineEquations`.
         """
         assert self.lines is not None
-        blur = self.response(0.0).blur_px
-        return LineEquations(self.bands, self.lines, blur, colour, other, offsets)
+        spread = self.rig.projector_response.line_spread
+        return LineEquations(self.bands, self.lines, spread, colour, other, offsets)
 
     def frames(self, columns_px: Tensor, inside: Tensor) -> range:
         """Frames of single lines that light any band (bands, pixels) that is inside; empty when none does."""

@@ -242,8 +242,8 @@ def _usable(footprint: Footprint, rig: Rig) -> NDArray[np.bool_]:
 def _light(rig: Rig, scan: LineScan, columns: torch.Tensor) -> Floats:
     """Light of each line on each band of each pixel, (frames, P, bands)."""
     slope = float((columns[-1] - columns[0]).abs().median()) / float(BANDS_NM[-1] - BANDS_NM[0])
-    blur = rig.projector_response.blur_px
-    table = ProfileTable(scan.lines.width_px, blur, slope * STEP_NM, columns.device, columns.dtype)
+    spread = rig.projector_response.line_spread
+    table = ProfileTable(scan.lines.width_px, spread, slope * STEP_NM, columns.device, columns.dtype)
     centres = torch.as_tensor(scan.centres_px)[:, None, None].to(columns.dtype)
     return table.at(columns.T - centres).numpy()
 

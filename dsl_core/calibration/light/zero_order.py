@@ -109,7 +109,7 @@ def fit_zero_order(
     scale = np.sqrt(max(float(np.median(chi[use])), 1.0))
     blur, peak, decay = float(common[0]), float(common[1]), float(np.exp(common[2]))
     spread = np.sqrt(np.diag(covariance)) * scale * (1.0, 1.0, decay)
-    response = start.model_copy(update={"blur_px": blur, "halo_peak_per_px": peak, "halo_decay_px": decay})
+    response = start.with_gaussian(blur).model_copy(update={"halo_peak_per_px": peak, "halo_decay_px": decay})
     return ZeroOrderFit(
         column, amplitude, use, response, (spread[0], spread[1], spread[2]), float(np.mean(chi[use]))
     )
@@ -149,12 +149,8 @@ def _window(
 
 
 def _profile(data: _Data, column: Floats, start: ProjectorResponse, common: Floats) -> Floats:
-    response = start.model_copy(
-        update={
-            "blur_px": float(common[0]),
-            "halo_peak_per_px": float(common[1]),
-            "halo_decay_px": float(np.exp(common[2])),
-        }
+    response = start.with_gaussian(float(common[0])).model_copy(
+        update={"halo_peak_per_px": float(common[1]), "halo_decay_px": float(np.exp(common[2]))}
     )
     distance = torch.as_tensor(column - data.centres)
     return np.asarray(

@@ -61,12 +61,8 @@ class BandpassCalibration(Record):
 
 def apply_bandpass(record: BandpassCalibration, rig: Rig) -> Rig:
     """The rig with efficiencies, response, white scale, blur and halo as measured."""
-    response = rig.projector_response.model_copy(
-        update={
-            "blur_px": record.blur_px,
-            "halo_peak_per_px": record.halo_peak_per_px,
-            "halo_decay_px": record.halo_decay_px,
-        }
+    response = rig.projector_response.with_gaussian(record.blur_px).model_copy(
+        update={"halo_peak_per_px": record.halo_peak_per_px, "halo_decay_px": record.halo_decay_px}
     )
     return rig.model_copy(
         update={

@@ -15,10 +15,11 @@ import torch
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import halo_of_line, zero_order_profile
+from dsl_core.optics.line_profile import LineTable, halo_of_line
 from dsl_core.optics.line_set import LineSet
 
-ITERATIONS = 6
+#: Steps of the fit, and the longest, px.
+ITERATIONS, STEP_PX = 6, 0.7
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
 MODEL_ERROR = 0.0015
 #: The same for combs, where the first orders of other lines are under the peak.
@@ -54,8 +55,10 @@ def refine(
     q = coarse_px.clone()
     brightest = amplitude = y.amax(0)
     error = MODEL_ERROR if lines.single else COMB_ERROR
+    # No distance grows by more than the steps of all iterations.
+    table = LineTable(lines.width_px, response, float((q - centres).abs().max()) + ITERATIONS * STEP_PX, q)
     for _ in range(ITERATIONS):
-        g, slope = _profile(q - centres, lines.width_px, response)
+        g, slope = table.at(q - centres)
         weight = 1 / (variance + (error * amplitude) ** 2)
         wg = weight * g
         gg = (wg * g).sum(0).clip(min=1e-30)
@@ -63,7 +66,7 @@ def refine(
         residual = y - amplitude * g
         along = slope - g * ((wg * slope).sum(0) / gg)
         information = (amplitude**2 * (weight * along * along).sum(0)).clip(min=1e-12)
-        q = q + (amplitude * (weight * along * residual).sum(0) / information).clip(-0.7, 0.7)
+        q = q + (amplitude * (weight * along * residual).sum(0) / information).clip(-STEP_PX, STEP_PX)
     used = (weight > 0).sum(0)
     chi_square = (weight * residual**2).sum(0) / (used - 2).clip(min=1)
     std_px = torch.sqrt(chi_square.clip(min=1) / information)
@@ -127,16 +130,3 @@ def _window(
     usable = lines.exists(line) & torch.isfinite(variance) & torch.isfinite(y)
     variance = torch.where(usable, variance, torch.inf)
     return torch.where(usable, y, 0.0), variance, lines.centre_px(line).to(coarse.dtype)
-
-
-def _profile(distance: Tensor, width_px: int, response: ProjectorResponse) -> tuple[Tensor, Tensor]:
-    """Profile of a line and its derivative over distance (1/px)."""
-    half = width_px / 2
-    g = zero_order_profile(distance, -half, half, response)
-    scale = 1 / (response.blur_px * math.sqrt(2 * math.pi))
-    inverse = -0.5 / response.blur_px**2
-    near, far = distance + half, distance - half
-    slope = scale * (torch.exp(inverse * near * near) - torch.exp(inverse * far * far))
-    decay = response.halo_decay_px
-    halo = response.halo_peak_per_px * (torch.exp(-near.abs() / decay) - torch.exp(-far.abs() / decay))
-    return g, slope + halo

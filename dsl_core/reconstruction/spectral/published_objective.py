@@ -212,11 +212,12 @@ class PublishedReconstruction:
 
     def _line_response(self, order: int, slope: float) -> Tensor:
         """Signal of a white pixel from a line centred on each band's column, (3, bands), DN per ms."""
-        blur, half = self.rig.projector_response.blur_px, self.lines.width_px / 2
-        reach_nm = math.ceil((half + 4 * blur) / slope)
+        response, half = self.rig.projector_response, self.lines.width_px / 2
+        reach_nm = math.ceil((half + 4 * response.blur_px) / slope)
         offsets_nm = np.arange(-reach_nm, reach_nm + 0.5, 0.5)
         at = torch.as_tensor(offsets_nm * slope)
-        profile = (step_edge(at + half, blur) - step_edge(at - half, blur)).numpy()
+        spread = response.line_spread
+        profile = (step_edge(at + half, spread) - step_edge(at - half, spread)).numpy()
         nm = (self.grid.centres_nm[:, None] + offsets_nm).ravel()
         density = chain_response(self.rig, order, nm).sum(1).reshape(3, self.grid.count, -1)
         return torch.as_tensor(density @ profile * 0.5, dtype=torch.float32)

@@ -88,10 +88,9 @@ class DepthOfField(ExtraEffect):
     def direct_light(self, path: LightPath) -> PatternView:
         """See `ExtraEffect`: the direct light of a projector that is out of focus here and there."""
         levels, weights = layers(self.blurs(path).projector_px)
-        sharp = path.rig.projector_response.blur_px
         views = []
         for level, weight in zip(levels, weights, strict=True):
-            blurred = path.with_value("rig.projector_response.blur_px", math.hypot(sharp, level))
+            blurred = path.with_value("rig.projector_response", path.rig.projector_response.blurred(level))
             views.append(blurred.renderer(_parts_in(path, weight > 0)))
         return LayeredView(tuple(views), tuple(weights))
 

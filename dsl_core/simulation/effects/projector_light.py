@@ -19,7 +19,9 @@ class Blur(Effect):
 
     name = "blur"
     summary = "blur of the projector"
-    ideal = MappingProxyType({"rig.projector_response.blur_px": _SHARP_PX})
+    ideal = MappingProxyType(
+        {"rig.projector_response.spread": None, "rig.projector_response.blur_px": _SHARP_PX}
+    )
 
     def bound(self, limits: Limits) -> EffectBound:
         """At the edge of a line all of its light."""
