@@ -79,7 +79,7 @@ def reconstruct(
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
     from dsl_core.optics.line_set import LineSet
-    from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
+    from dsl_core.reconstruction.columns.line_spread import own_spread, spread_finding, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
@@ -95,8 +95,12 @@ def reconstruct(
     with timer.stage("read and merge the line frames"):
         stack = stack_lines(merged, progress)
     with timer.stage("columns, depth, normals"):
+        findings = []
         if options.refine_columns and not options.as_calibrated:
-            rig = with_own_spread(rig, own_spread(rig, LineSet.of(plan), code, white, stack))
+            found = own_spread(rig, LineSet.of(plan), code, white, stack)
+            if found is not None:
+                findings.append(spread_finding(rig.projector_response, found))
+            rig = with_own_spread(rig, found)
         geometry = reconstruct_geometry(
             rig,
             plan,
@@ -114,7 +118,7 @@ def reconstruct(
         with timer.stage("spectra"):
             spectra = solve_spectra(rig, plan, options, stack, known_pixels(geometry), progress)
     with timer.stage("colour and result"):
-        return assemble(rig, plan, options.grid, geometry, spectra)
+        return assemble(rig, plan, options.grid, geometry, spectra, findings)
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

@@ -45,6 +45,9 @@ def reconstruct(
         bool, typer.Option("--refine/--no-refine", help="Find columns to a fraction of a pixel.")
     ] = True,
     depth_only: Annotated[bool, typer.Option("--depth-only", help="Leave out the spectra.")] = False,
+    as_calibrated: Annotated[
+        bool, typer.Option("--as-calibrated", help="Correct nothing by what the scan itself shows.")
+    ] = False,
     device: Annotated[str, typer.Option(help="cpu, cuda, or auto: cuda if available.")] = "cpu",
     force: Force = False,
     json: Json = False,
@@ -63,7 +66,15 @@ def reconstruct(
     grid = parse_bands(bands)
     check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
-    options = Options(grid, model, refine, not depth_only, torch_device(device), solver=solver)
+    options = Options(
+        grid,
+        model,
+        refine,
+        not depth_only,
+        torch_device(device),
+        solver=solver,
+        as_calibrated=as_calibrated,
+    )
     with output.progress() as progress:
         result = reconstruct_scan(session, rig, options, progress, timer, override)
         with timer.stage("save the result"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from dsl_core import __version__
 from dsl_core.model.calibration.accepted import missed_attributes
-from dsl_core.model.fit import ATTRIBUTE
+from dsl_core.model.fit import ATTRIBUTE, Fit, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
 from dsl_core.model.rig import Rig
@@ -46,9 +47,17 @@ def known_pixels(geometry: Geometry) -> Pixels:
 
 
 def assemble(
-    rig: Rig, plan: CapturePlan, grid: WavelengthGrid, geometry: Geometry, spectra: SpectralMaps | None
+    rig: Rig,
+    plan: CapturePlan,
+    grid: WavelengthGrid,
+    geometry: Geometry,
+    spectra: SpectralMaps | None,
+    findings: Iterable[FitFinding] = (),
 ) -> xr.Dataset:
-    """The dataset of a scan; without spectra when only depth was requested."""
+    """The dataset of a scan; without spectra when only depth was requested.
+
+    ``findings`` are those that were made on the way.
+    """
     from dsl_core.optics.colour import reflectance_to_srgb
 
     flags = geometry.flags.copy()
@@ -72,7 +81,8 @@ def assemble(
         )
     arrays["flags"] = flags
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
-    attributes[ATTRIBUTE] = fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra).model_dump_json()
+    fit = Fit.of([*findings, *fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra).findings])
+    attributes[ATTRIBUTE] = fit.model_dump_json()
     attributes |= missed_attributes(rig.calibrations)
     return build_result(arrays, grid.centres_nm, attributes)
 

@@ -33,13 +33,19 @@ from dsl_core.optics.spread.wave import column_wave
 Floats = NDArray[np.float64]
 #: Distance between the Gaussians of a curve and how far it reaches, px.
 STEP_PX, REACH_PX = 0.125, 6.0
-#: Steps of each pixel's amplitude and column before and between those of the curve, and of the curve.
-SETTLING, ROUNDS, LONGEST_PX = 3, 3, 0.5
+#: Steps of each pixel's amplitude and column between those of the curve, and the longest, px.
+SETTLING, LONGEST_PX = 3, 0.5
+#: Steps in which a curve is stretched, and in which it takes any shape.
+STRETCHINGS, ROUNDS = 3, 4
+#: A shape that explains the lines so much worse than it first promised has gone astray.
+WORSE = 1.2
 #: Relative error of a modelled profile, added to each variance.
 MODEL_ERROR = 0.0015
 #: A pixel whose chi-square is so many times the others' sees something else.
 MAX_CHI_SQUARE = 5.0
 MAX_SHIFT_PX = 2.0
+#: Deviation of a column of which nothing is known.
+FREE_PX = 1e3
 MIN_PIXELS = 200
 #: Factors by which a curve may be stretched, and how often the search among them starts anew, finer.
 STRETCHES, FINER = np.geomspace(0.4, 2.5, 25), 3
@@ -98,6 +104,7 @@ class _Normal:
     right: Floats
     square: float
     count: int
+    pixels: int
 
     def cost(self, shares: Floats) -> float:
         return float(shares @ self.matrix @ shares - 2 * self.right @ shares + self.square)
@@ -108,6 +115,7 @@ class _Normal:
             self.right + other.right,
             self.square + other.square,
             self.count + other.count,
+            self.pixels + other.pixels,
         )
 
 
@@ -116,31 +124,65 @@ def fit_spread(peaks: Peaks, column_px: Tensor, start: ProjectorResponse) -> Spr
 
     ``column_px`` (P,) are columns to about half a pixel, ``start`` the response as it was known.
     """
-    family = _Family(start)
-    response, column = start, column_px.clone()
-    amplitude = peaks.y.amax(0)
-    found = None
-    for _ in range(ROUNDS):
-        column, amplitude, chi_square = _settle(peaks, column, amplitude, response)
-        used = (amplitude > 0) & torch.isfinite(column) & torch.isfinite(chi_square)
-        used &= (column - column_px).abs() < MAX_SHIFT_PX
-        if used.any():
-            used &= chi_square < MAX_CHI_SQUARE * max(float(chi_square[used].median()), 1.0)
-        wave = column_wave(column.reshape(-1, peaks.run), used.reshape(-1, peaks.run), peaks.step_px)
-        used &= wave.smooth.repeat_interleave(peaks.run)
-        if int(used.sum()) < MIN_PIXELS:
+    family, view = _Family(start), _View(peaks, column_px, column_px.clone(), peaks.y.amax(0))
+    found, response = None, start
+    # First as if nothing was known of the columns: a curve that is the known one, or stretched, stands then.
+    for _ in range(STRETCHINGS):
+        halves = view.equations(response, family.centres_px, waves=False)
+        if halves is None:
             return None
-        which = torch.nonzero(used).ravel()
-        straight = column - wave.px.ravel()
-        halves = [
-            _normal(peaks.of(part), straight[part], amplitude[part], response, family.centres_px, wave.std_px)
-            for part in (which[which // peaks.run % 2 == half] for half in (0, 1))
-        ]
-        found = _choose(halves, family, len(which))
+        found = _choose(halves, family, shapes=False)
         response = found.response
         if not found.changed:
             break
-    return found
+    assert found is not None
+    better = _choose(halves, family, shapes=True)
+    if better.after == found.after:
+        return found
+    first = better
+    for _ in range(ROUNDS):
+        halves = view.equations(better.response, family.centres_px, waves=True)
+        if halves is None:
+            return found
+        better = _choose(halves, family, shapes=True)
+    return better if better.after < WORSE * first.after else found
+
+
+@dataclass
+class _View:
+    """What pixels see, and the columns and amplitudes found so far."""
+
+    peaks: Peaks
+    start_px: Tensor
+    column: Tensor
+    amplitude: Tensor
+
+    def equations(
+        self, response: ProjectorResponse, centres_px: Floats, *, waves: bool
+    ) -> list[_Normal] | None:
+        """Normal equations of two halves of the pixels; None when too few of them see a line.
+
+        With ``waves`` the columns are held to what is smooth over runs of neighbours.
+        """
+        peaks, run = self.peaks, self.peaks.run
+        self.column, self.amplitude, chi_square = _settle(peaks, self.column, self.amplitude, response)
+        used = (self.amplitude > 0) & torch.isfinite(self.column) & torch.isfinite(chi_square)
+        used &= (self.column - self.start_px).abs() < MAX_SHIFT_PX
+        if used.any():
+            used &= chi_square < MAX_CHI_SQUARE * max(float(chi_square[used].median()), 1.0)
+        column, std_px = self.column, FREE_PX
+        if waves:
+            wave = column_wave(column.reshape(-1, run), used.reshape(-1, run), peaks.step_px)
+            used &= wave.smooth.repeat_interleave(run)
+            column, std_px = column - wave.px.ravel(), wave.std_px
+        if int(used.sum()) < MIN_PIXELS:
+            return None
+        which = torch.nonzero(used).ravel()
+        parts = (which[which // run % 2 == half] for half in (0, 1))
+        return [
+            _normal(peaks.of(part), column[part], self.amplitude[part], response, centres_px, std_px)
+            for part in parts
+        ]
 
 
 def _settle(
@@ -191,7 +233,9 @@ def _normal(
         target = target - taken * (own * target).sum(0)
     flat, values = rows.flatten(0, 1), target.flatten()
     count = int(torch.isfinite(peaks.variance).sum()) - 2 * len(column)
-    return _Normal((flat.T @ flat).numpy(), (flat.T @ values).numpy(), float(values @ values), count)
+    return _Normal(
+        (flat.T @ flat).numpy(), (flat.T @ values).numpy(), float(values @ values), count, len(column)
+    )
 
 
 def _unit(values: Tensor) -> Tensor:
@@ -252,42 +296,43 @@ class _Family:
             factors = np.linspace(low, high, len(STRETCHES))
         return float(factors[len(factors) // 2])
 
+    def std(self, normal: _Normal, factor: float, chi_square: float) -> float:
+        """Relative deviation of a factor where chi-squares have this size, by how fast they grow off it."""
+        low, middle, high = (normal.cost(self.stretched(factor * by)) for by in (0.98, 1.0, 1.02))
+        return math.sqrt(2 * chi_square / max((low + high - 2 * middle) / 0.02**2, 1e-30))
 
-def _choose(halves: list[_Normal], family: _Family, pixels: int) -> SpreadFit:
-    """The simplest response that pixels ask for which did not enter its fit."""
+
+def _choose(halves: list[_Normal], family: _Family, *, shapes: bool) -> SpreadFit:
+    """The simplest response that pixels ask for which did not enter its fit; any shape where these may be."""
     whole = halves[0] + halves[1]
-    factors = [family.best(half) for half in halves]
-    near = [family.stretched(factor) for factor in factors]
+    near = [family.stretched(family.best(half)) for half in halves]
 
-    def crossed(first: Floats, second: Floats) -> float:
-        return halves[1].cost(first) + halves[0].cost(second)
+    def crossed(curves: list[Floats]) -> float:
+        return halves[1].cost(curves[0]) + halves[0].cost(curves[1])
 
-    known = whole.cost(family.stretched(1.0))
-    stretched = crossed(near[0], near[1])
+    known, stretched = whole.cost(family.stretched(1.0)), crossed(near)
     pulled = {
-        pull: crossed(*(_any(half, start, pull) for half, start in zip(halves, near, strict=True)))
-        for pull in PULLS
+        pull: crossed([_any(half, curve, pull) for half, curve in zip(halves, near, strict=True)])
+        for pull in (PULLS if shapes else ())
     }
-    pull = min(pulled, key=lambda each: pulled[each])
     # Errors that the model grants itself make chi-squares smaller than one: what counts is their scale.
-    scale = min(known, stretched, pulled[pull]) / whole.count
-    response, after, width_std = family.start, known, 0.0
+    scale = min(known, stretched, *pulled.values()) / whole.count
+    factor = family.best(whole)
+    response, after = family.start, known
     if known - stretched > scale * CLEARLY:
-        factor = family.best(whole)
         response, after = family.response(factor), stretched
-        width_std = abs(factors[0] - factors[1]) / 2 * family.start.blur_px
-    if after - pulled[pull] > scale * (CLEARLY + CLEAR_SHARE * whole.count):
-        near_all = family.stretched(family.best(whole))
-        response = family.start.with_spread(LineSpread.of(_any(whole, near_all, pull), STEP_PX))
-        after = pulled[pull]
-        widths = [
-            LineSpread.of(_any(half, start, pull), STEP_PX).rms_px
-            for half, start in zip(halves, near, strict=True)
-        ]
-        width_std = abs(widths[0] - widths[1]) / 2
-
-    count = whole.count
-    return SpreadFit(response, response is not family.start, width_std, known / count, after / count, pixels)
+    if pulled and after - min(pulled.values()) > scale * (CLEARLY + CLEAR_SHARE * whole.count):
+        pull = min(pulled, key=lambda each: pulled[each])
+        shares = _any(whole, family.stretched(factor), pull)
+        response, after = family.start.with_spread(LineSpread.of(shares, STEP_PX)), pulled[pull]
+    return SpreadFit(
+        response,
+        response is not family.start,
+        family.std(whole, factor, scale) * response.blur_px,
+        known / whole.count,
+        after / whole.count,
+        whole.pixels,
+    )
 
 
 def _any(normal: _Normal, near: Floats, pull: float) -> Floats:

@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 
 #: Degree of the polynomial that the columns of a run follow.
-DEGREE = 2
+DEGREE = 3
 #: The shortest wave, px.
 SHORTEST_PX = 0.5
 #: Runs that scatter so many times as much as others are not smooth.
@@ -21,7 +21,9 @@ ROUGH = 4.0
 #: A run needs so many pixels.
 MIN_RUN = 6
 #: Keeps waves at zero that runs do not show, relative to the pixels.
-RIDGE = 1e-3
+RIDGE = 0.1
+#: Places on the projector at which runs count as one, and how many deviations a wave must have.
+PLACES, SIGMAS = 24, 3.0
 #: No wave is larger, px.
 LARGEST_PX = 0.3
 
@@ -55,16 +57,30 @@ def column_wave(column_px: Tensor, used: Tensor, period_px: float) -> Wave:
     both = both - weight * torch.einsum("li,rik->rlk", powers, taken)
     shapes, values = both[..., :-1], both[..., -1]
     found = torch.zeros(shapes.shape[-1]).to(column_px)
-    rest, std = values, math.inf
+    free = (used.sum(1) - DEGREE - 1).clip(min=1)
+    std = math.inf
     for _ in range(3):
         if not smooth.any():
             return Wave(torch.zeros_like(column_px), smooth, math.inf)
-        flat, right = shapes[smooth].flatten(0, 1), values[smooth].flatten()
-        size = RIDGE * float(used[smooth].sum()) * torch.eye(flat.shape[1]).to(flat)
-        found = torch.linalg.solve(flat.T @ flat + size, flat.T @ right)
-        rest = values - shapes @ found
-        free = (used.sum(1) - DEGREE - 1).clip(min=1)
-        scatter = ((rest**2).sum(1) / free).sqrt()
+        found = _significant(shapes[smooth], values[smooth], column_px[smooth].nan_to_num().mean(1))
+        scatter = ((values - shapes @ found).square().sum(1) / free).sqrt()
         std = float(scatter[smooth].median())
         smooth = smooth & (scatter < ROUGH * max(std, 1e-6))
     return Wave((waves @ found).clip(-LARGEST_PX, LARGEST_PX), smooth, std)
+
+
+def _significant(shapes: Tensor, values: Tensor, place_px: Tensor) -> Tensor:
+    """Coefficients of shapes (runs, pixels, n) for values (runs, pixels), as far as chance does not explain.
+
+    Where a surface is flat, runs at one place (runs,) of the projector have the same errors, row by row, and
+    count as one.
+    """
+    flat = shapes.flatten(0, 1)
+    size = RIDGE * len(flat) * torch.eye(flat.shape[1]).to(flat)
+    inverse = torch.linalg.inv(flat.T @ flat + size)
+    found = inverse @ (flat.T @ values.flatten())
+    pulls = torch.einsum("rlk,rl->rk", shapes, values - shapes @ found)
+    place = place_px.argsort().argsort() * min(PLACES, len(place_px)) // len(place_px)
+    common = torch.zeros(min(PLACES, len(place_px)), flat.shape[1]).to(flat).index_add_(0, place, pulls)
+    variance = torch.diagonal(inverse @ common.T @ common @ inverse)
+    return torch.where(found**2 > SIGMAS**2 * variance, found, 0.0)

@@ -1,0 +1,94 @@
+"""The line spread from lines at many sub-pixel places."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.model.line_spread import LineSpread
+from dsl_core.model.rig import ProjectorResponse
+from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.spread.curves import density
+from dsl_core.optics.spread.fit import MIN_PIXELS, Peaks, fit_spread
+
+WIDTH_PX, STEP_PX, RUN = 5, 2, 8
+PLACES = np.arange(-48, 49) / 8
+KNOWN = ProjectorResponse(blur_px=0.6, halo_peak_per_px=6e-4, halo_decay_px=31.0)
+
+
+def shape(values: np.ndarray) -> ProjectorResponse:
+    return KNOWN.with_spread(LineSpread.of(values, 0.125))
+
+
+TAILED = shape(np.exp(-2 * PLACES**2 / 0.5**2) + 0.04 * np.exp(-0.5 * (PLACES / 1.5) ** 2))
+SQUARE = shape((np.abs(PLACES) < 1.0).astype(float))
+SKEWED = shape(np.exp(-0.5 * (PLACES / np.where(PLACES < 0, 0.35, 0.85)) ** 2))
+
+
+def seen(response: ProjectorResponse, runs: int = 250, noise: float = 2e-3) -> tuple[Peaks, torch.Tensor]:
+    """Lines that pixels see whose projector has this response, and the columns of the pixels."""
+    random = np.random.default_rng(3)
+    start, pitch = random.uniform(20, 600, (runs, 1)), random.uniform(0.6, 0.9, (runs, 1))
+    column = torch.as_tensor((start + pitch * np.arange(RUN)).ravel())
+    centres = (column / STEP_PX).round() * STEP_PX + STEP_PX * torch.arange(-4, 5)[:, None]
+    light = zero_order_profile(column - centres, -WIDTH_PX / 2, WIDTH_PX / 2, response)
+    amplitude = torch.as_tensor(random.uniform(0.3, 1.0, len(column)))
+    y = amplitude * light + noise * torch.as_tensor(random.standard_normal(light.shape))
+    return Peaks(y, torch.full_like(y, noise**2), centres, WIDTH_PX, STEP_PX, RUN), column
+
+
+def off(found: ProjectorResponse, true: ProjectorResponse) -> float:
+    """Share of the light of a line that falls elsewhere."""
+    places = np.arange(-8, 8, 0.01)
+    curves = [density(response.line_spread, places) for response in (found, true)]
+    return 0.5 * float(np.abs(curves[0] - curves[1]).sum()) * 0.01
+
+
+def test_the_known_spread_stays_where_it_is_the_true_one() -> None:
+    peaks, column = seen(KNOWN)
+    found = fit_spread(peaks, column.round(), KNOWN)
+    assert found is not None
+    assert not found.changed
+    assert found.response is KNOWN
+    measured = fit_spread(*seen(TAILED), TAILED)
+    assert measured is not None
+    assert measured.response is TAILED
+
+
+@pytest.mark.parametrize("blur_px", [0.5, 0.63, 0.8])
+def test_another_blur_is_found_to_its_deviation_and_stays_a_gaussian(blur_px: float) -> None:
+    peaks, column = seen(KNOWN.with_gaussian(blur_px))
+    found = fit_spread(peaks, column.round(), KNOWN)
+    assert found is not None
+    assert found.changed
+    assert found.response.spread is None
+    assert 0 < found.rms_std_px < 0.003
+    assert abs(found.response.blur_px - blur_px) < 4 * found.rms_std_px + 1e-3
+    assert found.after < 1.2 < found.before
+
+
+@pytest.mark.parametrize("true", [TAILED, SQUARE, SKEWED])
+def test_any_shape_is_found(true: ProjectorResponse) -> None:
+    peaks, column = seen(true)
+    known = KNOWN.with_gaussian(true.blur_px)
+    found = fit_spread(peaks, column.round(), known)
+    assert found is not None
+    assert found.response.spread is not None
+    assert off(found.response, true) < 0.35 * off(known, true)
+    assert off(found.response, true) < 0.06
+    assert found.after < 1.2
+    assert found.response.blur_px == pytest.approx(true.blur_px, rel=0.05)
+
+
+def test_pixels_with_a_second_light_do_not_count() -> None:
+    peaks, column = seen(KNOWN)
+    peaks.y[6:, ::5] += 0.3
+    found = fit_spread(peaks, column.round(), KNOWN)
+    assert found is not None
+    assert off(found.response, KNOWN) < 0.01
+
+
+def test_too_few_pixels_give_no_answer() -> None:
+    peaks, column = seen(KNOWN, runs=MIN_PIXELS // RUN - 1)
+    assert fit_spread(peaks, column.round(), KNOWN) is None

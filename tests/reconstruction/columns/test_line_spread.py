@@ -1,0 +1,75 @@
+"""A scan whose projector is not in the focus of its calibration."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from dsl_core import pipeline
+from dsl_core.model.fit import Fit
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
+from dsl_core.model.rig import Rig
+from dsl_core.optics.line_set import LineSet
+from dsl_core.reconstruction.columns.line_spread import own_spread
+from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
+from dsl_core.workflows import scans
+from tests.cases.twin_scan import MemoryScan, twin_scan
+
+Scanned = tuple[Rig, MemoryScan, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def scanned() -> Scanned:
+    """A chart, and its true depth."""
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=3))
+    devices, scan = twin_scan(plan, size="160x104", scene="color-checker")
+    truth = scans.twin_truth(devices, pipeline.Options().grid)
+    assert devices.calibration is not None
+    assert truth is not None
+    assert truth.depth_mm is not None
+    return devices.calibration, scan, truth.depth_mm
+
+
+def blurred(rig: Rig, blur_px: float) -> Rig:
+    response = rig.projector_response.with_gaussian(blur_px)
+    return rig.model_copy(update={"projector_response": response})
+
+
+def depth_error_mm(scanned: Scanned, rig: Rig, as_calibrated: bool) -> tuple[float, Fit]:
+    _, scan, truth = scanned
+    options = pipeline.Options(spectra=False, as_calibrated=as_calibrated)
+    result = pipeline.reconstruct(scan, rig, options)
+    fit = Fit.read(result.attrs)
+    assert fit is not None
+    return float(np.sqrt(np.nanmean((result["depth_mm"].values - truth) ** 2))), fit
+
+
+def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scanned) -> None:
+    right, fit = depth_error_mm(scanned, scanned[0], as_calibrated=False)
+    assert "line spread" not in {finding.name for finding in fit.significant}
+    wrong = blurred(scanned[0], 0.7)
+    before, fit = depth_error_mm(scanned, wrong, as_calibrated=True)
+    assert "line spread" not in {finding.name for finding in fit.findings}
+    after, fit = depth_error_mm(scanned, wrong, as_calibrated=False)
+    assert before > 3 * right
+    assert after < 1.05 * right
+    told = next(finding for finding in fit.significant if finding.name == "line spread")
+    assert told.part == "profile"
+    assert re.search(r"over 0\.(599|600) ± 0\.00\d px", told.sentence)
+    assert "by its calibration over 0.700 px" in told.sentence
+
+
+def test_only_single_lines_without_gaps_show_the_spread(scanned: Scanned) -> None:
+    rig, scan, _ = scanned
+    merged = MergedScan(scan, rig)
+    code, white = decode_columns(merged)
+    stack = stack_lines(merged)
+    lines = LineSet.of(scan.plan)
+    assert own_spread(rig, lines, code, white, stack) is not None
+    assert own_spread(rig, None, code, white, stack) is None
+    comb = LineSet.of(CapturePlan(spectral=LineComb(shifts_px=(0, 0, 0))))
+    assert own_spread(rig, comb, code, white, stack) is None
+    sparse = LineSet.of(CapturePlan(spectral=ScanLines(width_px=5, step_px=8, sparse=True)))
+    assert own_spread(rig, sparse, code, white, stack) is None
