@@ -59,7 +59,7 @@ class LineSpread(Record):
     @property
     def centres_px(self) -> NDArray[np.float64]:
         """Centres of the Gaussians."""
-        return self.first_px + self.step_px * np.arange(len(self.shares))
+        return self.first_px + self.step_px * np.arange(len(self.shares), dtype=np.float64)
 
     def _before(self, place_px: float) -> float:
         """Share of the light before a place."""

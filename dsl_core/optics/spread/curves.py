@@ -31,13 +31,13 @@ def mixed(spread: LineSpread, reach_px: float, of_one: Callable[[Floats], Floats
     half = math.ceil(reach_px / sample_px)
     offsets = (len(spread.shares) - 1) * stride
     # From the last Gaussian as seen on the left end to the first one as seen on the right end.
-    one = of_one(np.arange(-half - offsets, half + offsets + 1) * sample_px)
+    one = of_one(np.arange(-half - offsets, half + offsets + 1, dtype=np.float64) * sample_px)
     count = 2 * half + 1 + offsets
     total = np.zeros(count)
     for i, share in enumerate(spread.shares):
         start = offsets - i * stride
         total += share * one[start : start + count]
-    return spread.first_px + (np.arange(count) - half) * sample_px, total
+    return spread.first_px + (np.arange(count, dtype=np.float64) - half) * sample_px, total
 
 
 @lru_cache(maxsize=16)

@@ -125,18 +125,18 @@ def fit_spread(peaks: Peaks, column_px: Tensor, start: ProjectorResponse) -> Spr
     ``column_px`` (P,) are columns to about half a pixel, ``start`` the response as it was known.
     """
     family, view = _Family(start), _View(peaks, column_px, column_px.clone(), peaks.y.amax(0))
-    found, response = None, start
-    # First as if nothing was known of the columns: a curve that is the known one, or stretched, stands then.
+    # First as if nothing was known of the columns: what the known curve explains, stretched or not, stands.
+    halves = view.equations(start, family.centres_px, waves=False)
     for _ in range(STRETCHINGS):
-        halves = view.equations(response, family.centres_px, waves=False)
         if halves is None:
             return None
         found = _choose(halves, family, shapes=False)
-        response = found.response
         if not found.changed:
             break
-    assert found is not None
-    better = _choose(halves, family, shapes=True)
+        halves = view.equations(found.response, family.centres_px, waves=False)
+    if halves is None:
+        return None
+    found, better = (_choose(halves, family, shapes=shapes) for shapes in (False, True))
     if better.after == found.after:
         return found
     first = better
@@ -240,7 +240,8 @@ def _normal(
 
 def _unit(values: Tensor) -> Tensor:
     """Columns of length one."""
-    return values / values.norm(dim=0).clip(min=1e-30)
+    unit: Tensor = values / values.norm(dim=0).clip(min=1e-30)
+    return unit
 
 
 def _shapes(width_px: int, distance_px: Tensor, centres_px: Floats) -> Tensor:
@@ -261,7 +262,8 @@ class _Family:
         # On the grid of a measured curve that curve is exact.
         first = self._known.first_px if isinstance(self._known, LineSpread) else 0.0
         count = math.ceil(REACH_PX / STEP_PX)
-        self.centres_px = first + (round(-first / STEP_PX) + np.arange(-count, count + 1)) * STEP_PX
+        steps = round(-first / STEP_PX) + np.arange(-count, count + 1, dtype=np.float64)
+        self.centres_px = first + STEP_PX * steps
 
     def stretched(self, factor: float) -> Floats:
         """Shares of the curve with all distances times a factor."""

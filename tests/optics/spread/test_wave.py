@@ -16,7 +16,8 @@ def runs(pitch_px: float = 0.73, count: int = 300, length: int = 10) -> torch.Te
     generator = torch.Generator().manual_seed(0)
     start, slope, bend = torch.rand((3, count, 1), generator=generator, dtype=torch.float64)
     at = torch.arange(length, dtype=torch.float64)
-    return 600 * start + (pitch_px + 0.2 * slope) * at + 0.01 * bend * at**2
+    column: torch.Tensor = 600 * start + (pitch_px + 0.2 * slope) * at + 0.01 * bend * at**2
+    return column
 
 
 def waved(column: torch.Tensor) -> torch.Tensor:
