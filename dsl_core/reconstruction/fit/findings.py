@@ -13,6 +13,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.fit.causes import cause_findings
 from dsl_core.reconstruction.fit.shares import band_findings, share_findings
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ def fit_of(
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra.data_share, spectra.reach)
+    if spectra is not None and spectra.probe is not None:
+        findings += cause_findings(spectra.probe)
     return Fit.of(findings)
 
 

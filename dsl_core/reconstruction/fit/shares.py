@@ -11,7 +11,7 @@ from dsl_core.model.fit import FitFinding, Part
 from dsl_core.model.result import DEPTH_INVALID, Flag, Reach
 
 #: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
-MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED = 0.25, 0.1, 0.1, 0.5
+MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED = 0.4, 0.1, 0.1, 0.5
 #: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
@@ -37,13 +37,13 @@ def share_findings(flags: NDArray[np.integer], has_spectra: bool) -> Iterator[Fi
     if not has_spectra or np.count_nonzero(measured) < FEWEST:
         return
     yield _share(
-        "profile",
+        "mixed pixels",
         "poor fit",
         measured,
         (bits & int(Flag.POOR_FIT)) != 0,
         MOST_POOR,
         "No spectrum explains the line frames of {0} of the pixels.",
-        "Run the drift check; calibrate again if it names a part.",
+        "Look at a picture of the flags: along edges a pixel sees two materials, and more pixels help.",
     )
     yield _share(
         "light",

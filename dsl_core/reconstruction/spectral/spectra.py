@@ -22,6 +22,8 @@ from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, 
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
+from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
+from dsl_core.reconstruction.spectral.probe import Probe, probe
 from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
@@ -34,6 +36,12 @@ TILE, TILE_BANDS, LEAST_TILE = (64, 96), 60, (16, 24)
 DENSE_PIXELS = 512
 #: Degrees of freedom that a spectrum takes from its data, roughly, in the reduced chi-square.
 PARAMETERS = 25
+#: Chi-square that noise alone does not reach: what exceeds it is misfit that neighbouring lines share.
+SURE_MISFIT = 1.3
+#: Chi-square from which a pixel may see several surfaces, and the most that it is then unsure by.
+MIXED_MISFIT, MIXED_STD = 3.0, 0.5
+#: Relative error of a level that ends at the upper bound.
+BOUND_SHARE = 0.5
 
 
 def model_of_plan(
@@ -51,7 +59,10 @@ def zero_order_error(rig: Rig, plan: CapturePlan) -> float:
 
 @dataclass(frozen=True)
 class SpectralMaps:
-    """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid."""
+    """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid.
+
+    ``probe`` is what the scan says about its model, where it can say anything, and ``error`` what follows.
+    """
 
     reflectance: NDArray[np.float32]
     std: NDArray[np.float32]
@@ -59,6 +70,8 @@ class SpectralMaps:
     reach: NDArray[np.uint8]
     at_bound: NDArray[np.bool_]
     chi_square: NDArray[np.float32]
+    probe: Probe | None = None
+    error: ModelError | None = None
 
     @classmethod
     def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
@@ -98,6 +111,8 @@ class SpectralReconstruction:
         self.prior = prior or Prior().at_step(grid.step_nm)
         self.device, self.dtype = torch.device(device), dtype
         self.colour_weight = self._colour_weight()
+        self.contrast = neighbour_contrast(pixels.amplitude)
+        self._error: ModelError | None = None
 
     def run(self, progress: Progress | None = None, threads: int = 2) -> SpectralMaps:
         """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy."""
@@ -106,6 +121,8 @@ class SpectralReconstruction:
             self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
         )
         with one_kernel_thread():
+            found = probe(self)
+            self._error = None if found is None else model_error(found)
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
                 list(self._tiles()),
@@ -113,7 +130,7 @@ class SpectralReconstruction:
                 "spectra",
                 progress,
             )
-        return out
+        return replace(out, probe=found, error=self._error)
 
     def _tiles(self) -> Iterator[tuple[slice, slice]]:
         height, width = self.pixels.valid.shape
@@ -263,7 +280,17 @@ class SpectralReconstruction:
         flat, mean = frames.flat, spectra.mean[reported]
         relative = frames.known("shading_rel_std").nan_to_num(nan=0.0)
         # What the model cannot explain makes the answer that much less certain (Birge ratio).
-        std = torch.hypot(spectra.std[reported] * misfit.clip(min=1).sqrt(), mean * relative)
+        excess, error = misfit.clip(min=1), relative
+        if self._error is not None:
+            excess = excess + (misfit - SURE_MISFIT).clip(min=0) * (self._error.correlation - 1)
+            share = self._error.at(*frames.place(), self.pixels.valid.shape)
+            error = torch.hypot(relative, like(share, mean))
+        # A pixel that no spectrum explains may have that of a neighbour, one at the upper bound any level.
+        high = (spectra.at_bound & (spectra.nodes > self.prior.bounds[1] / 2)).any(0)
+        error = torch.hypot(error, torch.where(high, BOUND_SHARE, 0.0))
+        std = torch.hypot(spectra.std[reported] * excess.sqrt(), mean * error)
+        mixed = torch.where(misfit > MIXED_MISFIT, self._map(self.contrast, flat), 0.0)
+        std = torch.hypot(std, (mean * mixed).clip(max=MIXED_STD))
         for cube, values in (
             (out.reflectance, mean),
             (out.std, std),

@@ -25,7 +25,7 @@ def flags(flag: Flag, share: float) -> np.ndarray[tuple[int, ...], np.dtype[np.u
 @pytest.mark.parametrize(
     ("flag", "limit", "part"),
     [
-        (Flag.POOR_FIT, 0.25, "profile"),
+        (Flag.POOR_FIT, 0.4, "mixed pixels"),
         (Flag.AT_BOUND, 0.1, "light"),
         (Flag.CODES_DISAGREE, 0.1, "coverage"),
         (Flag.OUT_OF_RANGE, 0.1, "coverage"),

@@ -1,0 +1,95 @@
+"""How wrong spectra are by the model itself, learned from the probed pixels of a scan.
+
+The parameters of `dsl_core.reconstruction.spectral.probe` are fitted cell by cell. What a cell asks for, less
+what its noise alone would ask for, times its effect on reflectance is the error that the model has there; it
+is stated as a share of reflectance for every cell and band, and added to the deviation of every pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.reconstruction.spectral.probe import CELLS, PARAMETERS, PRIOR_STD, Probe
+
+Floats = NDArray[np.float64]
+
+#: How many times the square that noise alone would ask for is taken off: of noise nothing should be left.
+SURE = 2.0
+#: Room for what varies within a cell.
+MARGIN = 1.25
+#: Chi-square from which residuals are not noise, and how many such pixels say how they hang together.
+MISFIT_FROM, FEW = 1.5, 10
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """``relative`` (bands, cells down, cells across) is the error of reflectance by the model, as a share.
+
+    ``correlation`` is by how much the residuals of pixels with misfit hang together from line to line: what
+    exceeds a chi-square of 1 does not average out as noise does, and counts as many times.
+    """
+
+    relative: Floats
+    correlation: float = 1.0
+
+    def at(self, rows: NDArray[np.intp], columns: NDArray[np.intp], shape: tuple[int, ...]) -> Floats:
+        """The error at pixels (n,) of a picture of a shape, linear between the cells' centres, (bands, n)."""
+        from scipy.ndimage import map_coordinates
+
+        place = [
+            (at + 0.5) / size * count - 0.5
+            for at, size, count in zip((rows, columns), shape, CELLS, strict=True)
+        ]
+        found = [map_coordinates(band, place, order=1, mode="nearest") for band in self.relative]
+        return np.asarray(found, np.float64)
+
+
+def model_error(probe: Probe) -> ModelError:
+    """The error of the model in each cell; cells without pixels take their neighbours'."""
+    from scipy.ndimage import gaussian_filter
+
+    cells, bands = CELLS[0] * CELLS[1], probe.reflectance.shape[1]
+    squares, level = np.zeros((cells, bands)), np.zeros((cells, bands))
+    for cell in np.unique(probe.cell[probe.sound]):
+        here = probe.sound & (probe.cell == cell)
+        w = probe.weight[here]
+        information = np.tensordot(w, probe.normal[here], 1)
+        covariance = np.linalg.inv(information + np.diag(np.square(1 / np.array(PRIOR_STD))))
+        asked = covariance @ (w @ probe.score[here])
+        # Noise alone asks for as much as the data know of the parameters.
+        by_noise = covariance @ information @ covariance
+        bias = probe.bias[here]
+        error = (bias @ asked) ** 2 - SURE * np.einsum("nbp,pq,nbq->nb", bias, by_noise, bias)
+        error += (bias[:, :, _PROFILE] @ probe.lines.values) ** 2
+        squares[cell], level[cell] = error.sum(0), (probe.reflectance[here] ** 2).sum(0)
+    grid = (*CELLS, bands)
+    squares, level = (
+        gaussian_filter(values.reshape(grid), (0.7, 0.7, 1.0), mode="nearest") for values in (squares, level)
+    )
+    relative = MARGIN * np.sqrt(np.maximum(squares, 0) / np.maximum(level, 1e-6))
+    misfit = (probe.chi_square > MISFIT_FROM) & np.isfinite(probe.correlation)
+    correlation = float(np.median(probe.correlation[misfit])) if misfit.sum() >= FEW else 1.0
+    return ModelError(relative.transpose(2, 0, 1), correlation)
+
+
+def neighbour_contrast(amplitude: NDArray[np.float32]) -> NDArray[np.float32]:
+    """How far the level of a pixel (rows, columns) may be off that sees its neighbours, relative to its own.
+
+    From samples of one colour around it: half their difference, relative to the darkest.
+    """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    light = np.maximum(np.nan_to_num(amplitude), 0)
+    # Every other row and column has the same colour.
+    like_me = np.zeros((5, 5), bool)
+    like_me[::2, ::2] = True
+    high, low = (choose(light, footprint=like_me) for choose in (maximum_filter, minimum_filter))
+    contrast = (high - low) / np.maximum(2 * low, 0.01 * high + 1e-12)
+    return np.asarray(maximum_filter(contrast, 3), np.float32)
+
+
+#: Where the parameters of the lines' profile are.
+_PROFILE = [PARAMETERS.index("blur"), PARAMETERS.index("tail")]

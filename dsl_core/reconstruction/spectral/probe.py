@@ -1,0 +1,313 @@
+"""What some pixels say about the model itself: which small changes of it their frames ask for.
+
+Each sampled pixel is solved again together with a few parameters of the model: columns of each first order,
+its gain, blur and tails of a line, the level of the light over time. The spectrum is eliminated, so that what
+is left is what no spectrum can take up: colours of a line that do not belong to one wavelength, orders that
+disagree, a zero order of another colour. ``bias`` is what such a change does to the spectrum that takes the
+model as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from dsl_core.optics.colour_neighbours import bayer_colours
+from dsl_core.optics.correspondence import Footprint, like
+from dsl_core.optics.line_profile import ProfileTable, halo_of_line
+from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.dense_solver import solve_dense
+from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines
+from dsl_core.reconstruction.spectral.solver import band_mean, roughness
+from dsl_core.reconstruction.spectral.tile_frames import weighted
+from dsl_core.solve import banded
+
+if TYPE_CHECKING:
+    from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+#: The parameters, in their order: shifts in projector columns, all others relative.
+PARAMETERS = ("shift +1", "shift -1", "gain +1", "gain -1", "blur", "tail", "drift")
+#: What each may be off before any scan is seen, so that fits stay finite. Blur and tails hardly show in the
+#: first orders, where an error of the spectrum's prior looks like them; the zero order tells them far better.
+PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1)
+#: Cells (rows, columns) that the picture is divided into; pixels in each, one of so many, and their range.
+CELLS, ONE_OF, PIXELS_PER_CELL = (6, 8), 6000, (5, 10)
+#: With fewer pixels nothing is said; so many are worked out at a time.
+FEWEST, CHUNK = 40, 48
+#: Steps of the numerical derivatives: columns (px) and blur (share).
+SHIFT_PX, BLUR_STEP = 0.05, 0.05
+#: Blur of the tail of a line, relative to its own.
+TAIL_BLUR = 4.0
+#: Relative error of the zero order that neighbours need not share.
+ZERO_ERROR = 0.01
+#: Pixels whose chi-square exceeds the usual one by this factor see several surfaces.
+MIXED_FROM = 5.0
+#: Degrees of freedom that a spectrum takes, roughly.
+SPECTRUM = 25
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What sampled pixels say: arrays over targets (n,), parameters (p,) of `PARAMETERS` and bands (b,).
+
+    ``normal`` (n, p, p) and ``score`` (n, p) are the equations of the parameters without the spectrum,
+    weighted by the noise; ``bias`` (n, b, p) is the error of the stated reflectance for a parameter of one;
+    ``reflectance`` (n, b); ``chi_square`` (n,) is reduced; ``correlation`` (n,) is by how much sums of
+    neighbouring residuals vary more than independent ones; ``place`` (n, 2) is row and column from -1 to 1,
+    ``cell`` (n,) the cell of `CELLS`. ``lines`` is what the zero order of the same pixels says, and
+    ``nm_per_px`` how far apart columns of the first orders are.
+    """
+
+    normal: Floats
+    score: Floats
+    bias: Floats
+    reflectance: Floats
+    chi_square: Floats
+    correlation: Floats
+    place: Floats
+    cell: Indices
+    lines: LineProbe
+    nm_per_px: float
+
+    @property
+    def sound(self) -> NDArray[np.bool_]:
+        """Pixels (n,) whose numbers are finite and that see one surface, by how well their frames fit."""
+        finite = np.isfinite(self.score).all(1) & np.isfinite(self.normal).all((1, 2))
+        usual = max(float(np.median(self.chi_square[finite])), 1.0) if finite.any() else 1.0
+        return np.asarray(finite & (self.chi_square < MIXED_FROM * usual))
+
+    @property
+    def weight(self) -> Floats:
+        """Weight (n,) of each pixel: less where the frames fit less, nothing where they see two surfaces."""
+        return np.where(self.sound, 1 / np.maximum(self.chi_square * self.correlation, 1), 0.0)
+
+
+def probe(solver: SpectralReconstruction) -> Probe | None:
+    """Probe pixels of a scan of single lines; None for other patterns, and where there are too few pixels."""
+    per_cell = int(np.clip(np.count_nonzero(solver.pixels.valid) // ONE_OF, *PIXELS_PER_CELL))
+    targets = sample_pixels(solver.pixels.valid, per_cell)
+    if not solver.model.single or len(targets) < FEWEST:
+        return None
+    with torch.inference_mode():
+        parts = [_probe_some(solver, targets[i : i + CHUNK]) for i in range(0, len(targets), CHUNK)]
+    together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    lines = solver.model.lines
+    assert lines is not None
+    response = solver.model.response(0.0)
+    return Probe(
+        **together,
+        lines=probe_lines(lines, response, solver.pixels, solver.radiance, solver.std, targets),
+        nm_per_px=_nm_per_px(solver, targets),
+    )
+
+
+def sample_pixels(valid: NDArray[np.bool_], per_cell: int) -> Indices:
+    """Flat indices of up to ``per_cell`` pixels of each cell whose eight neighbours are valid, too."""
+    from scipy.ndimage import minimum_filter
+
+    inner = np.flatnonzero(minimum_filter(valid.astype(np.uint8), 3, mode="constant"))
+    inner = np.random.default_rng(0).permutation(inner)
+    cell = cell_of(*np.divmod(inner, valid.shape[1]), valid.shape)
+    order = np.argsort(cell, kind="stable")
+    first = np.searchsorted(cell[order], cell[order])
+    return np.sort(inner[order[np.arange(len(order)) - first < per_cell]])
+
+
+def _nm_per_px(solver: SpectralReconstruction, targets: Indices) -> float:
+    """Wavelength from one column to the next in the first orders, mean over pixels."""
+    depth = torch.as_tensor(solver.pixels.depth_mm.ravel()[targets], dtype=torch.float64)
+    columns = solver.model.trace(torch.as_tensor(targets), depth, orders=ORDERS[:1]).orders[ORDERS[0]].columns
+    nm = solver.bands.centres_nm
+    return float((nm[-1] - nm[0]) / (columns[-1] - columns[0]).abs().mean())
+
+
+def cell_of(rows: Indices, columns: Indices, shape: tuple[int, ...]) -> Indices:
+    """Index of the cell of pixels in a picture of a shape."""
+    return np.asarray(rows * CELLS[0] // shape[0] * CELLS[1] + columns * CELLS[1] // shape[1], np.intp)
+
+
+def _probe_some(solver: SpectralReconstruction, targets: Indices) -> dict[str, NDArray[Any]]:
+    shape = solver.pixels.valid.shape
+    samples, owner = _samples(targets, shape, solver.rig.sensor.bayer)
+    light = _Light(solver, samples)
+    shading = torch.as_tensor(solver.pixels.shading.ravel()[targets], dtype=torch.float64)
+    owners, count = torch.as_tensor(owner), len(targets)
+
+    def gather(values: Tensor) -> Tensor:
+        return torch.zeros((count, *values.shape[1:]), dtype=values.dtype).index_add_(0, owners, values)
+
+    lit, weight = shading[owners], light.weight
+    rows = light.rows * lit[:, None, None]
+    heavy = (rows * weight[..., None]).mT
+    matrix, right = gather(heavy @ rows), gather((heavy @ light.values[..., None])[..., 0])
+    found = solve_dense(matrix, right, solver.prior)
+    nodes = found.nodes.T.contiguous()
+    own = nodes[owners]
+    residual = light.values - (rows @ own[..., None])[..., 0]
+    changes = light.changes(own) * lit[:, None, None]
+    cross = gather(heavy @ changes)
+    prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
+    prior = prior + torch.eye(nodes.shape[1]).to(matrix) * solver.prior.level_std**-2
+    bias = torch.linalg.solve(matrix + prior, cross)
+    heavy = (changes * weight[..., None]).mT
+    normal = gather(heavy @ changes) - cross.mT @ bias
+    score = gather((heavy @ residual[..., None])[..., 0])
+    freedom = (gather((weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
+    reported = solver.bands.reported
+    y, x = np.divmod(targets, shape[1])
+    return {
+        "normal": normal.numpy(),
+        "score": score.numpy(),
+        "bias": band_mean(bias.transpose(0, 1))[reported].transpose(0, 1).numpy(),
+        "reflectance": found.mean[reported].T.numpy(),
+        "chi_square": (gather((weight * residual**2).sum(1)) / freedom).numpy(),
+        "correlation": _correlation(residual * weight.sqrt(), gather).numpy(),
+        "place": np.stack([2 * y / shape[0] - 1, 2 * x / shape[1] - 1], 1),
+        "cell": cell_of(y, x, shape),
+    }
+
+
+def _correlation(standard: Tensor, gather: Callable[[Tensor], Tensor]) -> Tensor:
+    """By how much sums of residuals (samples, rows) over lines vary more than independent ones: at least 1.
+
+    ``1 + 2 sum(rho)`` of the autocorrelation up to the lag where it first vanishes.
+    """
+    total = gather((standard * standard).sum(1)).clip(min=1e-12)
+    factor, open_ = torch.ones_like(total), torch.ones_like(total, dtype=torch.bool)
+    for lag in range(1, 9):
+        rho = gather((standard[:, lag:] * standard[:, :-lag]).sum(1)) / total
+        open_ &= rho > 0.02
+        factor += 2 * torch.where(open_, rho, 0.0)
+    return factor
+
+
+def _samples(targets: Indices, shape: tuple[int, ...], bayer: str) -> tuple[Indices, Indices]:
+    """Flat indices of the samples that belong to inner targets, and the number of each one's target."""
+    y, x = np.divmod(targets, shape[1])
+    colour = bayer_colours(bayer, y, x)
+    samples, owner = [], []
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            other = bayer_colours(bayer, y + dy, x + dx)
+            use = np.flatnonzero((other != colour) | (dy == dx == 0))
+            samples.append((y[use] + dy) * shape[1] + x[use] + dx)
+            owner.append(use)
+    return np.concatenate(samples), np.concatenate(owner)
+
+
+@dataclass(frozen=True)
+class _OrderLight:
+    """Lines near one order: the model's rows (samples, lines, bands), changed ones, data, weight and time."""
+
+    rows: Tensor
+    shifted: Tensor
+    blurred: Tensor
+    tailed: Tensor
+    values: Tensor
+    weight: Tensor
+    time: Tensor
+
+
+class _Light:
+    """Data of samples, and the rows of the model of unit shading and of its changes.
+
+    ``values`` and ``weight`` (samples, k), ``rows`` (samples, k, bands): the lines near each order, one order
+    after the other, and last the zero order.
+    """
+
+    def __init__(self, solver: SpectralReconstruction, samples: Indices) -> None:
+        self._solver, self._samples = solver, samples
+        self._known = {
+            name: torch.as_tensor(values.ravel()[samples], dtype=torch.float64)
+            for name, values in vars(solver.pixels).items()
+            if name != "valid"
+        }
+        self._place = np.divmod(samples, solver.pixels.valid.shape[1])
+        colour = bayer_colours(solver.rig.sensor.bayer, *self._place)
+        self._colour = torch.as_tensor(colour)
+        known = self._known
+        traced = solver.model.trace(torch.as_tensor(samples), known["depth_mm"], known["column_px"], ORDERS)
+        self._orders = [self._order(order, traced.orders[order]) for order in ORDERS]
+        zero = like(solver.bands.moments[0].sum(1), known["shading"])[self._colour][:, None]
+        amplitude, std = known["amplitude"][:, None], known["amplitude_std"][:, None]
+        weight = 1 / (std**2 + (ZERO_ERROR * amplitude) ** 2)
+        self.rows = torch.cat([*(order.rows for order in self._orders), zero], 1)
+        self.values = torch.cat([*(order.values for order in self._orders), amplitude], 1)
+        self.weight = torch.cat([*(order.weight for order in self._orders), weight], 1)
+        self.weight = self.weight.nan_to_num(0.0, 0.0, 0.0)
+
+    def _order(self, order: int, footprint: Footprint) -> _OrderLight:
+        solver, lines = self._solver, self._solver.model.lines
+        assert lines is not None
+        columns, inside = footprint.columns, solver.model.inside(footprint)
+        half = solver.bands.half_width_px(columns)
+        blur = solver.model.response(0.0).blur_px
+        tables = [
+            ProfileTable(lines.width_px, b, half, columns.device, columns.dtype)
+            for b in (blur, blur * (1 + BLUR_STEP), blur * TAIL_BLUR)
+        ]
+        reach = tables[-1].support_px
+        low = torch.where(inside, columns, torch.inf).amin(0)
+        high = torch.where(inside, columns, -torch.inf).amax(0)
+        any_inside = inside.any(0)
+        span = float((high - low)[any_inside].max()) if bool(any_inside.any()) else 0.0
+        first = torch.where(any_inside, lines.position(low - reach).ceil(), 0.0).long()
+        index = first[:, None] + torch.arange(math.ceil((span + 2 * reach) / lines.step_px) + 1)
+        used = lines.exists(index) & any_inside[:, None]
+        distance = columns.T[:, None] - lines.centre_px(index).to(columns)[..., None]
+        white = like(solver.bands.moments[order].sum(1), columns)[self._colour] * inside.T
+        own, blurred, tail = (table.at(distance) * white[:, None] for table in tables)
+        shifted = (tables[0].at(distance + SHIFT_PX) - tables[0].at(distance - SHIFT_PX)) * white[:, None]
+        frame = lines.frame(index).numpy()
+        rows, columns_at = (at[:, None] for at in self._place)
+        y = torch.as_tensor(solver.radiance[frame, rows, columns_at]).double()
+        std = torch.as_tensor(solver.std[frame, rows, columns_at]).double()
+        known = self._known
+        away = known["column_px"][:, None] - lines.centre_px(index)
+        halo = known["amplitude"][:, None] * halo_of_line(away, lines.width_px, solver.rig.projector_response)
+        values, weight = weighted(y - known["offset"][:, None] - halo, std**2)
+        lit = (own > 0).any(2) & used
+        return _OrderLight(
+            own,
+            shifted / (2 * SHIFT_PX),
+            (blurred - own) / BLUR_STEP,
+            tail - own,
+            values,
+            weight * lit,
+            index / lines.lines - 0.5,
+        )
+
+    def changes(self, nodes: Tensor) -> Tensor:
+        """What each of `PARAMETERS` adds to ``values`` of unit shading for spectra (samples, bands).
+
+        Shape (samples, k, parameters).
+        """
+        parts = []
+        for number, light in enumerate(self._orders):
+
+            def seen(rows: Tensor) -> Tensor:
+                return (rows @ nodes[..., None])[..., 0]
+
+            own = seen(light.rows)
+            part = torch.zeros((*own.shape, len(PARAMETERS)), dtype=own.dtype)
+            part[..., number] = seen(light.shifted)
+            part[..., 2 + number] = own
+            part[..., 4], part[..., 5] = seen(light.blurred), seen(light.tailed)
+            part[..., 6] = own * light.time
+            parts.append(part)
+        zero = torch.zeros_like(parts[0][:, :1])
+        lines = self._solver.model.lines
+        assert lines is not None
+        time = lines.position(self._known["column_px"]) / lines.lines - 0.5
+        zero[:, 0, 6] = (self.rows[:, -1] * nodes).sum(1) * time
+        return torch.cat([*parts, zero], 1)
