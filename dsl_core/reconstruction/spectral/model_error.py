@@ -86,7 +86,9 @@ def neighbour_contrast(amplitude: NDArray[np.float32]) -> NDArray[np.float32]:
     # Every other row and column has the same colour.
     like_me = np.zeros((5, 5), bool)
     like_me[::2, ::2] = True
-    high, low = (choose(light, footprint=like_me) for choose in (maximum_filter, minimum_filter))
+    high, low = (
+        choose(light, footprint=like_me, mode="mirror") for choose in (maximum_filter, minimum_filter)
+    )
     contrast = (high - low) / np.maximum(2 * low, 0.01 * high + 1e-12)
     return np.asarray(maximum_filter(contrast, 3), np.float32)
 

@@ -1,0 +1,100 @@
+"""A scan reconstructed with a rig that is wrong in one part names that part; with its own rig, none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.fit import Fit, Part
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.reconstruction.fit.causes import cause_findings
+from dsl_core.reconstruction.spectral.probe import Probe, probe
+from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
+from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
+
+GRID = WavelengthGrid(step_nm=10.0)
+
+
+@pytest.fixture(scope="module")
+def scanned() -> tuple[DeviceRig, MemoryScan]:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
+    return twin_scan(plan, size="112x72", scene="color-checker")
+
+
+def probed(rig: Rig, scan: MemoryScan) -> Probe:
+    stack, pixels = solver_input(rig, scan)
+    found = probe(
+        SpectralReconstruction(rig, scan.plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
+    )
+    assert found is not None
+    return found
+
+
+def own(rig: Rig) -> Rig:
+    return rig
+
+
+def shifted_film(rig: Rig) -> Rig:
+    return rig.model_copy(update={"film": rig.film.model_copy(update={"tilt_y_deg": 0.5})})
+
+
+def bent_film(rig: Rig) -> Rig:
+    bend = rig.film.bend_per_mm + 0.002
+    return rig.model_copy(update={"film": rig.film.model_copy(update={"bend_per_mm": bend})})
+
+
+def one_order_brighter(rig: Rig) -> Rig:
+    curve = rig.efficiency[1]
+    brighter = curve.model_copy(update={"values": tuple(1.08 * value for value in curve.values)})
+    return rig.model_copy(update={"efficiency": {**rig.efficiency, 1: brighter}})
+
+
+def other_gamma(rig: Rig) -> Rig:
+    response = rig.projector_response
+    return rig.model_copy(
+        update={"projector_response": response.model_copy(update={"gamma": response.gamma + 0.05})}
+    )
+
+
+def less_blur(rig: Rig) -> Rig:
+    response = rig.projector_response
+    return rig.model_copy(
+        update={"projector_response": response.model_copy(update={"blur_px": 0.9 * response.blur_px})}
+    )
+
+
+@pytest.mark.parametrize(
+    ("wrong", "part"),
+    [
+        (own, None),
+        (shifted_film, "film"),
+        (bent_film, "film"),
+        (one_order_brighter, "orders"),
+        (other_gamma, "response"),
+        (less_blur, "profile"),
+    ],
+)
+def test_the_part_that_is_wrong_is_named(
+    scanned: tuple[DeviceRig, MemoryScan], wrong: Callable[[Rig], Rig], part: Part | None
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    fit = Fit.of(cause_findings(probed(wrong(devices.calibration), scan)))
+    assert fit.parts[:1] == (() if part is None else (part,)), fit.words
+
+
+def test_the_gain_of_an_order_is_found_by_its_size(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    found = {f.name: f for f in cause_findings(probed(one_order_brighter(devices.calibration), scan))}
+    difference = found["difference between the gains of the orders"]
+    assert difference.std is not None
+    assert difference.value == pytest.approx(1 / 1.08 - 1, abs=3 * difference.std)
+    assert difference.std < 0.03
+    assert np.isfinite([f.value for f in found.values()]).all()
