@@ -62,14 +62,14 @@ def model_error(probe: Probe) -> ModelError:
         # Noise alone asks for as much as the data know of the parameters.
         by_noise = covariance @ information @ covariance
         bias = probe.bias[here]
-        error = (bias @ asked) ** 2 - SURE * np.einsum("nbp,pq,nbq->nb", bias, by_noise, bias)
-        error += (bias[:, :, _PROFILE] @ probe.lines.values) ** 2
-        squares[cell], level[cell] = error.sum(0), (probe.reflectance[here] ** 2).sum(0)
-    grid = (*CELLS, bands)
-    squares, level = (
-        gaussian_filter(values.reshape(grid), (0.7, 0.7, 1.0), mode="nearest") for values in (squares, level)
+        square = (bias @ asked) ** 2 - SURE * np.einsum("nbp,pq,nbq->nb", bias, by_noise, bias)
+        square += (bias[:, :, _PROFILE] @ probe.lines.values) ** 2
+        squares[cell], level[cell] = square.sum(0), (probe.reflectance[here] ** 2).sum(0)
+    error, light = (
+        gaussian_filter(values.reshape(*CELLS, bands), (0.7, 0.7, 1.0), mode="nearest")
+        for values in (squares, level)
     )
-    relative = MARGIN * np.sqrt(np.maximum(squares, 0) / np.maximum(level, 1e-6))
+    relative = MARGIN * np.sqrt(np.maximum(error, 0) / np.maximum(light, 1e-6))
     misfit = (probe.chi_square > MISFIT_FROM) & np.isfinite(probe.correlation)
     correlation = float(np.median(probe.correlation[misfit])) if misfit.sum() >= FEW else 1.0
     return ModelError(relative.transpose(2, 0, 1), correlation)

@@ -19,6 +19,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.line_profile import ProfileTable, halo_of_line
@@ -191,7 +192,7 @@ def _correlation(standard: Tensor, gather: Callable[[Tensor], Tensor]) -> Tensor
     return factor
 
 
-def _samples(targets: Indices, shape: tuple[int, ...], bayer: str) -> tuple[Indices, Indices]:
+def _samples(targets: Indices, shape: tuple[int, ...], bayer: BayerPattern) -> tuple[Indices, Indices]:
     """Flat indices of the samples that belong to inner targets, and the number of each one's target."""
     y, x = np.divmod(targets, shape[1])
     colour = bayer_colours(bayer, y, x)
