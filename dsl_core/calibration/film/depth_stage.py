@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.film.correspondence import fit_stage_grid
-from dsl_core.calibration.film.fit import FilmFit, OrderSamples, fit_film, grating_columns, with_geometry
+from dsl_core.calibration.film.fit import (
+    FilmFit,
+    OrderSamples,
+    fit_film,
+    grating_columns,
+    require_plausible,
+    seen_straight,
+    with_geometry,
+)
 from dsl_core.calibration.film.order_columns import fit_columns, search_columns
 from dsl_core.calibration.film.order_paths import LineFrames, filter_passband
 from dsl_core.calibration.film.residual import choose_residual
@@ -112,6 +120,7 @@ def calibrate_depth_stage(
         film=film.film,
         film_std=film.std,
         scatter_px=film.scatter_px,
+        filter_index=film.angle.index,
         filters=seen,
         residual=residual,
         held_out=held_out,
@@ -124,13 +133,21 @@ def calibrate_depth_stage(
 def fit_first_orders(
     rig: Rig, planes: Sequence[Plane], data: StageData, progress: Progress
 ) -> tuple[FilmFit, OrderSamples]:
-    """The film fitted to first orders on known planes, from that of ``rig`` on, and the samples."""
+    """The film fitted to first orders on known planes, from that of ``rig`` on, and the samples.
+
+    Where filters shift with the angle of view, samples are returned as if they did not.
+    """
     here, mounting = rig, rig.film
     for round_ in range(1 + FINE_ROUNDS):
         samples = _samples(here, planes, data, round_ == 0, progress)
         fit = fit_film(here, samples, mounting)
+        if round_:
+            angled = fit_film(here, samples, mounting, angled=True)
+            fit = angled if angled.angle.is_significant else fit
         here = rig.model_copy(update={"film": fit.film})
+        samples = seen_straight(here, samples, fit.angle)
         _require_filters(rig, here, data, samples, WRONG_PX if round_ == 0 else OFF_PX)
+        require_plausible(fit.film, mounting)
     return fit, samples
 
 

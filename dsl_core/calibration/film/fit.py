@@ -1,7 +1,8 @@
 """The film's pose, period and bend from columns of first orders on known planes.
 
 All six numbers of `Film` are fitted to all samples; where samples cannot tell them apart (distance and
-bend, or period and distance over few depths) the values of the mounting decide, as a prior.
+bend, or period and distance over few depths) the values of the mounting decide, as a prior. On request the
+shift of filters with the angle of view is fitted as well (`filter_angle`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dsl_core.calibration.film.filter_angle import NO_SHIFT, FilterAngle, shift_terms
+from dsl_core.calibration.film.filter_angle import PRIOR_STD as ANGLE_STD
 from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
@@ -29,7 +32,16 @@ Ints = NDArray[np.int64]
 FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "lines_per_mm", "distance_mm")
 PRIOR_STD = np.array([3.0, 3.0, 3.0, 0.01, 25.0, 3.0])
 STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-6, 1e-2, 1e-2])
+#: Step of differences over the share of a wavelength.
+SHARE_STEP = 1e-3
 ROUNDS = 15
+#: How far from its mounting a film can be, in the unit of each field: a frame holds it within some degrees
+#: and centimetres, one that bends more touches it, and data sheets of gratings are right to a few percent.
+PLAUSIBLE = np.array([10.0, 10.0, 10.0, 0.05, 50.0, 20.0])
+WORDS = (
+    ("tilt about x", "°"), ("tilt about y", "°"), ("roll", "°"), ("bend", "/mm"), ("density", " lines/mm"),
+    ("distance from the projector", " mm"),
+)  # fmt: skip
 #: Residuals beyond this many deviations weigh less (Huber), and no column is better than this (px).
 HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: What all columns of a filter and order have in common beyond their noise, px: evenly, and as a ramp in
@@ -86,13 +98,15 @@ class OrderSamples:
 class FilmFit:
     """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px).
 
-    ``gain`` (fields, samples) is how far each field moves when a column does.
+    ``gain`` (fields, samples) is how far each field moves when a column does. ``angle`` is the shift of the
+    filters with the angle of view, none where it was not fitted.
     """
 
     film: Film
     covariance: Floats
     scatter_px: float
     gain: Floats
+    angle: FilterAngle = NO_SHIFT
 
     @property
     def std(self) -> dict[str, float]:
@@ -112,9 +126,24 @@ def grating_columns(rig: Rig, samples: OrderSamples) -> Floats:
     return found
 
 
-def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUNDS) -> FilmFit:
+def columns_per_share(rig: Rig, samples: OrderSamples) -> Floats:
+    """By how many columns samples move when their wavelengths are all longer by a share, divided by it."""
+    longer = replace(samples, wavelength_nm=samples.wavelength_nm * (1 + SHARE_STEP))
+    return (grating_columns(rig, longer) - grating_columns(rig, samples)) / SHARE_STEP
+
+
+def seen_straight(rig: Rig, samples: OrderSamples, angle: FilterAngle) -> OrderSamples:
+    """The samples as they would be through filters that shift nothing."""
+    shift = shift_terms(rig, samples.pixel) @ np.array(angle.values)
+    return replace(samples, column_px=samples.column_px - columns_per_share(rig, samples) * shift)
+
+
+def fit_film(
+    rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUNDS, angled: bool = False
+) -> FilmFit:
     """Fit the film of ``rig`` by Gauss and Newton, robustly; ``mounting`` is what its prior is about.
 
+    With ``angled`` the filters shift with the angle of view, all alike, by what fits best.
     Raises `CalibrationError` with too few samples, or when the fit does not converge.
     """
     if len(samples) < MIN_SAMPLES:
@@ -122,31 +151,62 @@ def fit_film(rig: Rig, samples: OrderSamples, mounting: Film, rounds: int = ROUN
             f"First orders were found in only {len(samples)} tiles of the image; {MIN_SAMPLES} are needed to"
             " fit the film. Check that the film is on, the filters, and the exposure."
         )
-    centre, values = _values(mounting), _values(rig.film)
+    count, extra = len(FIELDS), 3 if angled else 0
+    centre, values = (np.pad(_values(film), (0, extra)) for film in (mounting, rig.film))
+    prior_std = np.concatenate([PRIOR_STD, ANGLE_STD[:extra]])
     sigma = np.hypot(samples.std_px, FLOOR_PX)
-    scale, covariance, gain = 1.0, np.eye(len(FIELDS)), np.empty((len(FIELDS), len(samples)))
+    terms = shift_terms(rig, samples.pixel)[:, :extra]
+    scale, covariance, gain = 1.0, np.eye(len(values)), np.empty((len(values), len(samples)))
     for _ in range(rounds):
-        here = grating_columns(_with(rig, values), samples)
-        residual = samples.column_px - here
-        ahead = [grating_columns(_with(rig, values + step), samples) for step in np.diag(STEPS)]
-        jacobian = (np.stack(ahead, 1) - here[:, None]) / STEPS * PRIOR_STD
+        now = _with(rig, values[:count])
+        here = grating_columns(now, samples)
+        ahead = [grating_columns(_with(rig, values[:count] + step), samples) for step in np.diag(STEPS)]
+        by_film = (np.stack(ahead, 1) - here[:, None]) / STEPS
+        by_angle = columns_per_share(now, samples)[:, None] * terms if angled else terms
+        residual = samples.column_px - here - by_angle @ values[count:]
+        jacobian = np.concatenate([by_film, by_angle], 1) * prior_std
         weight, scale = huber_weights(residual, sigma, HUBER_SIGMAS)
-        information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(FIELDS))
-        gradient = jacobian.T @ (weight * residual) + (centre - values) / PRIOR_STD
+        information = (jacobian * weight[:, None]).T @ jacobian + np.eye(len(values))
+        gradient = jacobian.T @ (weight * residual) + (centre - values) / prior_std
         covariance = np.linalg.inv(information)
-        gain = covariance @ (jacobian * weight[:, None]).T * PRIOR_STD[:, None]
+        gain = covariance @ (jacobian * weight[:, None]).T * prior_std[:, None]
         step = covariance @ gradient
-        values = values + PRIOR_STD * step.clip(-1, 1)
+        values = values + prior_std * step.clip(-1, 1)
         if np.abs(step / np.sqrt(np.diag(covariance))).max() < 1e-2:
             break
     if not np.isfinite(values).all() or values[4] <= 0 or values[5] <= 0:
         raise CalibrationError(
             "The fit of the film did not converge. Check the filters, and the film's data."
         )
-    film = _with(rig, values).film
-    spread = covariance * np.outer(PRIOR_STD, PRIOR_STD)
+    film = _with(rig, values[:count]).film
     common = gain @ _common_offsets(rig, samples)
-    return FilmFit(film, spread + common @ common.T, scale * float(np.median(sigma)), gain)
+    spread = covariance * np.outer(prior_std, prior_std) + common @ common.T
+    angle = NO_SHIFT
+    if angled:
+        std = np.sqrt(np.diag(spread)[count:])
+        angle = FilterAngle(tuple(values[count:].tolist()), tuple(std.tolist()))
+    return FilmFit(film, spread[:count, :count], scale * float(np.median(sigma)), gain[:count], angle)
+
+
+def require_plausible(film: Film, mounting: Film) -> None:
+    """Raise `CalibrationError` when a fitted film is none that can stand where it was mounted.
+
+    Columns of another order, or of a wrong filter, are fitted well by films that are tilted like a roof.
+    """
+    found, expected = _values(film), _values(mounting)
+    off = np.abs(found - expected) > PLAUSIBLE
+    if off.any():
+        clauses = "; ".join(
+            f"{name} {found[i]:.4g}{unit}, mounted at {expected[i]:.4g}{unit}, plausible within"
+            f" ± {PLAUSIBLE[i]:g}{unit}"
+            for i, (name, unit) in enumerate(WORDS)
+            if off[i]
+        )
+        raise CalibrationError(
+            f"The film that fits best is none that can be mounted: {clauses}. Check the filters and their"
+            " order, that the film is the one of the data sheet and faces the projector, and that the"
+            " geometry is that of this rig; then capture again what was wrong."
+        )
 
 
 def _common_offsets(rig: Rig, samples: OrderSamples) -> Floats:

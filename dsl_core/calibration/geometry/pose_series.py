@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dsl_core.calibration.geometry.boards import grey_of, saturated
 from dsl_core.calibration.geometry.bundle import LENS
 from dsl_core.calibration.geometry.code_model import code_light
+from dsl_core.calibration.geometry.plausible import implausible
 from dsl_core.calibration.geometry.projector_corners import PoseObservation, observe_pose
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import Board
@@ -256,7 +257,7 @@ def doubts(found: GeometryCalibration, tilt_deg: float, baseline_mm: float | Non
         sentences.append(
             f"The board was tilted by {tilt_deg:.0f} degrees at most. Tilt it by {GOOD_TILT_DEG:.0f} to 45."
         )
-    return sentences + _size_doubt(found, baseline_mm)
+    return sentences + implausible(found) + _size_doubt(found, baseline_mm)
 
 
 def _corner_px(found: GeometryCalibration, lens: Lens, first: int) -> float:

@@ -35,6 +35,9 @@ STEPS = (1e-3, 1e-5, 1e-3)
 #: A pixel whose chi-square is so many times the others' sees something else; so does one that moved so far.
 MAX_CHI_SQUARE, MAX_SHIFT_PX = 5.0, 2.0
 
+#: What the blur of a projector in focus (px) and the peak of its halo (share of a line's light a px) can be.
+BLUR_PX, MAX_HALO_PER_PX = (0.05, 5.0), 0.1
+
 
 @dataclass(frozen=True)
 class ZeroOrderFit:
@@ -103,9 +106,10 @@ def fit_zero_order(
             )
         _require_peaks(use)
         common = common + step_common
-        common[:2] = common[0].clip(0.05, 5.0), common[1].clip(0.0, 0.1)
+        common[:2] = common[0].clip(*BLUR_PX), common[1].clip(0.0, MAX_HALO_PER_PX)
         common[2] = common[2].clip(np.log(3.0), np.log(300.0))
         amplitude, column, offset = amplitude + step[0], column + step[1].clip(-0.7, 0.7), offset + step[2]
+    require_plausible(float(common[0]), float(common[1]))
     scale = np.sqrt(max(float(np.median(chi[use])), 1.0))
     blur, peak, decay = float(common[0]), float(common[1]), float(np.exp(common[2]))
     spread = np.sqrt(np.diag(covariance)) * scale * (1.0, 1.0, decay)
@@ -113,6 +117,23 @@ def fit_zero_order(
     return ZeroOrderFit(
         column, amplitude, use, response, (spread[0], spread[1], spread[2]), float(np.mean(chi[use]))
     )
+
+
+def require_plausible(blur_px: float, halo_peak_per_px: float) -> None:
+    """Raise `CalibrationError` where blur or halo ended at the edge of what a projector can have."""
+    low, high = BLUR_PX
+    if not low < blur_px < high:
+        raise CalibrationError(
+            f"The projector's blur came out as {blur_px:g} px, at the edge of what is plausible ({low:g} to"
+            f" {high:g} px). Focus the projector on the target, check that nothing saturates, and capture the"
+            " step again."
+        )
+    if halo_peak_per_px >= MAX_HALO_PER_PX:
+        raise CalibrationError(
+            f"The projector's halo came out as {halo_peak_per_px:g} of a line's light a pixel; less than"
+            f" {MAX_HALO_PER_PX:g} is plausible. Clean the projector's lens and the film, keep the room dark,"
+            " and capture the step again."
+        )
 
 
 def _require_peaks(use: NDArray[np.bool_]) -> None:

@@ -14,6 +14,8 @@ ALONE = 0.5
 MAX_PULL = 1.8
 #: Bulge of the target at all positions, mm over 300 mm and in its deviations: the larger is allowed.
 MAX_BOW_MM, BOW_SIGMAS = 0.2, 3.0
+#: Effective indices that layers of interference filters have.
+FILTER_INDEX = (1.3, 3.0)
 #: Filters and LEDs may disagree by this much (nm, at a wavelength) or this many deviations, the larger.
 #: The film's line density makes up for filters that are all off by one share; only the LEDs' spectra tell.
 MAX_FILTERS_NM, FILTER_SIGMAS, MIDDLE_NM = 0.8, 3.0, 550.0
@@ -73,6 +75,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
             advice="Use more filters or positions, lines closer together, or longer exposures.",
         ),
         *film,
+        *_filter_index(record),
         *_chain(record.chain),
         Figure(
             name="captures in doubt",
@@ -121,6 +124,24 @@ def _chain(chain: ChainCorrection | None) -> tuple[Figure, ...]:
         " flat in front of the lens, and check their transmissions and the spectroradiometer's wavelengths.",
     )
     return correction, filters
+
+
+def _filter_index(record: DepthStageCalibration) -> tuple[Figure, ...]:
+    if record.filter_index is None:
+        return ()
+    value, std = record.filter_index
+    return (
+        Figure(
+            name="index of the filters, by their shift with the angle of view",
+            value=value,
+            unit="",
+            std=std,
+            low=FILTER_INDEX[0] - 2 * std,
+            high=FILTER_INDEX[1] + 2 * std,
+            advice="Colours shift over the picture in another way than through filters: calibrate the"
+            " geometry again, and put filters flat in front of the camera's lens.",
+        ),
+    )
 
 
 def _bow(record: DepthStageCalibration) -> tuple[Figure, ...]:

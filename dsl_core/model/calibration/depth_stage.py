@@ -68,7 +68,9 @@ class DepthStageCalibration(Record):
     ``bow_mm`` is by how much the target seems to bulge towards the camera over 300 mm, alike at all positions
     (None in older records).
     ``film_std`` are deviations by the film's fields, what the geometry leaves open included. ``scatter_px``
-    is that of single samples of first orders. ``frames`` counts the exposures.
+    is that of single samples of first orders. ``filter_index`` is the effective index of the filters, with
+    its deviation, by how their light shifts with the angle of view; None where it does not. ``frames`` counts
+    the exposures.
     """
 
     schema_version: Literal[1] = 1
@@ -85,6 +87,7 @@ class DepthStageCalibration(Record):
     film: Film
     film_std: dict[str, float]
     scatter_px: float
+    filter_index: tuple[float, float] | None = None
     filters: tuple[FilterSeen, ...]
     residual: ColumnResidual
     held_out: tuple[HeldOutError, ...]

@@ -7,7 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.film.fit import COMMON_PX, FIELDS, fit_film, grating_columns
+from dsl_core.calibration.film.filter_angle import shift_terms
+from dsl_core.calibration.film.fit import (
+    COMMON_PX,
+    FIELDS,
+    columns_per_share,
+    fit_film,
+    grating_columns,
+    require_plausible,
+    seen_straight,
+)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film
 from tests.cases.film_samples import (
@@ -50,6 +59,43 @@ def test_a_fifth_of_wrong_samples_does_no_harm() -> None:
     found = rig.model_copy(update={"film": fit_film(mounted(rig), samples, Film()).film})
     off = grating_columns(found, samples) - grating_columns(rig, samples)
     assert np.sqrt(np.mean(off**2)) < 0.02
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_filters_seen_at_an_angle_do_not_bend_the_film(seed: int) -> None:
+    # Index 1.9 and a tilt of 3 degrees: 4 nm at the side of the picture.
+    rig, samples = small_rig(), samples_of(small_rig(), NOISE_PX, seed=seed)
+    truth = np.array([1.9**-2, 1.9**-2 * np.radians(3.0), 0.0])
+    shift = shift_terms(rig, samples.pixel) @ truth
+    assert 550 * np.ptp(shift) > 4.0
+    askew = replace(samples, column_px=samples.column_px + columns_per_share(rig, samples) * shift)
+    bent = fit_film(mounted(rig), askew, Film())
+    assert abs(bent.film.bend_per_mm - rig.film.bend_per_mm) > 1e-3
+    found = fit_film(mounted(rig), askew, Film(), angled=True)
+    assert found.angle.index is not None
+    assert found.angle.index[0] == pytest.approx(1.9, abs=max(0.02, 4 * found.angle.index[1]))
+    fitted = rig.model_copy(update={"film": found.film})
+    off = grating_columns(fitted, samples) - grating_columns(rig, samples)
+    assert np.sqrt(np.mean(off**2)) < 0.02
+    straight = seen_straight(fitted, askew, found.angle)
+    assert np.abs(straight.column_px - samples.column_px).max() < 0.05
+
+
+def test_filters_that_shift_nothing_have_no_index() -> None:
+    found = fit_film(mounted(small_rig()), samples_of(small_rig(), NOISE_PX), Film(), angled=True)
+    assert not found.angle.is_significant
+    assert found.angle.index is None
+
+
+def test_a_film_that_cannot_be_mounted_is_refused_with_what_was_found_and_wanted() -> None:
+    require_plausible(Film(tilt_x_deg=4.0, lines_per_mm=510.0, bend_per_mm=0.02), Film())
+    film = Film(tilt_x_deg=56.0, distance_mm=60.0)
+    with pytest.raises(
+        CalibrationError, match=r"tilt about x 56°, mounted at 0°, plausible within ± 10°"
+    ) as told:
+        require_plausible(film, Film())
+    assert "distance from the projector 60 mm" in str(told.value)
+    assert "roll" not in str(told.value)
 
 
 def test_too_few_samples_are_refused() -> None:

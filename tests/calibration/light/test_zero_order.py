@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from dsl_core.calibration.light.zero_order import fit_zero_order
+from dsl_core.calibration.light.zero_order import fit_zero_order, require_plausible
 from dsl_core.errors import CalibrationError
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
@@ -53,6 +53,17 @@ def test_pixels_that_see_a_second_light_are_left_out() -> None:
     assert fit.good[~second].mean() > 0.98
     assert fit.chi_square == pytest.approx(1.0, abs=0.1)
     assert fit.response.blur_px == pytest.approx(TRUTH.blur_px, rel=0.01)
+
+
+def test_a_fit_that_ends_at_the_edge_of_what_is_plausible_is_refused() -> None:
+    truth = TRUTH.model_copy(update={"halo_peak_per_px": 0.2, "halo_decay_px": 4.0})
+    column, radiance, std = lines_seen(300, truth)
+    with pytest.raises(CalibrationError, match=r"halo came out as 0\.1 of .* less than 0\.1 is plausible"):
+        fit_zero_order(LINES, np.round(column), radiance, std, START, REACH_PX)
+    require_plausible(0.06, 0.09)
+    for blur_px in (0.05, 5.0):
+        with pytest.raises(CalibrationError, match=rf"blur came out as {blur_px:g} px, .*0\.05 to 5 px"):
+            require_plausible(blur_px, 0.0)
 
 
 def test_no_halo_is_found_as_none() -> None:

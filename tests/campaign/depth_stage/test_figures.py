@@ -40,6 +40,7 @@ def plane_figure(rms_px: dict[float, float], limit_px: float = 0.04) -> Figure:
         depth_std_mm=0.1,
         held_out=(HeldOutError(kept_out="x", grating_px=0.1, hybrid_px=0.1, noise_px=0.1),),
         chain=None,
+        filter_index=None,
         warnings=(),
     )
     return next(each for each in depth_stage_figures(record) if each.name == "scatter about the plane")
