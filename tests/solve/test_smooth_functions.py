@@ -73,10 +73,14 @@ def test_parts_of_the_equations_add_up() -> None:
     _, design, seen = draw(3, 0.002)
     std = np.full(60, 0.002)
     first, second = (Equations.of(design[p], seen[p], std[p]) for p in (slice(0, 25), slice(25, 60)))
-    whole = Equations.of(design, seen, std)
+    whole, both = Equations.of(design, seen, std), first + second
+    np.testing.assert_allclose(both.normal, whole.normal, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(both.right, whole.right, rtol=1e-9, atol=1e-6)
+    assert both.square == pytest.approx(whole.square)
+    assert both.count == whole.count
     prior = SmoothPrior(NODES, 1.0, 1.0).covariance(0.05, 60.0)
     np.testing.assert_allclose(
-        solve_given(first + second, prior, 1.0).values, solve_given(whole, prior, 1.0).values, rtol=1e-6
+        solve_given(both, prior, 1.0).values, solve_given(whole, prior, 1.0).values, rtol=1e-6
     )
     rest = whole - second
     np.testing.assert_allclose(rest.normal, first.normal, rtol=1e-9, atol=1e-6)
