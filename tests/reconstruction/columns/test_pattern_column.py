@@ -67,6 +67,30 @@ def test_columns_are_found_far_better_than_decoded(spectral: SpectralSet) -> Non
     assert float((error / column.std_px[column.refined]).abs().median()) < 1.5
 
 
+def test_columns_between_candidates_are_found_as_sure_as_stated() -> None:
+    """Light of exactly the model, and noise that is far above its allowance, not below it."""
+    rig = small_rig()
+    profiles = radiance_profiles(rig, CapturePlan(code=GrayCode(rows=False), spectral=random_columns()))
+    draw = torch.Generator().manual_seed(5)
+    true = 100 + 400 * torch.rand(400, generator=draw, dtype=torch.float64)
+    light = WHITE / 3 * BlurredProfiles(rig.projector_response, profiles, 0.0, true).at(true).sum(1).T
+    found = [
+        refine_by_profiles(
+            true.round(),
+            light + noise * torch.randn(light.shape, generator=draw, dtype=torch.float64),
+            torch.full_like(light, max(noise, 1.0)),
+            profiles,
+            rig.projector_response,
+        )
+        for noise in (0.0, 40.0)
+    ]
+    exact, noisy = ((column.column_px - true)[column.refined] for column in found)
+    assert len(exact) > 350
+    assert float(exact.abs().quantile(0.9)) < 0.01
+    stated = found[1].std_px[found[1].refined]
+    assert 0.7 < float((noisy / stated).square().median().sqrt() / 0.6745) < 1.4
+
+
 def test_amplitude_is_that_of_white() -> None:
     column, _ = refined(random_columns(), small_rig(), (0.5, 0.3, 0.2))
     assert float(column.amplitude[column.refined].median()) == pytest.approx(WHITE, rel=0.02)
