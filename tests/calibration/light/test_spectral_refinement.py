@@ -9,6 +9,7 @@ from dsl_core.calibration.colour.color_checker import LIGHTS
 from dsl_core.calibration.light.spectral_refinement import (
     FINE_NM,
     PUBLISHED_WEIGHT,
+    REFLECTANCE_ERRORS,
     WEIGHTS,
     SpectralModel,
     SurfaceSignals,
@@ -82,6 +83,9 @@ def test_the_evidence_has_no_gap_of_more_than_a_decade_among_its_weights() -> No
     assert (decades > 0).all()
     assert decades.max() < 1.01
     assert PUBLISHED_WEIGHT in WEIGHTS
+    # From a tenth of a percent, which no chart is better than, to what a chart in poor condition has.
+    assert np.diff(np.log10(REFLECTANCE_ERRORS[1:])) == pytest.approx(0.5, abs=0.03)
+    assert (REFLECTANCE_ERRORS[0], REFLECTANCE_ERRORS[1]) == (0.0, 0.001)
 
 
 def test_intensities_count_relative_to_the_white_of_their_channel() -> None:
