@@ -66,3 +66,10 @@ def test_light_that_flickers_ends_the_search() -> None:
         bright = not bright
         exposure_ms = search.judge(np.full((4, 4), FULL if bright else 50, np.uint16), exposure_ms)
     assert "Hold everything still" in search.trouble
+
+
+def test_a_saturated_frame_quarters_the_exposure_and_a_black_one_lengthens_it_sixteenfold() -> None:
+    search = ExposureSearch((0.02, 5000.0), FULL, None, black_level_dn=200.0)
+    assert search.judge(np.full((6, 8), FULL, np.uint16), 160.0) == pytest.approx(40.0)
+    assert search.judge(np.full((6, 8), 200, np.uint16), 10.0) == pytest.approx(160.0)
+    assert not search.is_over

@@ -104,6 +104,14 @@ def test_blocks_are_means_and_grow_until_the_budget_holds() -> None:
     assert graph.mean_dn[0, 0].tolist() == [65, 0, 0]
 
 
+def test_graphs_fill_their_budget_and_no_more() -> None:
+    finest = BlockGraphs(PLAN, "RGGB")
+    assert finest.block_px == 2
+    exactly = finest._means.nbytes
+    assert BlockGraphs(PLAN, "RGGB", budget_bytes=exactly).block_px == 2
+    assert BlockGraphs(PLAN, "RGGB", budget_bytes=exactly - 1).block_px == 4
+
+
 def test_other_frames_and_places_outside_give_nothing() -> None:
     graphs = BlockGraphs(PLAN, "RGGB")
     graphs.add(next(PLAN.shots()), np.full((10, 18), 7, np.uint16))

@@ -141,6 +141,17 @@ def test_frame_numbers_may_start_anew_after_a_resume(
     assert find_problems(ScanReader(folder)) == []
 
 
+def test_a_camera_may_round_exposures_by_a_twentieth(
+    tmp_path: Path, plan: CapturePlan, frame_of: FrameOf
+) -> None:
+    for share, told in ((1.04, False), (0.96, False), (1.06, True), (0.94, True)):
+        folder = tmp_path / f"{share}.dsl"
+        frames = {shot.index: frame_of(shot) for shot in plan.shots()}
+        _write(folder, plan, {i: replace(f, exposure_ms=share * f.exposure_ms) for i, f in frames.items()})
+        problems = find_problems(ScanReader(folder))
+        assert len(problems) == (plan.shot_count if told else 0)
+
+
 def test_wrong_exposure(tmp_path: Path, plan: CapturePlan, frame_of: FrameOf) -> None:
     frames = {shot.index: frame_of(shot) for shot in plan.shots()}
     frames[4] = replace(frames[4], exposure_ms=12.0)
