@@ -18,8 +18,10 @@ from dsl_core.optics.line_profile import SAMPLES, ProfileTable
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 
-#: How much closer than their mean spacing bands may be, because the response moves their centroids.
+#: How much closer than their mean spacing bands may be at least, because the response moves their centroids;
+#: those of wide bands move by a third of a band.
 CENTROID_SLACK_PX = 0.5
+CLOSENESS_PIXELS = 256
 #: Bands of usable first orders are never closer, px per nm; evanescent ones, far outside, may coincide.
 MIN_DISPERSION = 0.1
 #: Diagonals whose sum is below this share of the main one are left out.
@@ -30,6 +32,24 @@ GROUP = 3
 
 #: A tabulated profile of a width, spread and half width of a band (px), shared by all that ask for it.
 _table = lru_cache(maxsize=64)(ProfileTable)
+
+
+def closeness_px(columns: Tensor, inside: Tensor, spacing_px: float, reach_px: float) -> float:
+    """How much closer than their mean spacing any two bands come that overlap (px), at least the usual slack.
+
+    ``columns`` and ``inside`` are (bands, pixels); bands farther apart than ``reach_px`` do not overlap.
+    """
+    slack = CENTROID_SLACK_PX
+    # Bands shift alike at neighbouring pixels, so that some of them tell; fine bands have hundreds of pairs.
+    some = slice(None, None, max(columns.shape[1] // CLOSENESS_PIXELS, 1))
+    columns, inside = columns[:, some], inside[:, some]
+    for apart in range(1, len(columns)):
+        both = inside[apart:] & inside[:-apart]
+        nearest = torch.where(both, (columns[apart:] - columns[:-apart]).abs(), torch.inf).amin()
+        if float(nearest) > reach_px:
+            break
+        slack = max(slack, apart * spacing_px - float(nearest))
+    return slack
 
 
 class LineEquations:
@@ -78,7 +98,8 @@ class LineEquations:
         spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(
             min=MIN_DISPERSION * self.bands.step_nm
         )
-        tails = table.overlaps(float(spacing), CENTROID_SLACK_PX)[::-1].cumsum()[::-1]
+        slack = closeness_px(columns, inside, float(spacing), 2 * table.support_px)
+        tails = table.overlaps(float(spacing), slack)[::-1].cumsum()[::-1]
         bandwidth = max(min(int((tails > DROPPED).sum()), self.bands.count - 1), 1)
         # What the left-out diagonals may sum to is added to the main one: a truncated matrix of bright pixels
         # would not be positive definite.

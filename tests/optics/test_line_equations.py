@@ -10,7 +10,7 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
-from dsl_core.optics.line_equations import CENTROID_SLACK_PX, DROPPED, LineEquations
+from dsl_core.optics.line_equations import CENTROID_SLACK_PX, DROPPED, LineEquations, closeness_px
 from dsl_core.optics.line_profile import band_profile
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pixel_model import PixelModel
@@ -107,6 +107,25 @@ def bright_equations(step_nm: float) -> LineEquations:
         inside = model.inside(footprint, margin_px=0.0)
         system.add(order, footprint.columns, inside, bright, bright, 0)
     return system
+
+
+def test_bands_that_the_response_moves_towards_each_other_overlap_as_near_as_they_are() -> None:
+    # Bands of 35 nm: some are 7 columns apart, though 13 in the mean.
+    rig, plan = published_rig(), CapturePlan()
+    model = model_of(rig, WavelengthGrid(stop_nm=640.0, step_nm=35.0), plan)
+    pixels = torch.arange(0, 890 * 580, 8009)
+    depth = torch.full((len(pixels),), 700.0, dtype=torch.float64)
+    footprint = model.trace(pixels, depth).orders[1]
+    columns, inside = footprint.columns, model.inside(footprint, margin_px=0.0)
+    spacing = float((columns[-1] - columns[0]).abs().min() / (len(columns) - 1))
+    slack = closeness_px(columns, inside, spacing, 40.0)
+    assert slack > 5.0
+    for apart in (1, 2, 3):
+        both = inside[apart:] & inside[:-apart]
+        nearest = float((columns[apart:] - columns[:-apart]).abs()[both].min())
+        assert nearest > 40.0 or apart * spacing - slack <= nearest + 1e-9
+    even = 5.0 * torch.arange(9, dtype=torch.float64)[:, None]
+    assert closeness_px(even, torch.ones_like(even, dtype=torch.bool), 5.0, 40.0) == CENTROID_SLACK_PX
 
 
 def test_bands_narrower_than_a_column_leave_the_equations_positive() -> None:
