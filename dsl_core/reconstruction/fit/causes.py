@@ -15,11 +15,11 @@ from dsl_core.reconstruction.spectral.probe import PARAMETERS, PRIOR_STD, Probe
 Floats = NDArray[np.float64]
 
 #: What matters of each: place of the orders (px), gains, blur and tail of the lines, light over the scan.
-MOST_SHIFT_PX, MOST_GAIN, MOST_BLUR, MOST_TAIL, MOST_DRIFT = 0.02, 0.015, 0.03, 0.004, 0.02
+MOST_SHIFT_PX, MOST_GAIN, MOST_BLUR, MOST_TAIL, MOST_DRIFT = 0.035, 0.015, 0.03, 0.004, 0.014
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
 #: How many deviations of its own a figure must be away from zero.
-SIGMAS = 4.0
+SIGMAS = 3.0
 #: Terms of the shift of an order over the picture: up to second degree.
 _TERMS = 6
 _CALIBRATE = "Run the drift check; calibrate again the part that it names."

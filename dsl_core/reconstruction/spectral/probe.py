@@ -42,7 +42,7 @@ PARAMETERS = ("shift +1", "shift -1", "gain +1", "gain -1", "blur", "tail", "dri
 #: first orders, where an error of the spectrum's prior looks like them; the zero order tells them far better.
 PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1)
 #: Cells (rows, columns) that the picture is divided into; pixels in each, one of so many, and their range.
-CELLS, ONE_OF, PIXELS_PER_CELL = (6, 8), 6000, (5, 10)
+CELLS, ONE_OF, PIXELS_PER_CELL = (6, 8), 6000, (8, 12)
 #: With fewer pixels nothing is said; so many are worked out at a time.
 FEWEST, CHUNK = 40, 48
 #: Steps of the numerical derivatives: columns (px) and blur (share).
