@@ -14,9 +14,9 @@ Columns: RMSE of depth (mm) per pixel, its 99th and 99.9th percentile, and the s
 stated 95 % band; RMSE and angle (rad) of patch means; RMSE of pixels, 99th and 99.9th percentile of the error
 of reflectance over pixels and bands, and the share of these inside their band; width of peaks (nm) with
 ``--scene filters``; median chi-square; shares flagged POOR_FIT and DEPTH_EDGE; seconds of the reconstruction;
-and the parts of the model of which the result itself says that they do not fit. With ``--scene sphere`` also
-the ball by angle of incidence: mean reflectance over the true one, its scatter, and angle; matte, or glossy
-with ``--option gloss=0.04 --option effects=EFFECTS`` where these include ``specular``.
+and the parts of the model of which the result itself says that they do not fit. ``--sphere`` scans a ball
+instead, matt and glossy, and prints its mean reflectance over the true one, the scatter of that, and the
+angle, by incidence of the light.
 """
 
 from __future__ import annotations
@@ -115,14 +115,11 @@ class Captured:
         return cls(MemoryScan(plan, frames), load_rig(folder / "rig.json"), truth, known["incidence_deg"])
 
 
-def capture_variant(variant: str, seed: int, arguments: argparse.Namespace) -> Captured:
+def capture_variant(variant: str, seed: int, size: str, look: dict[str, str]) -> Captured:
     """Scan the scene with a foreign twin; the calibration is that of the twin without the variant."""
     from dsl_core.simulation.sim_devices import open_twin
 
-    texts = dict(option.split("=", 1) for option in arguments.option)
-    texts |= {"scene": arguments.scene, "size": arguments.size, "seed": str(1000 + seed)}
-    texts |= rig_options(variant, seed)
-    devices = open_twin(texts)
+    devices = open_twin({**look, "size": size, "seed": str(1000 + seed), **rig_options(variant, seed)})
     truth = scans.twin_truth(devices, WavelengthGrid())
     assert truth is not None
     world = devices.camera.world  # type: ignore[attr-defined]
@@ -149,7 +146,7 @@ def calibrated(variant: str, seed: int, size: str, folder: Path) -> Rig:
     """The rig that the commands find, left in a folder; raises `DslError` with the sentence of a refusal."""
     home = folder / f"{variant}-{seed}"
     if not (home / "rig.json").exists():
-        chosen = {"size": size, "seed": str(seed), **rig_options(variant, seed), "truth": str(seed)}
+        chosen = {"size": size, "seed": str(seed), **rig_options(variant, seed)}
         words = ["--rig", "twin", "--yes", "--no-library"]
         words += [part for key, value in chosen.items() for part in ("--option", f"{key}={value}")]
         done = subprocess.run(
@@ -286,21 +283,30 @@ def row(variant: str, seed: int, figures: dict[str, Any]) -> list[str]:
     ]  # fmt: skip
 
 
-def cases(arguments: argparse.Namespace) -> Iterator[tuple[str, int, Captured]]:
-    """Every scan that was asked for, stored or taken now."""
+def looks(arguments: argparse.Namespace) -> dict[str, dict[str, str]]:
+    """Options of the twin's scene by what is added to the names of its scans."""
+    if not arguments.sphere:
+        scene = arguments.scene
+        return {"" if scene == "color-checker" else f"-{scene}": {"scene": scene}}
+    from dsl_core.simulation.effects.catalogue import USUAL
+
+    effects = ",".join(sorted(USUAL | {"specular"}))
+    return {"-matt": {"scene": "sphere"}, "-glossy": {"scene": "sphere", "gloss": "0.04", "effects": effects}}
+
+
+def cases(arguments: argparse.Namespace) -> Iterator[tuple[str, str, int, Captured]]:
+    """Every scan that was asked for, stored or taken now: its name in the table, variant, seed."""
     for seed in arguments.seeds:
         for variant in arguments.variants:
-            name = f"{variant}-{seed}-{arguments.size}"
-            if arguments.scene != "color-checker":
-                name += f"-{arguments.scene}"
-            if arguments.scans:
-                if (arguments.scans / name / "truth.npz").is_file():
-                    yield variant, seed, Captured.load(arguments.scans / name)
-                continue
-            taken = capture_variant(variant, seed, arguments)
-            if arguments.keep:
-                taken.save(arguments.keep / name)
-            yield variant, seed, taken
+            for look, texts in ({"": {}} if arguments.scans else looks(arguments)).items():
+                folder = f"{variant}-{seed}-{arguments.size}{look}"
+                if not arguments.scans:
+                    taken = capture_variant(variant, seed, arguments.size, texts)
+                    if arguments.keep:
+                        taken.save(arguments.keep / folder)
+                    yield variant + look, variant, seed, taken
+                elif (arguments.scans / folder / "truth.npz").is_file():
+                    yield variant, variant, seed, Captured.load(arguments.scans / folder)
 
 
 def main() -> None:
@@ -312,7 +318,7 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=lambda text: [int(s) for s in text.split(",")], default=[0])
     parser.add_argument("--scene", default="color-checker")
-    parser.add_argument("--option", action="append", default=[], help="more options of the twin, key=value")
+    parser.add_argument("--sphere", action="store_true", help="a matt and a glossy ball")
     parser.add_argument("--keep", type=Path, metavar="DIR")
     parser.add_argument("--scans", type=Path, metavar="DIR")
     parser.add_argument("--calibrate", type=Path, metavar="DIR", help="folder for the calibrations")
@@ -325,7 +331,7 @@ def main() -> None:
         arguments.variants, arguments.size = arguments.variants[:3], "112x72"
     rows: list[dict[str, Any]] = []
     print_table(HEADER, [])
-    for variant, seed, taken in cases(arguments):
+    for name, variant, seed, taken in cases(arguments):
         try:
             if arguments.calibrate:
                 found = calibrated(variant, seed, arguments.size, arguments.calibrate)
@@ -335,10 +341,10 @@ def main() -> None:
             print(f"{variant} {seed}: {error}", flush=True)
             rows.append({"variant": variant, "seed": seed, "failure": str(error)})
             continue
-        print("  ".join(row(variant, seed, figures)), flush=True)
+        print("  ".join(row(name, seed, figures)), flush=True)
         for part in figures.get("by_incidence", []):
             print("    " + "  ".join(f"{key} {value:.4g}" for key, value in part.items()), flush=True)
-        rows.append({"variant": variant, "seed": seed, **figures})
+        rows.append({"variant": name, "seed": seed, **figures})
     print()
     print_table(HEADER, [row(r["variant"], r["seed"], r) for r in rows if "failure" not in r])
     write_json(arguments.json, {"size": arguments.size, "scene": arguments.scene, "rows": rows})
