@@ -72,8 +72,12 @@ class LineSpread(Record):
     @property
     def rms_px(self) -> float:
         """Root mean square distance of the light from its centroid."""
-        centroid = float(self.centres_px @ self.shares)
-        return math.sqrt(float((self.centres_px - centroid) ** 2 @ self.shares) + self.core_px**2)
+        return math.sqrt(float((self.centres_px - self.lean_px) ** 2 @ self.shares) + self.core_px**2)
+
+    @property
+    def lean_px(self) -> float:
+        """How far the mean place of the light is from zero, its median."""
+        return float(self.centres_px @ self.shares)
 
     def blurred(self, blur_px: float) -> Self:
         """The same after a further Gaussian blur."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from dsl_core.progress import Progress
 from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_dark, settle
 from dsl_core.reconstruction.columns.maps import WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
+from dsl_core.reconstruction.columns.waves import wave_std_px
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.surface import Surface, reconstruct_surface
@@ -85,7 +87,9 @@ def reconstruct_geometry(
     maps = finder.find(np.arange(start_px.size), start_px, start_std_px, progress)
     lit = _lit(white)
     settled = settle(code, maps, finder, lit, progress)
-    dq = np.hypot(maps.column_std_px, rig.column_std_px)
+    waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
+    common = math.hypot(rig.column_std_px, _zero_std_px(rig))
+    dq = np.hypot(np.hypot(maps.column_std_px, common), waves.ravel())
     flags = _flags(rig, code, white, maps, settled, lit, profiles is not None)
     good = (flags & int(DEPTH_INVALID)) == 0
     depth_mm = np.where(good, maps.depth_mm, np.nan).reshape(shape)
@@ -97,6 +101,16 @@ def reconstruct_geometry(
     light = (maps.amplitude, maps.amplitude_std, maps.offset, maps.offset_std)
     a, da, dark, dark_std = (m.reshape(shape) for m in light)
     return Geometry(q, std, depth_mm, depth_std, a, da, dark, dark_std, flags.reshape(shape) | edge, surface)
+
+
+def _zero_std_px(rig: Rig) -> float:
+    """Deviation of where an uneven line spread has its zero, px.
+
+    The median, by which columns of a binary code go, or the mean of its light: that depends on how columns
+    were calibrated.
+    """
+    spread = rig.projector_response.spread
+    return 0.0 if spread is None else abs(spread.lean_px) / math.sqrt(3)
 
 
 def _start(code: DecodedCode) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

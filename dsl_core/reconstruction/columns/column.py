@@ -20,6 +20,8 @@ from dsl_core.optics.line_set import LineSet
 
 #: Steps of the fit, and the longest, px.
 ITERATIONS, STEP_PX = 6, 0.7
+#: Where the fit of a measured spread starts, from the decoded column, px.
+ASIDE_PX = 0.35
 #: Relative error of the modelled peak (blur, halo, neighbouring pixels), added to each variance.
 MODEL_ERROR = 0.0015
 #: The same for combs, where the first orders of other lines are under the peak.
@@ -52,7 +54,8 @@ def refine(
     frames are saturated, with an infinite deviation: less would make light of the zero order next to them.
     """
     y, variance, centres = _window(coarse_px, radiance, std, lines, response)
-    q = coarse_px.clone()
+    # Measured spreads may end sharply: from the middle between two frames no frame shows a slope.
+    q = coarse_px.clone() if response.spread is None else coarse_px + ASIDE_PX
     brightest = amplitude = y.amax(0)
     error = MODEL_ERROR if lines.single else COMB_ERROR
     # No distance grows by more than the steps of all iterations.
