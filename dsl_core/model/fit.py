@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Literal
 
@@ -65,14 +66,24 @@ class FitFinding(Record):
 
 
 class Fit(Record):
-    """What a result says about the fit of its model, from the worst finding to the best."""
+    """What a result says about the fit of its model, from the worst finding to the best.
+
+    ``model_error[band][row][column]`` is the part of the stated deviation of reflectance that is the model's,
+    as a share of reflectance, in cells of the picture; the rest is noise. Empty where nothing is known.
+    """
 
     findings: tuple[FitFinding, ...] = ()
+    model_error: tuple[tuple[tuple[float, ...], ...], ...] = ()
 
     @classmethod
-    def of(cls, findings: Iterable[FitFinding]) -> Fit:
+    def of(
+        cls,
+        findings: Iterable[FitFinding],
+        model_error: tuple[tuple[tuple[float, ...], ...], ...] = (),
+    ) -> Fit:
         """The findings in their order: significant ones first, and by severity among them."""
-        return cls(findings=tuple(sorted(findings, key=lambda f: (not f.significant, -f.severity))))
+        ordered = sorted(findings, key=lambda f: (not f.significant, -f.severity))
+        return cls(findings=tuple(ordered), model_error=model_error)
 
     @classmethod
     def read(cls, attributes: Mapping[str, object]) -> Fit | None:
@@ -108,4 +119,13 @@ class Fit(Record):
     @property
     def words(self) -> str:
         """The verdict: how well the model fits, then what does not, each with what to do about it."""
-        return "\n".join([self.headline, *(f"{f.sentence} {f.advice}".strip() for f in self.significant)])
+        lines = [self.headline, *(f"{f.sentence} {f.advice}".strip() for f in self.significant)]
+        if self.significant and self.model_error:
+            lines.append(f"Deviations of reflectance contain {self.model_share:.1%} of it for the model.")
+        return "\n".join(lines)
+
+    @property
+    def model_share(self) -> float:
+        """Root mean square of ``model_error``; 0 where nothing is known of it."""
+        values = [value for band in self.model_error for row in band for value in row]
+        return math.sqrt(sum(value * value for value in values) / len(values)) if values else 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from dsl_core.io.result.result_file import load_result, save_result
@@ -35,8 +36,16 @@ def test_a_fit_without_findings_that_matter_says_that_the_model_fits() -> None:
     assert Fit.of([finding("light", 0.5, False)]).words == "The model fits this rig and scene."
 
 
+def test_the_part_of_the_model_in_the_deviations_is_told_where_it_matters() -> None:
+    error = (((0.03, 0.0), (0.0, 0.03)),)
+    told = Fit.of([finding("orders", 1.5, True)], error)
+    assert told.model_share == pytest.approx(0.03 / 2**0.5)
+    assert told.words.endswith("contain 2.1% of it for the model.")
+    assert Fit.of([finding("orders", 0.5, False)], error).words == "The model fits this rig and scene."
+
+
 def test_it_travels_in_a_saved_result(tmp_path: Path) -> None:
-    fit = Fit.of([finding("orders", 1.5, True), finding("mixed pixels", 0.25, False)])
+    fit = Fit.of([finding("orders", 1.5, True), finding("mixed pixels", 0.25, False)], (((0.01,),),))
     arrays: dict[str, NDArray[np.generic]] = {"depth_mm": np.ones((2, 3), np.float32)}
     made = build_result(arrays, np.empty(0), {ATTRIBUTE: fit.model_dump_json()})
     assert Fit.read(load_result(save_result(made, tmp_path / "a.zarr")).attrs) == fit

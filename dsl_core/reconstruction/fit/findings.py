@@ -37,7 +37,8 @@ def fit_of(
         findings += band_findings(grid.step_nm, width_nm, spectra.data_share, spectra.reach)
     if spectra is not None and spectra.probe is not None:
         findings += cause_findings(spectra.probe)
-    return Fit.of(findings)
+    error = None if spectra is None else spectra.error
+    return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
 
 
 def line_width_nm(
