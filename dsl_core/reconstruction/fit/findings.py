@@ -36,7 +36,7 @@ def fit_of(
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra.data_share, spectra.reach)
     if spectra is not None and spectra.probe is not None:
-        findings += cause_findings(spectra.probe)
+        findings += cause_findings(spectra.probe, spectra.corrected)
     error = None if spectra is None else spectra.error
     return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
 

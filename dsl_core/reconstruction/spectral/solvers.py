@@ -48,5 +48,7 @@ def solve_spectra(
     model = correspondence(rig, options.correspondence)
     data = (rig, plan, options.grid, model, stack.radiance, stack.std, pixels)
     if kind is None:
-        return SpectralReconstruction(*data, device=options.device).run(progress)
+        return SpectralReconstruction(*data, device=options.device, as_calibrated=options.as_calibrated).run(
+            progress
+        )
     return kind(*data, device=options.device).run(progress)

@@ -22,8 +22,10 @@ from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, 
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
+from dsl_core.reconstruction.spectral.causes import fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.probe import Probe, probe
+from dsl_core.reconstruction.spectral.self_correction import corrected
 from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
@@ -61,7 +63,8 @@ def zero_order_error(rig: Rig, plan: CapturePlan) -> float:
 class SpectralMaps:
     """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid.
 
-    ``probe`` is what the scan says about its model, where it can say anything, and ``error`` what follows.
+    ``probe`` is what the scan says about its model, where it can say anything, ``corrected`` whether the
+    spectra are those of a model that follows it, and ``error`` what is left.
     """
 
     reflectance: NDArray[np.float32]
@@ -72,6 +75,7 @@ class SpectralMaps:
     chi_square: NDArray[np.float32]
     probe: Probe | None = None
     error: ModelError | None = None
+    corrected: bool = False
 
     @classmethod
     def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
@@ -103,7 +107,9 @@ class SpectralReconstruction:
         prior: Prior | None = None,
         device: str = "cpu",
         dtype: torch.dtype = torch.float32,
+        as_calibrated: bool = False,
     ) -> None:
+        """With ``as_calibrated`` the model stays as it is, whatever the scan itself says."""
         self.rig, self.pixels = rig, pixels
         self.model = model_of_plan(rig, plan, grid, model)
         self.bands = self.model.bands
@@ -113,6 +119,7 @@ class SpectralReconstruction:
         self.colour_weight = self._colour_weight()
         self.contrast = neighbour_contrast(pixels.amplitude)
         self._error: ModelError | None = None
+        self._as_calibrated = as_calibrated
 
     def run(self, progress: Progress | None = None, threads: int = 2) -> SpectralMaps:
         """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy."""
@@ -121,8 +128,14 @@ class SpectralReconstruction:
             self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
         )
         with one_kernel_thread():
-            found = probe(self)
-            self._error = None if found is None else model_error(found)
+            found = left = probe(self)
+            better = None
+            if found is not None and not self._as_calibrated:
+                better = corrected(self.model, fit_causes(found))
+            if better is not None:
+                self.model, self.bands = better, better.bands
+                left = probe(self)
+            self._error = None if left is None else model_error(left)
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
                 list(self._tiles()),
@@ -130,7 +143,7 @@ class SpectralReconstruction:
                 "spectra",
                 progress,
             )
-        return replace(out, probe=found, error=self._error)
+        return replace(out, probe=found, error=self._error, corrected=better is not None)
 
     def _tiles(self) -> Iterator[tuple[slice, slice]]:
         height, width = self.pixels.valid.shape

@@ -1,0 +1,120 @@
+"""The parameters of the model that all probed pixels of a scan ask for together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.reconstruction.spectral.probe import PARAMETERS, PRIOR_STD, Probe
+
+Floats = NDArray[np.float64]
+
+#: What matters of the place of the orders (px) and of their gains.
+MOST_SHIFT_PX, MOST_GAIN = 0.035, 0.015
+#: How many deviations of its own a figure must be away from zero.
+SIGMAS = 3.0
+#: Terms of the shift of an order over the picture: up to second degree.
+_TERMS = 6
+
+
+def matters(value: float, std: float, limit: float) -> bool:
+    """Whether a figure is above its limit, and too far from zero for chance."""
+    return bool(abs(value) > max(limit, SIGMAS * std))
+
+
+def shift_terms(x: Floats, y: Floats) -> Floats:
+    """Terms (n, 6) of a smooth shift at places (n,), both from -1 to 1 over the picture."""
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1)
+
+
+@dataclass(frozen=True)
+class Causes:
+    """The parameters of the model fitted to a whole scan, with deviations from the scatter over cells.
+
+    ``terms_px`` (2, 6) of the shifts of both orders (see `shift_terms`), ``shift_px`` (n, 2) these at the
+    probed pixels, their root mean square and its deviation;
+    ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
+    from the first line to the last.
+    """
+
+    terms_px: Floats
+    shift_px: Floats
+    rms_px: float
+    rms_std_px: float
+    gain: Floats
+    common_std: float
+    difference_std: float
+    drift: float
+    drift_std: float
+
+    @property
+    def moved(self) -> bool:
+        """Whether the orders are elsewhere than calibrated."""
+        return matters(self.rms_px, self.rms_std_px, MOST_SHIFT_PX)
+
+    @property
+    def unequal(self) -> bool:
+        """Whether one order is brighter or darker against the other than calibrated."""
+        plus, minus = self.gain
+        return matters(plus - minus, self.difference_std, MOST_GAIN)
+
+    @property
+    def common_gain(self) -> float:
+        """What both orders share, zero where they have changed in opposite ways.
+
+        It is between them and the zero order, which other settings measure: whether the film or a response
+        has changed, a scan alone cannot tell.
+        """
+        plus, minus = self.gain
+        return float(np.sign(plus) * min(abs(plus), abs(minus))) if plus * minus > 0 else 0.0
+
+
+def fit_causes(probe: Probe) -> Causes:
+    """Fit all parameters at once; shifts are smooth over the picture, all others equal everywhere."""
+    x, y = probe.place[:, 1], probe.place[:, 0]
+    terms = shift_terms(x, y)
+    count, rest = len(x), len(PARAMETERS) - 2
+    design = np.zeros((count, len(PARAMETERS), 2 * _TERMS + rest))
+    design[:, 0, :_TERMS] = design[:, 1, _TERMS : 2 * _TERMS] = terms
+    design[:, 2:, 2 * _TERMS :] = np.eye(rest)
+    used, weight = probe.sound, probe.weight
+    score = np.einsum("npk,np->nk", design, probe.score)[used] * weight[used, None]
+    normal = np.einsum("npk,npq,nql->nkl", design, probe.normal, design)[used] * weight[used, None, None]
+    prior = np.r_[np.full(2 * _TERMS, PRIOR_STD[0]), PRIOR_STD[2:]] ** -2.0
+    inverse = np.linalg.inv(normal.sum(0) + np.diag(prior))
+    found = inverse @ score.sum(0)
+    covariance = inverse * _excess(score - normal @ found, normal, prior, probe.cell[used])
+    shift = design[:, :2] @ found
+    spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])
+    # Noise adds its own square to that of the shift.
+    square, noise = float(np.mean(shift[used] ** 2)), float(np.mean(spread[used]))
+    first = 2 * _TERMS
+    pair = np.array([[0.5, 0.5], [1.0, -1.0]])
+    common, difference = np.sqrt(
+        np.diag(pair @ covariance[first : first + 2, first : first + 2] @ pair.T)
+    ).tolist()
+    return Causes(
+        terms_px=found[: 2 * _TERMS].reshape(2, _TERMS),
+        shift_px=shift,
+        rms_px=float(np.sqrt(max(square - noise, 0.0))),
+        rms_std_px=float(np.sqrt(noise / (2 * _TERMS))),
+        gain=found[first : first + 2],
+        common_std=common,
+        difference_std=difference,
+        drift=float(found[-1]),
+        drift_std=float(np.sqrt(covariance[-1, -1])),
+    )
+
+
+def _excess(left: Floats, normal: Floats, prior: Floats, cell: NDArray[np.intp]) -> float:
+    """By how much what cells (n,) ask for scatters more than their noise does: at least 1."""
+    ratios = []
+    for index in np.unique(cell):
+        here = cell == index
+        asked, information = left[here].sum(0), normal[here].sum(0)
+        solved = np.linalg.solve(information + np.diag(prior), asked)
+        known = np.trace(np.linalg.solve(information + np.diag(prior), information))
+        ratios.append(float(asked @ solved) / max(known, 1.0))
+    return max(float(np.mean(ratios)), 1.0)

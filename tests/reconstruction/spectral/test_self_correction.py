@@ -1,0 +1,81 @@
+"""Spectra follow a film that has changed since the calibration, as far as the scan itself shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import correspondence
+from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
+from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
+
+GRID = WavelengthGrid(step_nm=10.0)
+
+
+@pytest.fixture(scope="module")
+def scanned() -> tuple[Rig, MemoryScan]:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=4))
+    devices: DeviceRig
+    devices, scan = twin_scan(plan, size="112x72", scene="color-checker")
+    assert devices.calibration is not None
+    return devices.calibration, scan
+
+
+def solved(rig: Rig, scan: MemoryScan, as_calibrated: bool) -> SpectralMaps:
+    stack, pixels = solver_input(rig, scan)
+    data = (rig, scan.plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
+    return SpectralReconstruction(*data, as_calibrated=as_calibrated).run()
+
+
+@pytest.fixture(scope="module")
+def right(scanned: tuple[Rig, MemoryScan]) -> SpectralMaps:
+    return solved(*scanned, as_calibrated=True)
+
+
+def error(found: SpectralMaps, right: SpectralMaps) -> float:
+    return float(np.sqrt(np.nanmedian((found.reflectance - right.reflectance) ** 2)))
+
+
+def shifted_film(rig: Rig) -> Rig:
+    return rig.model_copy(update={"film": rig.film.model_copy(update={"distance_mm": 29.3})})
+
+
+def one_order_brighter(rig: Rig) -> Rig:
+    curve = rig.efficiency[1]
+    brighter = curve.model_copy(update={"values": tuple(1.08 * value for value in curve.values)})
+    return rig.model_copy(update={"efficiency": {**rig.efficiency, 1: brighter}})
+
+
+@pytest.mark.parametrize("wrong", [shifted_film, one_order_brighter])
+def test_most_of_the_error_of_a_changed_film_is_taken_back(
+    scanned: tuple[Rig, MemoryScan], right: SpectralMaps, wrong: Callable[[Rig], Rig]
+) -> None:
+    rig, scan = scanned
+    left, taken = (solved(wrong(rig), scan, as_calibrated) for as_calibrated in (True, False))
+    assert not left.corrected
+    assert taken.corrected
+    assert error(taken, right) < 0.5 * error(left, right)
+
+
+def test_a_film_as_calibrated_changes_nothing(scanned: tuple[Rig, MemoryScan], right: SpectralMaps) -> None:
+    found = solved(*scanned, as_calibrated=False)
+    assert not found.corrected
+    assert np.array_equal(found.reflectance, right.reflectance, equal_nan=True)
+
+
+def test_what_both_orders_share_is_left_to_the_responses(
+    scanned: tuple[Rig, MemoryScan], right: SpectralMaps
+) -> None:
+    rig, scan = scanned
+    brighter = {
+        order: curve.model_copy(update={"values": tuple(1.05 * value for value in curve.values)})
+        for order, curve in rig.efficiency.items()
+    }
+    found = solved(rig.model_copy(update={"efficiency": brighter}), scan, as_calibrated=False)
+    assert not found.corrected
