@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -23,15 +23,13 @@ from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.line_profile import ProfileTable, halo_of_line
+from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines
-from dsl_core.reconstruction.spectral.solver import band_mean, roughness
-from dsl_core.reconstruction.spectral.tile_frames import weighted
+from dsl_core.reconstruction.spectral.solver import Prior, band_mean, roughness
+from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
 from dsl_core.solve import banded
-
-if TYPE_CHECKING:
-    from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -55,6 +53,17 @@ ZERO_ERROR = 0.01
 MIXED_FROM = 5.0
 #: Degrees of freedom that a spectrum takes, roughly.
 SPECTRUM = 25
+
+
+@dataclass(frozen=True)
+class ProbedScan:
+    """A scan and its model: ``radiance`` and ``std`` are (frames, rows, columns), in DN per ms."""
+
+    model: PixelModel
+    pixels: Pixels
+    radiance: NDArray[np.float32]
+    std: NDArray[np.floating]
+    prior: Prior
 
 
 @dataclass(frozen=True)
@@ -93,22 +102,22 @@ class Probe:
         return np.where(self.sound, 1 / np.maximum(self.chi_square * self.correlation, 1), 0.0)
 
 
-def probe(solver: SpectralReconstruction) -> Probe | None:
+def probe(scan: ProbedScan) -> Probe | None:
     """Probe pixels of a scan of single lines; None for other patterns, and where there are too few pixels."""
-    per_cell = int(np.clip(np.count_nonzero(solver.pixels.valid) // ONE_OF, *PIXELS_PER_CELL))
-    targets = sample_pixels(solver.pixels.valid, per_cell)
-    if not solver.model.single or len(targets) < FEWEST:
+    per_cell = int(np.clip(np.count_nonzero(scan.pixels.valid) // ONE_OF, *PIXELS_PER_CELL))
+    targets = sample_pixels(scan.pixels.valid, per_cell)
+    if not scan.model.single or len(targets) < FEWEST:
         return None
     with torch.inference_mode():
-        parts = [_probe_some(solver, targets[i : i + CHUNK]) for i in range(0, len(targets), CHUNK)]
+        parts = [_probe_some(scan, targets[i : i + CHUNK]) for i in range(0, len(targets), CHUNK)]
     together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    lines = solver.model.lines
+    lines = scan.model.lines
     assert lines is not None
-    response = solver.model.response(0.0)
+    response = scan.model.response(0.0)
     return Probe(
         **together,
-        lines=probe_lines(lines, response, solver.pixels, solver.radiance, solver.std, targets),
-        nm_per_px=_nm_per_px(solver, targets),
+        lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets),
+        nm_per_px=_nm_per_px(scan, targets),
     )
 
 
@@ -124,11 +133,11 @@ def sample_pixels(valid: NDArray[np.bool_], per_cell: int) -> Indices:
     return np.sort(inner[order[np.arange(len(order)) - first < per_cell]])
 
 
-def _nm_per_px(solver: SpectralReconstruction, targets: Indices) -> float:
+def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:
     """Wavelength from one column to the next in the first orders, mean over pixels."""
-    depth = torch.as_tensor(solver.pixels.depth_mm.ravel()[targets], dtype=torch.float64)
-    columns = solver.model.trace(torch.as_tensor(targets), depth, orders=ORDERS[:1]).orders[ORDERS[0]].columns
-    nm = solver.bands.centres_nm
+    depth = torch.as_tensor(scan.pixels.depth_mm.ravel()[targets], dtype=torch.float64)
+    columns = scan.model.trace(torch.as_tensor(targets), depth, orders=ORDERS[:1]).orders[ORDERS[0]].columns
+    nm = scan.model.bands.centres_nm
     return float((nm[-1] - nm[0]) / (columns[-1] - columns[0]).abs().mean())
 
 
@@ -137,11 +146,11 @@ def cell_of(rows: Indices, columns: Indices, shape: tuple[int, ...]) -> Indices:
     return np.asarray(rows * CELLS[0] // shape[0] * CELLS[1] + columns * CELLS[1] // shape[1], np.intp)
 
 
-def _probe_some(solver: SpectralReconstruction, targets: Indices) -> dict[str, NDArray[Any]]:
-    shape = solver.pixels.valid.shape
-    samples, owner = _samples(targets, shape, solver.rig.sensor.bayer)
-    light = _Light(solver, samples)
-    shading = torch.as_tensor(solver.pixels.shading.ravel()[targets], dtype=torch.float64)
+def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
+    shape = scan.pixels.valid.shape
+    samples, owner = _samples(targets, shape, scan.model.rig.sensor.bayer)
+    light = _Light(scan, samples)
+    shading = torch.as_tensor(scan.pixels.shading.ravel()[targets], dtype=torch.float64)
     owners, count = torch.as_tensor(owner), len(targets)
 
     def gather(values: Tensor) -> Tensor:
@@ -151,20 +160,20 @@ def _probe_some(solver: SpectralReconstruction, targets: Indices) -> dict[str, N
     rows = light.rows * lit[:, None, None]
     heavy = (rows * weight[..., None]).mT
     matrix, right = gather(heavy @ rows), gather((heavy @ light.values[..., None])[..., 0])
-    found = solve_dense(matrix, right, solver.prior)
+    found = solve_dense(matrix, right, scan.prior)
     nodes = found.nodes.T.contiguous()
     own = nodes[owners]
     residual = light.values - (rows @ own[..., None])[..., 0]
     changes = light.changes(own) * lit[:, None, None]
     cross = gather(heavy @ changes)
     prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
-    prior = prior + torch.eye(nodes.shape[1]).to(matrix) * solver.prior.level_std**-2
+    prior = prior + torch.eye(nodes.shape[1]).to(matrix) * scan.prior.level_std**-2
     bias = torch.linalg.solve(matrix + prior, cross)
     heavy = (changes * weight[..., None]).mT
     normal = gather(heavy @ changes) - cross.mT @ bias
     score = gather((heavy @ residual[..., None])[..., 0])
     freedom = (gather((weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
-    reported = solver.bands.reported
+    reported = scan.model.bands.reported
     y, x = np.divmod(targets, shape[1])
     return {
         "normal": normal.numpy(),
@@ -226,20 +235,20 @@ class _Light:
     after the other, and last the zero order.
     """
 
-    def __init__(self, solver: SpectralReconstruction, samples: Indices) -> None:
-        self._solver, self._samples = solver, samples
+    def __init__(self, scan: ProbedScan, samples: Indices) -> None:
+        self._scan, self._samples = scan, samples
         self._known = {
             name: torch.as_tensor(values.ravel()[samples], dtype=torch.float64)
-            for name, values in vars(solver.pixels).items()
+            for name, values in vars(scan.pixels).items()
             if name != "valid"
         }
-        self._place = np.divmod(samples, solver.pixels.valid.shape[1])
-        colour = bayer_colours(solver.rig.sensor.bayer, *self._place)
+        self._place = np.divmod(samples, scan.pixels.valid.shape[1])
+        colour = bayer_colours(scan.model.rig.sensor.bayer, *self._place)
         self._colour = torch.as_tensor(colour)
         known = self._known
-        traced = solver.model.trace(torch.as_tensor(samples), known["depth_mm"], known["column_px"], ORDERS)
+        traced = scan.model.trace(torch.as_tensor(samples), known["depth_mm"], known["column_px"], ORDERS)
         self._orders = [self._order(order, traced.orders[order]) for order in ORDERS]
-        zero = like(solver.bands.moments[0].sum(1), known["shading"])[self._colour][:, None]
+        zero = like(scan.model.bands.moments[0].sum(1), known["shading"])[self._colour][:, None]
         amplitude, std = known["amplitude"][:, None], known["amplitude_std"][:, None]
         weight = 1 / (std**2 + (ZERO_ERROR * amplitude) ** 2)
         self.rows = torch.cat([*(order.rows for order in self._orders), zero], 1)
@@ -248,11 +257,11 @@ class _Light:
         self.weight = self.weight.nan_to_num(0.0, 0.0, 0.0)
 
     def _order(self, order: int, footprint: Footprint) -> _OrderLight:
-        solver, lines = self._solver, self._solver.model.lines
+        scan, lines = self._scan, self._scan.model.lines
         assert lines is not None
-        columns, inside = footprint.columns, solver.model.inside(footprint)
-        half = solver.bands.half_width_px(columns)
-        blur = solver.model.response(0.0).blur_px
+        columns, inside = footprint.columns, scan.model.inside(footprint)
+        half = scan.model.bands.half_width_px(columns)
+        blur = scan.model.response(0.0).blur_px
         tables = [
             ProfileTable(lines.width_px, b, half, columns.device, columns.dtype)
             for b in (blur, blur * (1 + BLUR_STEP), blur * TAIL_BLUR)
@@ -266,16 +275,18 @@ class _Light:
         index = first[:, None] + torch.arange(math.ceil((span + 2 * reach) / lines.step_px) + 1)
         used = lines.exists(index) & any_inside[:, None]
         distance = columns.T[:, None] - lines.centre_px(index).to(columns)[..., None]
-        white = like(solver.bands.moments[order].sum(1), columns)[self._colour] * inside.T
+        white = like(scan.model.bands.moments[order].sum(1), columns)[self._colour] * inside.T
         own, blurred, tail = (table.at(distance) * white[:, None] for table in tables)
         shifted = (tables[0].at(distance + SHIFT_PX) - tables[0].at(distance - SHIFT_PX)) * white[:, None]
         frame = lines.frame(index).numpy()
         rows, columns_at = (at[:, None] for at in self._place)
-        y = torch.as_tensor(solver.radiance[frame, rows, columns_at]).double()
-        std = torch.as_tensor(solver.std[frame, rows, columns_at]).double()
+        y = torch.as_tensor(scan.radiance[frame, rows, columns_at]).double()
+        std = torch.as_tensor(scan.std[frame, rows, columns_at]).double()
         known = self._known
         away = known["column_px"][:, None] - lines.centre_px(index)
-        halo = known["amplitude"][:, None] * halo_of_line(away, lines.width_px, solver.rig.projector_response)
+        halo = known["amplitude"][:, None] * halo_of_line(
+            away, lines.width_px, scan.model.rig.projector_response
+        )
         values, weight = weighted(y - known["offset"][:, None] - halo, std**2)
         lit = (own > 0).any(2) & used
         return _OrderLight(
@@ -307,7 +318,7 @@ class _Light:
             part[..., 6] = own * light.time
             parts.append(part)
         zero = torch.zeros_like(parts[0][:, :1])
-        lines = self._solver.model.lines
+        lines = self._scan.model.lines
         assert lines is not None
         time = lines.position(self._known["column_px"]) / lines.lines - 0.5
         zero[:, 0, 6] = (self.rows[:, -1] * nodes).sum(1) * time

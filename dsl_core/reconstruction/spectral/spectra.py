@@ -24,7 +24,7 @@ from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
 from dsl_core.reconstruction.spectral.causes import fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
-from dsl_core.reconstruction.spectral.probe import Probe, probe
+from dsl_core.reconstruction.spectral.probe import Probe, ProbedScan, probe
 from dsl_core.reconstruction.spectral.self_correction import corrected
 from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
@@ -128,13 +128,13 @@ class SpectralReconstruction:
             self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
         )
         with one_kernel_thread():
-            found = left = probe(self)
+            found = left = probe(self.probed)
             better = None
             if found is not None and not self._as_calibrated:
                 better = corrected(self.model, fit_causes(found))
             if better is not None:
                 self.model, self.bands = better, better.bands
-                left = probe(self)
+                left = probe(self.probed)
             self._error = None if left is None else model_error(left)
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
@@ -144,6 +144,11 @@ class SpectralReconstruction:
                 progress,
             )
         return replace(out, probe=found, error=self._error, corrected=better is not None)
+
+    @property
+    def probed(self) -> ProbedScan:
+        """What `probe` needs of the scan, with the model as it is now."""
+        return ProbedScan(self.model, self.pixels, self.radiance, self.std, self.prior)
 
     def _tiles(self) -> Iterator[tuple[slice, slice]]:
         height, width = self.pixels.valid.shape

@@ -29,9 +29,8 @@ def scanned() -> tuple[DeviceRig, MemoryScan]:
 
 def probed(rig: Rig, scan: MemoryScan) -> Probe:
     stack, pixels = solver_input(rig, scan)
-    found = probe(
-        SpectralReconstruction(rig, scan.plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
-    )
+    data = (rig, scan.plan, GRID, correspondence(rig), stack.radiance, stack.std, pixels)
+    found = probe(SpectralReconstruction(*data).probed)
     assert found is not None
     return found
 
