@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
-from dsl_core.optics.led_cycle import led_weights
 from dsl_core.optics.sensor import digitise
 from dsl_core.simulation.effects.base import LightPath, PatternView
 from dsl_core.simulation.effects.planner import EffectPlan
 from dsl_core.simulation.foreign.exposure import exposed
+from dsl_core.simulation.led_cycle import led_weights
 from dsl_core.simulation.rendered_scene import EffectRequest, RenderedScene, SceneInView, Setup
 from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 from dsl_core.solve.threads import one_kernel_thread

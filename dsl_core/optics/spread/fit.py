@@ -47,7 +47,7 @@ MAX_SHIFT_PX = 2.0
 #: Deviation of a column of which nothing is known.
 FREE_PX = 1e3
 MIN_PIXELS = 200
-#: Factors by which a curve may be stretched, and how often the search among them starts anew, finer.
+#: Factors by which a curve may be stretched, and how often the search among them is repeated, finer.
 STRETCHES, FINER = np.geomspace(0.4, 2.5, 25), 3
 #: Strengths of the pull towards the stretched curve, relative to the data's.
 PULLS = 10.0 ** np.arange(-7.0, 0.0)

@@ -24,12 +24,19 @@ Floats = NDArray[np.float64]
 PROFILE = ("blur", "tail")
 #: What each may be off before any scan is seen.
 PRIOR_STD = (1.0, 0.5)
-#: Pixels whose chi-square exceeds the usual one by this factor lie beside an edge.
+#: Pixels whose chi-square exceeds the usual one by this factor are next to an edge.
 MIXED_FROM = 3.0
 #: Lines this far from a pixel's column tell of the profile, px.
 REACH_PX = 14.0
 #: Steps of the derivatives: column (px) and blur (share); and blur of the tail relative to the line's own.
 STEP_PX, BLUR_STEP, TAIL_BLUR = 0.05, 0.05, 4.0
+
+
+def sound_pixels(score: Floats, normal: Floats, chi_square: Floats, mixed_from: float) -> NDArray[np.bool_]:
+    """Pixels (n,) with finite equations and a chi-square below ``mixed_from`` times the usual one."""
+    finite = np.isfinite(score).all(1) & np.isfinite(normal).all((1, 2))
+    usual = max(float(np.median(chi_square[finite])), 1.0) if finite.any() else 1.0
+    return np.asarray(finite & (chi_square < mixed_from * usual))
 
 
 @dataclass(frozen=True)
@@ -43,9 +50,7 @@ class LineProbe:
     @property
     def sound(self) -> NDArray[np.bool_]:
         """Pixels (n,) whose numbers are finite, and whose lines fit about as well as those of most."""
-        finite = np.isfinite(self.score).all(1) & np.isfinite(self.normal).all((1, 2))
-        usual = max(float(np.median(self.chi_square[finite])), 1.0) if finite.any() else 1.0
-        return np.asarray(finite & (self.chi_square < MIXED_FROM * usual))
+        return sound_pixels(self.score, self.normal, self.chi_square, MIXED_FROM)
 
     @property
     def values(self) -> Floats:

@@ -26,7 +26,7 @@ from dsl_core.optics.line_profile import ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
-from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines
+from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
 from dsl_core.reconstruction.spectral.solver import Prior, band_mean, roughness
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
 from dsl_core.solve import banded
@@ -92,9 +92,7 @@ class Probe:
     @property
     def sound(self) -> NDArray[np.bool_]:
         """Pixels (n,) whose numbers are finite and that see one surface, by how well their frames fit."""
-        finite = np.isfinite(self.score).all(1) & np.isfinite(self.normal).all((1, 2))
-        usual = max(float(np.median(self.chi_square[finite])), 1.0) if finite.any() else 1.0
-        return np.asarray(finite & (self.chi_square < MIXED_FROM * usual))
+        return sound_pixels(self.score, self.normal, self.chi_square, MIXED_FROM)
 
     @property
     def weight(self) -> Floats:

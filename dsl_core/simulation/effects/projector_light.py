@@ -6,9 +6,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from dsl_core.optics.led_cycle import LEDS
 from dsl_core.simulation.effects.base import Effect, Limits
 from dsl_core.simulation.effects.tolerance import EffectBound
+from dsl_core.simulation.led_cycle import LEDS
 
 #: A blur that no sample of the twin shows.
 _SHARP_PX = 1e-3

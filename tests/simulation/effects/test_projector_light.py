@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from dsl_core.model.plan import CapturePlan
-from dsl_core.optics.led_cycle import led_weights
 from dsl_core.simulation.effects.base import Limits
 from dsl_core.simulation.effects.catalogue import EFFECTS, Choice
 from dsl_core.simulation.effects.projector_light import largest_deviation
+from dsl_core.simulation.led_cycle import led_weights
 from dsl_core.simulation.rendered_scene import EffectRequest
 from tests.cases.effect_scenes import (
     HEIGHT,

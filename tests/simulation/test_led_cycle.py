@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.optics.led_cycle import led_weights
 from dsl_core.patterns.trial_pictures import trial_picture
+from dsl_core.simulation.led_cycle import led_weights
 from dsl_core.simulation.sim_devices import open_twin
 
 
