@@ -20,14 +20,19 @@ CORRECTED = " The spectra of this result are corrected for it."
 _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 
 
-def cause_findings(probe: Probe, corrected: bool = False) -> Iterator[FitFinding]:
+def cause_findings(probe: Probe, corrected: bool | None = None) -> Iterator[FitFinding]:
     """What the probed pixels of a scan say about each part of the model.
 
-    ``corrected`` results follow what was found of the film.
+    ``corrected`` results follow what was found of the film; where that was tried and did not make the frames
+    fit better (False), it is no finding.
     """
     causes = fit_causes(probe)
-    yield _film(causes, probe, corrected and causes.moved)
-    yield from _gains(causes, corrected and causes.unequal)
+    for finding in (
+        _film(causes, probe, bool(corrected and causes.moved)),
+        *_gains(causes, bool(corrected and causes.unequal)),
+    ):
+        refuted = corrected is False and finding.part in ("film", "orders")
+        yield finding.model_copy(update={"significant": finding.significant and not refuted})
     for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
         yield _profile(PROFILE[index], float(value), float(std))
     yield _finding(

@@ -2,7 +2,8 @@
 
 A film that was touched since the calibration shifts its orders by a fraction of a column and changes their
 light. The probe of a scan tells both from the zero order and from orders that disagree. What is too small to
-matter, or could be chance, is left as calibrated.
+matter, or could be chance, is left as calibrated; so is what does not make the frames fit better: few spectra
+on a small piece may look like a shift.
 """
 
 from __future__ import annotations
@@ -18,8 +19,12 @@ from dsl_core.optics.correspondence import Correspondence, Footprint, like
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.causes import Causes, shift_terms
+from dsl_core.reconstruction.spectral.probe import Probe
 
 Floats = NDArray[np.float64]
+
+#: How many deviations the chi-square of pixels has to fall by.
+SURELY = 3.0
 
 
 class ShiftedOrders:
@@ -54,3 +59,10 @@ def corrected(model: PixelModel, causes: Causes) -> PixelModel | None:
     if correspondence is model.correspondence and bands is model.bands:
         return None
     return PixelModel(model.rig, bands, model.profiles, correspondence, model.lines)
+
+
+def fits_better(before: Probe, after: Probe) -> bool:
+    """Whether the frames of the pixels in both probes fit the second model better, not by chance."""
+    both = before.sound & after.sound
+    fall = (before.chi_square - after.chi_square)[both]
+    return bool(both.sum() > 1 and fall.mean() > SURELY * fall.std() / np.sqrt(both.sum()))

@@ -25,7 +25,7 @@ from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, ro
 from dsl_core.reconstruction.spectral.causes import fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.probe import Probe, ProbedScan, probe
-from dsl_core.reconstruction.spectral.self_correction import corrected
+from dsl_core.reconstruction.spectral.self_correction import corrected, fits_better
 from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
@@ -64,7 +64,7 @@ class SpectralMaps:
     """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid.
 
     ``probe`` is what the scan says about its model, where it can say anything, ``corrected`` whether the
-    spectra are those of a model that follows it, and ``error`` what is left.
+    spectra are those of a model that follows it (None: nothing asked for it), and ``error`` what is left.
     """
 
     reflectance: NDArray[np.float32]
@@ -75,7 +75,7 @@ class SpectralMaps:
     chi_square: NDArray[np.float32]
     probe: Probe | None = None
     error: ModelError | None = None
-    corrected: bool = False
+    corrected: bool | None = None
 
     @classmethod
     def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
@@ -129,12 +129,16 @@ class SpectralReconstruction:
         )
         with one_kernel_thread():
             found = left = probe(self.probed)
-            better = None
+            better = taken = None
             if found is not None and not self._as_calibrated:
                 better = corrected(self.model, fit_causes(found))
-            if better is not None:
-                self.model, self.bands = better, better.bands
-                left = probe(self.probed)
+            if found is not None and better is not None:
+                left = probe(replace(self.probed, model=better))
+                taken = left is not None and fits_better(found, left)
+                if taken:
+                    self.model, self.bands = better, better.bands
+                else:
+                    left = found
             self._error = None if left is None else model_error(left)
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
@@ -143,7 +147,7 @@ class SpectralReconstruction:
                 "spectra",
                 progress,
             )
-        return replace(out, probe=found, error=self._error, corrected=better is not None)
+        return replace(out, probe=found, error=self._error, corrected=taken)
 
     @property
     def probed(self) -> ProbedScan:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
+from dsl_core.reconstruction.spectral.probe import Probe
+from dsl_core.reconstruction.spectral.self_correction import fits_better
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
 
@@ -58,7 +61,7 @@ def test_most_of_the_error_of_a_changed_film_is_taken_back(
 ) -> None:
     rig, scan = scanned
     left, taken = (solved(wrong(rig), scan, as_calibrated) for as_calibrated in (True, False))
-    assert not left.corrected
+    assert left.corrected is None
     assert taken.corrected
     assert error(taken, right) < 0.5 * error(left, right)
 
@@ -67,6 +70,18 @@ def test_a_film_as_calibrated_changes_nothing(scanned: tuple[Rig, MemoryScan], r
     found = solved(*scanned, as_calibrated=False)
     assert not found.corrected
     assert np.array_equal(found.reflectance, right.reflectance, equal_nan=True)
+
+
+def test_a_model_is_taken_only_if_frames_fit_it_better(
+    scanned: tuple[Rig, MemoryScan], right: SpectralMaps
+) -> None:
+    before = right.probe
+    assert isinstance(before, Probe)
+    scatter = 0.3 * np.random.default_rng(0).normal(size=len(before.chi_square))
+    less, same = (replace(before, chi_square=before.chi_square + scatter - fall) for fall in (0.2, 0.0))
+    assert fits_better(before, less)
+    assert not fits_better(before, same)
+    assert not fits_better(less, before)
 
 
 def test_what_both_orders_share_is_left_to_the_responses(

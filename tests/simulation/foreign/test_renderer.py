@@ -168,7 +168,8 @@ def test_lateral_colour_magnifies_red_and_blue_differently() -> None:
             places.append(i + (0.5 - profile[i]) / (profile[i + 1] - profile[i]))
         shifts[channel] = places[0] - places[1]
     assert shifts[0] * shifts[2] < 0
-    assert 0.02 < abs(shifts[0] - shifts[2]) < 1.0
+    # Half a pixel of the full picture at its side is a fifth of one here, and the edge is near the middle.
+    assert 0.004 < abs(shifts[0] - shifts[2]) < 0.4
 
 
 def test_noise_free_frames_do_not_depend_on_the_seed_of_the_noise_but_on_that_of_the_rig() -> None:
