@@ -23,15 +23,13 @@ _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 def cause_findings(probe: Probe, corrected: bool | None = None) -> Iterator[FitFinding]:
     """What the probed pixels of a scan say about each part of the model.
 
-    ``corrected`` results follow what was found of the film; where that was tried and did not make the frames
-    fit better (False), it is no finding.
+    ``corrected`` results follow what was found of the orders' light; where that was tried and did not make
+    the frames fit better (False), it is not a finding.
     """
     causes = fit_causes(probe)
-    for finding in (
-        _film(causes, probe, bool(corrected and causes.moved)),
-        *_gains(causes, bool(corrected and causes.unequal)),
-    ):
-        refuted = corrected is False and finding.part in ("film", "orders")
+    yield _film(causes, probe)
+    for finding in _gains(causes, bool(corrected)):
+        refuted = corrected is False and finding.part == "orders"
         yield finding.model_copy(update={"significant": finding.significant and not refuted})
     for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
         yield _profile(PROFILE[index], float(value), float(std))
@@ -56,7 +54,7 @@ def cause_findings(probe: Probe, corrected: bool | None = None) -> Iterator[FitF
     )
 
 
-def _film(causes: Causes, probe: Probe, corrected: bool) -> FitFinding:
+def _film(causes: Causes, probe: Probe) -> FitFinding:
     plus, minus = causes.shift_px[probe.sound].mean(0)
     return _finding(
         ("film", "place of the first orders", "px"),
@@ -64,9 +62,7 @@ def _film(causes: Causes, probe: Probe, corrected: bool) -> FitFinding:
         causes.rms_std_px,
         MOST_SHIFT_PX,
         f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
-        f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent otherwise."
-        + CORRECTED
-        * corrected,
+        f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent otherwise.",
         "Run the drift check, and calibrate the depth stage again.",
     )
 

@@ -24,22 +24,15 @@ def matters(value: float, std: float, limit: float) -> bool:
     return bool(abs(value) > max(limit, SIGMAS * std))
 
 
-def shift_terms(x: Floats, y: Floats) -> Floats:
-    """Terms (n, 6) of a smooth shift at places (n,), both from -1 to 1 over the picture."""
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1)
-
-
 @dataclass(frozen=True)
 class Causes:
     """The parameters of the model fitted to a whole scan, with deviations from the scatter over cells.
 
-    ``terms_px`` (2, 6) of the shifts of both orders (see `shift_terms`), ``shift_px`` (n, 2) these at the
-    probed pixels, their root mean square and its deviation;
+    ``shift_px`` (n, 2) of both orders at the probed pixels, their root mean square and its deviation;
     ``gain`` (2,) of both orders, with the deviations of their mean and difference; ``drift`` of the light
     from the first line to the last.
     """
 
-    terms_px: Floats
     shift_px: Floats
     rms_px: float
     rms_std_px: float
@@ -48,11 +41,6 @@ class Causes:
     difference_std: float
     drift: float
     drift_std: float
-
-    @property
-    def moved(self) -> bool:
-        """Whether the orders are elsewhere than calibrated."""
-        return matters(self.rms_px, self.rms_std_px, MOST_SHIFT_PX)
 
     @property
     def unequal(self) -> bool:
@@ -74,7 +62,7 @@ class Causes:
 def fit_causes(probe: Probe) -> Causes:
     """Fit all parameters at once; shifts are smooth over the picture, all others equal everywhere."""
     x, y = probe.place[:, 1], probe.place[:, 0]
-    terms = shift_terms(x, y)
+    terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1)
     count, rest = len(x), len(PARAMETERS) - 2
     design = np.zeros((count, len(PARAMETERS), 2 * _TERMS + rest))
     design[:, 0, :_TERMS] = design[:, 1, _TERMS : 2 * _TERMS] = terms
@@ -96,7 +84,6 @@ def fit_causes(probe: Probe) -> Causes:
         np.diag(pair @ covariance[first : first + 2, first : first + 2] @ pair.T)
     ).tolist()
     return Causes(
-        terms_px=found[: 2 * _TERMS].reshape(2, _TERMS),
         shift_px=shift,
         rms_px=float(np.sqrt(max(square - noise, 0.0))),
         rms_std_px=float(np.sqrt(noise / (2 * _TERMS))),

@@ -1,8 +1,7 @@
-"""Spectra follow a film that has changed since the calibration, as far as the scan itself shows it."""
+"""Spectra follow the light of the orders where it has changed since the calibration, as the scan shows it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -45,22 +44,17 @@ def error(found: SpectralMaps, right: SpectralMaps) -> float:
     return float(np.sqrt(np.nanmedian((found.reflectance - right.reflectance) ** 2)))
 
 
-def shifted_film(rig: Rig) -> Rig:
-    return rig.model_copy(update={"film": rig.film.model_copy(update={"distance_mm": 29.3})})
-
-
 def one_order_brighter(rig: Rig) -> Rig:
     curve = rig.efficiency[1]
     brighter = curve.model_copy(update={"values": tuple(1.08 * value for value in curve.values)})
     return rig.model_copy(update={"efficiency": {**rig.efficiency, 1: brighter}})
 
 
-@pytest.mark.parametrize("wrong", [shifted_film, one_order_brighter])
-def test_most_of_the_error_of_a_changed_film_is_taken_back(
-    scanned: tuple[Rig, MemoryScan], right: SpectralMaps, wrong: Callable[[Rig], Rig]
+def test_most_of_the_error_of_a_darker_order_is_taken_back(
+    scanned: tuple[Rig, MemoryScan], right: SpectralMaps
 ) -> None:
     rig, scan = scanned
-    left, taken = (solved(wrong(rig), scan, as_calibrated) for as_calibrated in (True, False))
+    left, taken = (solved(one_order_brighter(rig), scan, as_calibrated) for as_calibrated in (True, False))
     assert left.corrected is None
     assert taken.corrected
     assert error(taken, right) < 0.5 * error(left, right)
