@@ -45,7 +45,9 @@ def inside_outline(
     for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         if ay != by:
             crosses = (ay > y) != (by > y)
-            inside ^= crosses & (x < (bx - ax) * (y - ay) / (by - ay) + ax)
+            # Far from an edge that is nearly level the share overflows, but there nothing crosses.
+            with np.errstate(over="ignore", invalid="ignore"):
+                inside ^= crosses & (x < (bx - ax) * ((y - ay) / (by - ay)) + ax)
     return inside
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dsl_core.evaluation.marks import (
@@ -27,6 +27,7 @@ def test_a_rectangle_holds_the_pixels_whose_centres_it_holds() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-20, 40), st.floats(-20, 40)), min_size=3, max_size=3))
+@example([(0.0, 1.0), (0.0, 2.225073858507203e-309), (1.0, 0.0)])
 def test_a_triangle_holds_what_lies_on_the_inner_side_of_its_edges(
     corners: list[tuple[float, float]],
 ) -> None:
