@@ -128,17 +128,8 @@ class SpectralReconstruction:
             self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
         )
         with one_kernel_thread():
-            found = left = probe(self.probed)
-            better = taken = None
-            if found is not None and not self._as_calibrated:
-                better = corrected(self.model, fit_causes(found))
-            if found is not None and better is not None:
-                left = probe(replace(self.probed, model=better))
-                taken = left is not None and fits_better(found, left)
-                if taken:
-                    self.model, self.bands = better, better.bands
-                else:
-                    left = found
+            found = probe(self.probed)
+            left, taken = (found, None) if self._as_calibrated or found is None else self._follow(found)
             self._error = None if left is None else model_error(left)
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
@@ -148,6 +139,17 @@ class SpectralReconstruction:
                 progress,
             )
         return replace(out, probe=found, error=self._error, corrected=taken)
+
+    def _follow(self, found: Probe) -> tuple[Probe, bool | None]:
+        """Take over what a probe says if frames then fit better: what is left, and whether it was taken."""
+        better = corrected(self.model, fit_causes(found))
+        if better is None:
+            return found, None
+        left = probe(replace(self.probed, model=better))
+        if left is None or not fits_better(found, left):
+            return found, False
+        self.model, self.bands = better, better.bands
+        return left, True
 
     @property
     def probed(self) -> ProbedScan:

@@ -97,3 +97,15 @@ def test_the_gain_of_an_order_is_found_by_its_size(scanned: tuple[DeviceRig, Mem
     assert difference.value == pytest.approx(1 / 1.08 - 1, abs=3 * difference.std)
     assert difference.std < 0.03
     assert np.isfinite([f.value for f in found.values()]).all()
+
+
+def test_gains_that_make_no_frame_fit_better_are_not_a_finding(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    found = probed(one_order_brighter(devices.calibration), scan)
+    said = {taken: Fit.of(cause_findings(found, taken)) for taken in (True, False)}
+    assert said[True].parts[:1] == ("orders",)
+    assert "corrected for it" in said[True].words
+    assert "orders" not in said[False].parts
