@@ -18,6 +18,7 @@ from dsl_core.devices.conditions import current_conditions
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.simulation.published_rig import published_rig
+from tests.app.support.real_window import show_window
 
 OPTIONS = {"scene": "plane", "size": "64x48"}
 
@@ -27,8 +28,7 @@ def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mai
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path))
     composition = Composition(StartOptions(RigChoice("twin", tuple(OPTIONS.items()))))
     made = composition.open_window(tmp_path)
-    qtbot.addWidget(made)
-    made.show()
+    show_window(qtbot, made)
     rig = composition.rig
     rig.connect(rig.state.choice.value)
     qtbot.waitUntil(lambda: rig.state.devices.value is not None, timeout=60_000)

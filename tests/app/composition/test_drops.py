@@ -17,6 +17,7 @@ from pytestqt.qtbot import QtBot
 from dsl_core.io.plan_file import save_plan
 from dsl_core.io.result.annotations_file import Annotations, PinRecord, save_annotations
 from dsl_core.model.plan import CapturePlan, LineComb
+from tests.app.support.real_window import show_window
 from tests.app.support.small_result import RED, write_reference, write_small_result
 
 
@@ -24,8 +25,7 @@ from tests.app.support.small_result import RED, write_reference, write_small_res
 def window(qtbot: QtBot, tmp_path: Path) -> MainWindow:
     composition = Composition(StartOptions())
     made = composition.open_window(tmp_path / "home")
-    qtbot.addWidget(made)
-    made.show()
+    show_window(qtbot, made)
     return made
 
 

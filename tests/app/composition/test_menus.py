@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,8 @@ from dsl_app.shell.main_window import MainWindow
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from tests.app.support.real_window import show_window
+
 TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48"), ("realtime", "on")))
 
 
@@ -24,15 +25,11 @@ def composition(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Composition:
 
 
 @pytest.fixture
-def window(qtbot: QtBot, composition: Composition, tmp_path: Path) -> Iterator[MainWindow]:
+def window(qtbot: QtBot, composition: Composition, tmp_path: Path) -> MainWindow:
     made = composition.open_window(tmp_path)
     made.parts.settings.output_folder = str(tmp_path / "scans")
-    qtbot.addWidget(made)
-    made.show()
-    yield made
-    made.parts.runner.cancel_all()
-    qtbot.waitUntil(lambda: not made.parts.runner.active, timeout=20000)
-    made.close()
+    show_window(qtbot, made)
+    return made
 
 
 def test_a_rig_is_watched_and_scans_from_the_results_page(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -18,6 +17,7 @@ from dsl_core.io.calibration_library import CalibrationLibrary
 from tests.app.composition.test_drops import drop
 from tests.app.composition.test_names import complaints
 from tests.app.importing.published_folders import Folders, make_folders
+from tests.app.support.real_window import show_window
 
 PATIENCE_MS = 60_000
 
@@ -29,19 +29,15 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Folders:
 
 
 @pytest.fixture
-def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[MainWindow]:
+def window(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
     composition = Composition(StartOptions())
     made = composition.open_window(tmp_path / "home")
     made.parts.settings.output_folder = str(tmp_path / "scans")
-    qtbot.addWidget(made)
-    made.show()
-    yield made
-    made.parts.runner.cancel_all()
-    qtbot.waitUntil(lambda: not made.parts.runner.active, timeout=PATIENCE_MS)
-    made.close()
+    show_window(qtbot, made)
+    return made
 
 
 def opened(qtbot: QtBot, window: MainWindow) -> ImportDialog:

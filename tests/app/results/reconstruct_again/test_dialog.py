@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,6 +18,7 @@ from pytestqt.qtbot import QtBot
 
 from tests.app.composition.test_names import complaints
 from tests.app.support.compare_bench import make_result
+from tests.app.support.real_window import show_window
 
 PATIENCE_MS = 60_000
 
@@ -30,24 +30,18 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def window(
-    qtbot: QtBot, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> Iterator[MainWindow]:
+def window(qtbot: QtBot, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MainWindow:
     """A window with a result of a scan beside it."""
     monkeypatch.setenv("DSL_SCAN_HOME", str(tmp_path / "home"))
     # What is still read when the window closes is not asked about.
     monkeypatch.setattr(QMessageBox, "question", lambda *_: QMessageBox.StandardButton.Yes)
     composition = Composition(StartOptions())
     made = composition.open_window(tmp_path / "home")
-    qtbot.addWidget(made)
-    made.show()
+    show_window(qtbot, made)
     shutil.copytree(finished, tmp_path, dirs_exist_ok=True)
     made.open_path(tmp_path / "small.zarr")
     qtbot.waitUntil(lambda: not made.parts.runner.active, timeout=PATIENCE_MS)
-    yield made
-    made.parts.runner.cancel_all()
-    qtbot.waitUntil(lambda: not made.parts.runner.active, timeout=PATIENCE_MS)
-    made.close()
+    return made
 
 
 def opened(qtbot: QtBot, window: MainWindow) -> ReconstructionDialog:
