@@ -22,7 +22,7 @@ from torch import Tensor
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
-from dsl_core.optics.line_profile import ProfileTable, halo_of_line
+from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
@@ -215,15 +215,35 @@ def _samples(targets: Indices, shape: tuple[int, ...], bayer: BayerPattern) -> t
 
 @dataclass(frozen=True)
 class _OrderLight:
-    """Lines near one order: the model's rows (samples, lines, bands), changed ones, data, weight and time."""
+    """Lines near one order: the model's rows (samples, lines, bands), data, weight and time of each.
+
+    Changes of the rows, of the light ``white`` (samples, bands), are ``changes[index]``.
+    """
 
     rows: Tensor
-    shifted: Tensor
-    blurred: Tensor
-    tailed: Tensor
+    white: Tensor
+    index: Tensor
+    changes: Tensor
     values: Tensor
     weight: Tensor
     time: Tensor
+
+
+def _changed_profiles(width_px: float, blur_px: float, band_px: float, like: Tensor) -> Tensor:
+    """Profiles of a line on a band at even distances, `SAMPLES` a column, zero at both ends: (distances, 4).
+
+    As it is, and what it gains per column of shift, per share of blur and per share of light in the tail.
+    """
+    own, blurred, tail = (
+        ProfileTable(width_px, each, band_px, like.device, like.dtype).values
+        for each in (blur_px, blur_px * (1 + BLUR_STEP), blur_px * TAIL_BLUR)
+    )
+    own, blurred = (
+        torch.nn.functional.pad(each, ((len(tail) - len(each)) // 2,) * 2) for each in (own, blurred)
+    )
+    step = round(SHIFT_PX * SAMPLES)
+    shifted = (own.roll(-step) - own.roll(step)) * (SAMPLES / (2 * step))
+    return torch.stack([own, shifted, (blurred - own) / BLUR_STEP, tail - own], 1)
 
 
 class _Light:
@@ -259,12 +279,8 @@ class _Light:
         assert lines is not None
         columns, inside = footprint.columns, scan.model.inside(footprint)
         half = scan.model.bands.half_width_px(columns)
-        blur = scan.model.response(0.0).blur_px
-        tables = [
-            ProfileTable(lines.width_px, b, half, columns.device, columns.dtype)
-            for b in (blur, blur * (1 + BLUR_STEP), blur * TAIL_BLUR)
-        ]
-        reach = tables[-1].support_px
+        table = _changed_profiles(lines.width_px, scan.model.response(0.0).blur_px, half, columns)
+        reach = (len(table) - 1) / 2 / SAMPLES
         low = torch.where(inside, columns, torch.inf).amin(0)
         high = torch.where(inside, columns, -torch.inf).amax(0)
         any_inside = inside.any(0)
@@ -274,8 +290,8 @@ class _Light:
         used = lines.exists(index) & any_inside[:, None]
         distance = columns.T[:, None] - lines.centre_px(index).to(columns)[..., None]
         white = like(scan.model.bands.moments[order].sum(1), columns)[self._colour] * inside.T
-        own, blurred, tail = (table.at(distance) * white[:, None] for table in tables)
-        shifted = (tables[0].at(distance + SHIFT_PX) - tables[0].at(distance - SHIFT_PX)) * white[:, None]
+        at = ((distance + reach) * SAMPLES).add_(0.5).clip_(0, len(table) - 1).int()
+        own = table[:, 0].contiguous().index_select(0, at.reshape(-1)).reshape(at.shape) * white[:, None]
         frame = lines.frame(index).numpy()
         rows, columns_at = (at[:, None] for at in self._place)
         y = torch.as_tensor(scan.radiance[frame, rows, columns_at]).double()
@@ -289,9 +305,9 @@ class _Light:
         lit = (own > 0).any(2) & used
         return _OrderLight(
             own,
-            shifted / (2 * SHIFT_PX),
-            (blurred - own) / BLUR_STEP,
-            tail - own,
+            white,
+            at,
+            table[:, 1:].contiguous(),
             values,
             weight * lit,
             index / lines.lines - 0.5,
@@ -304,15 +320,13 @@ class _Light:
         """
         parts = []
         for number, light in enumerate(self._orders):
-
-            def seen(rows: Tensor) -> Tensor:
-                return (rows @ nodes[..., None])[..., 0]
-
-            own = seen(light.rows)
+            own = (light.rows @ nodes[..., None])[..., 0]
+            kinds = light.changes.shape[1]
+            rows = light.changes.index_select(0, light.index.reshape(-1)).reshape(*light.index.shape, kinds)
+            shifted, blurred, tailed = torch.einsum("slbk,sb->ksl", rows, light.white * nodes)
             part = torch.zeros((*own.shape, len(PARAMETERS)), dtype=own.dtype)
-            part[..., number] = seen(light.shifted)
-            part[..., 2 + number] = own
-            part[..., 4], part[..., 5] = seen(light.blurred), seen(light.tailed)
+            part[..., number], part[..., 2 + number] = shifted, own
+            part[..., 4], part[..., 5] = blurred, tailed
             part[..., 6] = own * light.time
             parts.append(part)
         zero = torch.zeros_like(parts[0][:, :1])
