@@ -16,9 +16,9 @@ from enum import StrEnum
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.preflight import require_possible
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import Cancelled, DslError
+from dsl_core.errors import Cancelled, DslError, StoreError
 from dsl_core.model.frames import FrameSink
-from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken, NoProgress, Progress
 
 
@@ -58,6 +58,8 @@ class Status:
 
 Listener = Callable[[Status], None]
 _log = logging.getLogger(__name__)
+#: So often a scan is completed after it was read back; a disk that loses frames again does not keep any.
+_COMPLETIONS = 2
 
 
 class Runner:
@@ -118,7 +120,7 @@ class Runner:
             self._condition.notify_all()
 
     def run(self) -> Status:
-        """Take every missing shot and return the final status.
+        """Take every missing shot, read all of them back, and return the final status.
 
         Raises `PlanError` when the plan is impossible on the rig, `DeviceError` when a shot cannot be taken,
         `StoreError` when it cannot be saved, `Cancelled` when someone requested the end.
@@ -129,6 +131,7 @@ class Runner:
             self._set(State.CHECKING)
             require_possible(self._rig, self._plan)
             self._take_all(list(self._sink.missing()))
+            self._complete()
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(
                 State.CANCELLED,
@@ -156,6 +159,27 @@ class Runner:
             done += 1
             self._set(State.RUNNING, shot=shot, done=done)
             self._report(done)
+
+    def _complete(self) -> None:
+        """Read everything back and take again what is not there, so that a finished scan is a whole one."""
+        for _ in range(_COMPLETIONS):
+            lost = self._sink.read_back()
+            if not lost:
+                return
+            _log.warning(
+                "%d of %d frames were lost or damaged on the disk after they were saved; they are taken"
+                " again. The first is %s.",
+                len(lost),
+                self._plan.shot_count,
+                describe_shot(lost[0]),
+            )
+            self._take_all(lost)
+        if lost := self._sink.read_back():
+            raise StoreError(
+                f"{len(lost)} of {self._plan.shot_count} frames are lost or damaged whenever they are read"
+                f" back, the first is {describe_shot(lost[0])}. Check the drive, and that no other program"
+                " changes the folder; then resume the scan."
+            )
 
     def _between_shots(self, shot: Shot, done: int) -> None:
         """Wait while paused; raise `Cancelled` once that was requested."""

@@ -32,6 +32,10 @@ class WatchedSink:
         except Exception:
             _log.exception("a watcher of the scan failed; the scan continues")
 
+    def read_back(self) -> list[Shot]:
+        """The shots whose frames are not kept as they were written."""
+        return self._sink.read_back()
+
     def close(self) -> None:
         """Finish the sink."""
         self._sink.close()

@@ -46,5 +46,8 @@ class FrameSink(Protocol):
     def write(self, shot: Shot, frame: Frame) -> None:
         """Store a frame so that it survives a crash from this moment on; raises `StoreError`."""
 
+    def read_back(self) -> list[Shot]:
+        """Look again at everything that is kept; the shots whose frames are not as they were written."""
+
     def close(self) -> None:
         """Finish; the sink may be reopened later."""

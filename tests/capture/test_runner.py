@@ -431,3 +431,37 @@ def test_cancelling_a_silent_camera_spares_the_other_attempts(
     assert [attempt for shot, attempt in bench.snapped if shot == 4] == [0]
     assert runner.status.state is State.CANCELLED
     assert len(sink.frames) == 4
+
+
+class LossySink(MemorySink):
+    """Loses frame 5 the first ``times`` that it is written."""
+
+    def __init__(self, plan: CapturePlan, times: int) -> None:
+        super().__init__(plan)
+        self.times = times
+
+    def read_back(self) -> list[Shot]:
+        if self.times:
+            self.times -= 1
+            del self.frames[5]
+        return super().read_back()
+
+
+def test_frames_lost_after_they_were_saved_are_taken_again(
+    rig: DeviceRig, bench: Any, plan: CapturePlan, pattern: Pattern, caplog: pytest.LogCaptureFixture
+) -> None:
+    sink = LossySink(plan, times=2)
+    status = Runner(rig, plan, sink, pattern).run()
+    assert (status.state, status.done) == (State.FINISHED, plan.shot_count)
+    assert sorted(sink.frames) == list(range(plan.shot_count))
+    assert [shot for shot, _ in bench.snapped].count(5) > 2
+    assert "frames were lost or damaged on the disk after they were saved" in caplog.text
+
+
+def test_a_disk_that_keeps_losing_frames_does_not_finish_a_scan(
+    rig: DeviceRig, plan: CapturePlan, pattern: Pattern
+) -> None:
+    runner = Runner(rig, plan, LossySink(plan, times=9), pattern)
+    with pytest.raises(StoreError, match=r"1 of \d+ frames are lost or damaged whenever they are read back"):
+        runner.run()
+    assert runner.status.state is State.FAILED

@@ -42,5 +42,9 @@ class MemorySink:
                 f"{describe_shot(shot).capitalize()} has not been captured. Run the scan to its end first."
             ) from None
 
+    def read_back(self) -> list[Shot]:
+        """The shots whose frames are gone."""
+        return list(self.missing())
+
     def close(self) -> None:
         """Nothing to finish."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic import Field, ValidationError
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import store_error, write_all
+from dsl_core.io.atomic import store_error, sync_folder, write_all, write_atomic
 from dsl_core.model.base import Record
 
 
@@ -58,6 +58,10 @@ def read_log(path: Path) -> tuple[list[LogEntry], int]:
     return entries, good
 
 
+def _line(entry: LogEntry) -> bytes:
+    return entry.model_dump_json().encode() + b"\n"
+
+
 class CaptureLog:
     """A log open for appending."""
 
@@ -65,18 +69,24 @@ class CaptureLog:
         """Open or create the log and cut off what a crash left of a last line; raises `StoreError`."""
         self.path = path
         self.entries, self._size = read_log(path)
+        self._descriptor: int | None = None
+        self._open()
+
+    def _open(self) -> None:
         flags = os.O_WRONLY | os.O_CREAT | getattr(os, "O_BINARY", 0)
         try:
-            self._descriptor: int | None = os.open(path, flags, 0o644)
+            self._descriptor = os.open(self.path, flags, 0o644)
             os.ftruncate(self._descriptor, self._size)
+            # A new file is only there after a power cut once its folder is.
+            sync_folder(self.path.parent)
         except OSError as error:
-            raise store_error(path, error) from error
+            raise store_error(self.path, error) from error
 
     def append(self, entry: LogEntry) -> None:
         """Add a line and wait until it is on disk; a line that does not fit is taken back."""
         if self._descriptor is None:
             raise StoreError(f"{self.path} is closed; open the scan again before writing to it.")
-        line = entry.model_dump_json().encode() + b"\n"
+        line = _line(entry)
         try:
             os.lseek(self._descriptor, self._size, os.SEEK_SET)
             write_all(self._descriptor, line)
@@ -87,6 +97,25 @@ class CaptureLog:
             raise store_error(self.path, error) from error
         self._size += len(line)
         self.entries.append(entry)
+
+    def restore(self) -> bool:
+        """Write all lines again unless the disk has them; says whether that was necessary."""
+        if self._descriptor is not None and self._is_whole(self._descriptor):
+            return False
+        self.close()
+        lines = b"".join(map(_line, self.entries))
+        write_atomic(self.path, lines)
+        self._size = len(lines)
+        self._open()
+        return True
+
+    def _is_whole(self, descriptor: int) -> bool:
+        """Whether the file of that name is the one being written, and holds every line."""
+        try:
+            same = os.path.samestat(os.stat(self.path), os.fstat(descriptor))
+            return same and read_log(self.path)[0] == self.entries
+        except (OSError, StoreError):
+            return False
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""

@@ -12,6 +12,7 @@ A frame is done when its line and its chunk exist and agree.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -39,6 +40,7 @@ from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
+_logger = logging.getLogger(__name__)
 SUFFIX = ".dsl"
 LOG_NAME = "frames.jsonl"
 FRAMES_NAME = "frames"
@@ -222,6 +224,53 @@ class ScanWriter:
         )
         self._log.append(entry)
         self._done.add(shot.index)
+
+    def read_back(self) -> list[Shot]:
+        """Shots whose frames are not on the disk as they were written; manifest and log are written again.
+
+        Every pixel is read and compared. Raises `StoreError` when the folder itself is gone or fails.
+        """
+        if not self.folder.is_dir():
+            raise StoreError(
+                f"{self.folder} was moved or deleted while it was written. Put it back and resume the scan."
+            )
+        restored = [
+            name
+            for name, restore in (
+                (MANIFEST_NAME, self._restore_manifest),
+                (LOG_NAME, self._log.restore),
+                (FRAMES_NAME, self._restore_metadata),
+            )
+            if restore()
+        ]
+        if restored:
+            _logger.warning(
+                "%s of %s changed while scanning and was written again."
+                " Keep other programs out of the folder.",
+                " and ".join(restored),
+                self.folder,
+            )
+        self._done = ScanReader(self.folder).sound()
+        return list(self.missing())
+
+    def _restore_manifest(self) -> bool:
+        """Write the manifest again unless the disk has it; says whether that was necessary."""
+        try:
+            if read_manifest(self.folder) == self.manifest:
+                return False
+        except StoreError:
+            pass
+        write_manifest(self.folder, self.manifest)
+        return True
+
+    def _restore_metadata(self) -> bool:
+        """Describe the frames again unless the disk has it; says whether that was necessary."""
+        try:
+            self._store.check()
+        except StoreError:
+            self._store.create()
+            return True
+        return False
 
     def close(self) -> None:
         """Finish and let other processes in; a second call does nothing."""
