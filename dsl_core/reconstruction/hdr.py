@@ -4,22 +4,19 @@ A raw value of setting i is ``raw_i = black_i + g_i L + noise`` with the gain ``
 radiance`` and the radiance ``L`` in DN per ms at full projector drive. Black is subtracted with its
 sign: clipping would bias the dark pixels that hold the first orders.
 
-The default weights are the inverse variances ``g_i^2 / (floor_i + g_i L / K)`` with K electrons per
+The weights are the inverse variances ``g_i^2 / (floor_i + g_i L / K)`` with K electrons per
 DN. ``L`` in them is not the pixel's own noisy value, which would favour values that happen to be low:
 it is the ratio ``sum (raw_i - black_i) / sum g_i`` over the unsaturated settings, and only the ratio
 of the weights of two settings matters, which hardly depends on it. What remains is less than 0.15
-standard deviations, and only where a setting is within its noise of saturation.
-
-The option "trapezoid" follows section 1.1 of the supplement of "Dispersed Structured Light" (Shin et
-al., CVPR 2024). Its weights do depend on the noisy values: near black it is biased upwards by about 0.6
-standard deviations.
+standard deviations, and only where a setting is within its noise of saturation. The weights of section
+1.1 of the supplement of "Dispersed Structured Light" (Shin et al., CVPR 2024), trapezoids of the noisy
+values themselves, scatter more and are biased near black by about 0.6 standard deviations.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +30,6 @@ Array = NDArray[np.float32]
 
 #: Rows merged at a time, so that all buffers stay in the processor's cache; even, to keep the Bayer phase.
 _BLOCK_ROWS = 32
-
-#: Corners of the trapezoid, fractions of full scale: up in the black-subtracted frame, down in the raw one.
-_RISE = (0.0, 0.02)
-_FALL = (0.85, 0.97)
 
 
 @dataclass(frozen=True)
@@ -87,7 +80,6 @@ class HdrMerger:
         blacks: Sequence[BlackFrame],
         sensor: Sensor,
         *,
-        weighting: Literal["inverse_variance", "trapezoid"] = "inverse_variance",
         saturation_margin_dn: float | None = None,
     ) -> None:
         """Prepare for frames of one size.
@@ -102,10 +94,9 @@ class HdrMerger:
                 f"Exposure x pattern radiance must be positive, given {np.asarray(gains_ms).tolist()} ms."
             )
         self.shape = blacks[0].mean.shape
-        self._full_dn = sensor.full_scale_dn
-        margin = 0.02 * self._full_dn if saturation_margin_dn is None else saturation_margin_dn
-        self._limit_dn = int(np.ceil(self._full_dn - margin))
-        self._weighting = weighting
+        full_dn = sensor.full_scale_dn
+        margin = 0.02 * full_dn if saturation_margin_dn is None else saturation_margin_dn
+        self._limit_dn = int(np.ceil(full_dn - margin))
         self._gain = [np.float32(gain) for gain in gains_ms]
         self._shot = [gain / np.float32(sensor.electrons_per_dn) for gain in self._gain]
         for black in blacks:
@@ -173,33 +164,8 @@ class HdrMerger:
             total += term
         np.divide(total, weight, out=out.radiance)
         np.divide(1, weight, out=out.variance)
-        if self._weighting == "trapezoid":
-            self._reweight(raws, rows, expected, out)
         if out.saturated.any():
             self._bound(rows, out)
-
-    def _reweight(
-        self, raws: list[NDArray[np.unsignedinteger]], rows: slice, expected: Array, out: MergedFrame
-    ) -> None:
-        """Replace the merge by the seed's; where all its weights vanish the inverse-variance merge stays."""
-        count = rows.stop - rows.start
-        weights = [self._trapezoid(r, s[:count]) for r, s in zip(raws, self._signal, strict=True)]
-        sum_ = np.sum(weights, axis=0)
-        radiance = np.zeros_like(expected)
-        variance = np.zeros_like(expected)
-        for i, weight in enumerate(weights):
-            share = weight / (sum_ * self._gain[i])
-            radiance += share * self._signal[i][:count]
-            variance += share**2 * (self._floor[i][rows] + expected * self._shot[i])
-        np.copyto(out.radiance, radiance, where=sum_ > 0)
-        np.copyto(out.variance, variance, where=sum_ > 0)
-
-    def _trapezoid(self, raw: NDArray[np.unsignedinteger], signal: Array) -> Array:
-        """The smaller of a ramp up in the black-subtracted and a ramp down in the raw frame."""
-        rise = (signal / self._full_dn - _RISE[0]) / (_RISE[1] - _RISE[0])
-        fall = (_FALL[1] - raw / np.float32(self._full_dn)) / (_FALL[1] - _FALL[0])
-        inside = np.clip(np.minimum(rise, fall), 0, 1)
-        return np.where(raw < self._limit_dn, inside, np.float32(0)).astype(np.float32)
 
     def _bound(self, rows: slice, out: MergedFrame) -> None:
         """The least radiance that saturates every setting, where every setting is saturated."""

@@ -26,12 +26,10 @@ def main() -> None:
     raws = [digitise(sensor, np.float32(gain) * radiance, rng) for gain in GAINS_MS]
     black = black_frame([digitise(sensor, np.zeros(SHAPE, np.float32), rng)], sensor)
     merger = HdrMerger(GAINS_MS, [black, black], sensor)
-    seed = HdrMerger(GAINS_MS, [black, black], sensor, weighting="trapezoid")
     out = merger.merge(raws)
     for name, work in (
         ("merge into given arrays", lambda: merger.merge(raws, out)),
         ("merge into new arrays", lambda: merger.merge(raws)),
-        ("merge, trapezoid", lambda: seed.merge(raws, out)),
         ("demosaic", lambda: demosaic(out.radiance, sensor.bayer)),
         ("demosaic variance", lambda: demosaic_variance(out.variance, sensor.bayer)),
     ):
