@@ -13,7 +13,7 @@ from dsl_core.errors import DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.published.calibration import check_calibration, holds_calibration, load_calibration
 from dsl_core.io.published.dataset import PUBLISHED_SETTINGS, export_dataset, open_dataset
-from dsl_core.io.published.layout import FileRecord, check_dataset
+from dsl_core.io.published.layout import FileRecord, survey
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import read_manifest
@@ -70,7 +70,7 @@ def _look_at_scan(root: Path, base: Rig) -> FolderLook:
     except DslError as error:
         # All that the layout wants is then missing, which the table says.
         plan = CapturePlan(name=root.name, settings=PUBLISHED_SETTINGS)
-        return FolderLook("scan", check_dataset(root, plan), f"{error}{_poses_hint(root)}")
+        return FolderLook("scan", survey(root, plan).records, f"{error}{_poses_hint(root)}")
     try:
         source.require_frames()
         require_possible(replay_rig(source, base), source.plan)

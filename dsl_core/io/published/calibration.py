@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.layout import FileRecord
@@ -89,13 +89,11 @@ def load_calibration(
     )
 
 
-def export_calibration(
-    rig: Rig, root: Path, grid: WavelengthGrid | None = None, *, overwrite: bool = False
-) -> list[Path]:
+def export_calibration(rig: Rig, root: Path, *, overwrite: bool = False) -> list[Path]:
     """Write a rig's lenses, pose and curves in the published layout below ``root``; raises `StoreError`."""
     stereo = Stereo(camera=rig.camera, projector=rig.projector, pose=rig.pose)
     return [
-        *save_tables(rig, root / TABLE_FOLDER, grid, overwrite=overwrite),
+        *save_tables(rig, root / TABLE_FOLDER, overwrite=overwrite),
         save_stereo(stereo, root / STEREO_NAME, overwrite=overwrite),
     ]
 
@@ -161,14 +159,12 @@ class PublishedTables:
     efficiency: dict[int, SpectralCurve]
 
 
-def load_tables(folder: Path, wavelengths_nm: ArrayLike | None = None) -> PublishedTables:
-    """Read the three tables; ``wavelengths_nm`` is needed when the number of bands is none of the published.
+def load_tables(folder: Path) -> PublishedTables:
+    """Read the three tables, whose numbers of bands must be published ones.
 
     Raises `CalibrationError` that names the file and the shape it should have.
     """
-    response = _load(folder, "response", wavelengths_nm)
-    emission = _load(folder, "emission", wavelengths_nm)
-    efficiency = _load(folder, "efficiency", wavelengths_nm)
+    response, emission, efficiency = (_load(folder, name) for name in TABLE_NAMES)
     return PublishedTables(
         response=(response[0], response[1], response[2]),
         emission=(emission[0], emission[1], emission[2]),
@@ -176,10 +172,8 @@ def load_tables(folder: Path, wavelengths_nm: ArrayLike | None = None) -> Publis
     )
 
 
-def save_tables(
-    rig: Rig, folder: Path, grid: WavelengthGrid | None = None, *, overwrite: bool = False
-) -> list[Path]:
-    """Write a rig's curves as the three tables, sampled on a grid (430 to 660 nm every 5 nm if not given).
+def save_tables(rig: Rig, folder: Path, *, overwrite: bool = False) -> list[Path]:
+    """Write a rig's curves as the three tables, 430 to 660 nm every 5 nm.
 
     Raises `StoreError` when a file already exists (unless ``overwrite``), `CalibrationError` when the rig
     has no efficiency for one of the orders -1, 0, +1.
@@ -191,7 +185,7 @@ def save_tables(
         raise CalibrationError(
             f"The rig {rig.name!r} has no efficiency of order {lacking[0]:+d}, which DG.npy contains."
         )
-    centres = (grid or WavelengthGrid()).centres_nm
+    centres = WavelengthGrid().centres_nm
     tables = {
         "response": np.stack([curve.at(centres) for curve in rig.response], axis=-1),
         "emission": np.stack([curve.at(centres) for curve in rig.emission], axis=-1),
@@ -209,7 +203,7 @@ def find_table(folder: Path, name: str) -> Path | None:
     return next((folder / n for n in TABLE_NAMES[name] if (folder / n).is_file()), None)
 
 
-def _load(folder: Path, name: str, wavelengths_nm: ArrayLike | None) -> list[SpectralCurve]:
+def _load(folder: Path, name: str) -> list[SpectralCurve]:
     path = find_table(folder, name)
     if path is None:
         raise CalibrationError(
@@ -224,22 +218,13 @@ def _load(folder: Path, name: str, wavelengths_nm: ArrayLike | None) -> list[Spe
         raise CalibrationError(
             f"{path} contains negative or non-finite values; a {name} cannot. Measure it again."
         )
-    centres = _centres(rows.shape[1], wavelengths_nm, path)
-    return [SpectralCurve.of(centres, row) for row in rows]
-
-
-def _centres(bands: int, wavelengths_nm: ArrayLike | None, path: Path) -> NDArray[np.float64]:
-    if wavelengths_nm is None:
-        if bands not in _GRIDS:
-            known = ", ".join(str(count) for count in sorted(_GRIDS))
-            raise CalibrationError(
-                f"{path} has {bands} bands; published tables have {known}. Give the wavelengths of the bands."
-            )
-        return _GRIDS[bands].centres_nm
-    centres = np.asarray(wavelengths_nm, np.float64)
-    if centres.shape != (bands,):
-        raise CalibrationError(f"{path} has {bands} bands, but {centres.size} wavelengths were given.")
-    return centres
+    bands = rows.shape[1]
+    if bands not in _GRIDS:
+        known = ", ".join(str(count) for count in sorted(_GRIDS))
+        raise CalibrationError(
+            f"{path} has {bands} bands; published tables have {known}. Resample it to one of their grids."
+        )
+    return [SpectralCurve.of(_GRIDS[bands].centres_nm, row) for row in rows]
 
 
 def _open(path: Path) -> NDArray[np.generic]:

@@ -76,25 +76,19 @@ class PublishedScan:
 
     def read(self, shot: Shot) -> NDArray[np.uint16]:
         """The mosaic of a shot, shape (rows, columns), DN; raises `StoreError` when it is not there."""
-        image = self.read_rgb(shot)
-        channels = bayer_channels(self.bayer, *image.shape[:2])
-        return np.take_along_axis(image, channels[..., None], axis=-1)[..., 0]
-
-    def read_rgb(self, shot: Shot) -> NDArray[np.uint16]:
-        """The demosaiced image of a shot, shape (rows, columns, 3), DN; raises `StoreError`."""
         import cv2
 
         place: Place = (shot.role, shot.setting, shot.pattern)
         path = self.found.files.get(place)
         if path is None:
-            record = self.found.by_place.get(place)
-            if record is None:
-                raise StoreError(f"The plan of {self.root} has no {shot.role} pattern {shot.pattern}.")
+            record = self.found.by_place[place]
             raise StoreError(f"{self.root / record.expected} is {record.status}: {record.advice}.")
         image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
         if image is None or image.ndim != 3:
             raise StoreError(f"{path} is damaged: it cannot be decoded. Copy it again or capture it again.")
-        return _right_aligned(np.asarray(image)[..., ::-1], self.bit_depth)
+        rgb = _right_aligned(np.asarray(image)[..., ::-1], self.bit_depth)
+        channels = bayer_channels(self.bayer, *rgb.shape[:2])
+        return np.take_along_axis(rgb, channels[..., None], axis=-1)[..., 0]
 
     def fingerprint(self) -> str:
         """What tells this dataset from every other, whatever its folder is called.
@@ -109,46 +103,22 @@ class PublishedScan:
                 digest.update(repr((place, size, file.read())).encode())
         return digest.hexdigest()
 
-    def points_mm(self) -> NDArray[np.float32]:
-        """Points of ``depth.npy``, shape (3, rows, columns), mm, camera frame, NaN where there is none.
 
-        Raises `StoreError` when the file is missing or has another shape.
-        """
-        path = self.root / DEPTH_NAME
-        try:
-            points = np.load(path, allow_pickle=False)
-        except (OSError, ValueError, EOFError) as error:
-            raise StoreError(
-                f"{path} cannot be read ({error}). Copy it again, or decode depth again."
-            ) from error
-        width, height = self.plan.camera_size_px
-        if points.shape != (height, width, 3):
-            raise StoreError(
-                f"{path} has shape {points.shape}; {(height, width, 3)} is needed (x, y, z in metres)."
-            )
-        millimetres: NDArray[np.float32] = np.moveaxis(points.astype(np.float32), -1, 0) * np.float32(1000)
-        millimetres[:, ~(np.isfinite(millimetres).all(axis=0) & (millimetres[2] > 0))] = np.nan
-        return millimetres
-
-
-def open_dataset(
-    root: Path, plan: CapturePlan | None = None, bayer: BayerPattern = "RGGB", bit_depth: int = 12
-) -> PublishedScan:
+def open_dataset(root: Path, bayer: BayerPattern = "RGGB", bit_depth: int = 12) -> PublishedScan:
     """Open a dataset folder; look at ``table`` for what is missing or misnamed.
 
-    Without a plan, that of ``plan.json`` is taken, otherwise the published one (640 x 360 projector, 318
+    The plan is that of ``plan.json``, otherwise the published one (640 x 360 projector, 318
     lines, 160 ms at level 0.2 and 320 ms at 0.8) with the size of the first scan-line image. Raises
     `StoreError` when the folder holds no such image or its plan is damaged.
     """
     if not root.is_dir():
         raise StoreError(f"{root} is not a folder. Give the folder that contains ldr_exposure1.")
-    if plan is None:
-        stored = root / PLAN_NAME
-        plan = (
-            read_record(stored, CapturePlan, "Correct it, or delete it.", fault="is not a capture plan")
-            if stored.is_file()
-            else _published_plan(root)
-        )
+    stored = root / PLAN_NAME
+    plan = (
+        read_record(stored, CapturePlan, "Correct it, or delete it.", fault="is not a capture plan")
+        if stored.is_file()
+        else _published_plan(root)
+    )
     return PublishedScan(root, plan, bayer, bit_depth, survey(root, plan))
 
 
@@ -158,11 +128,10 @@ def export_dataset(
     *,
     bayer: BayerPattern = "RGGB",
     bit_depth: int = 12,
-    points_mm: NDArray[np.floating] | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> list[Path]:
-    """Write a scan in the published layout, points (3, rows, columns) as ``depth.npy``; return the files.
+    """Write a scan in the published layout; return the files.
 
     The published code reads two settings; more are numbered on. Raises `StoreError`, also for frames the
     source does not have, and `Cancelled`; then nothing is written.
@@ -175,8 +144,6 @@ def export_dataset(
             target = draft / folder_name(shot.role, shot.setting) / file_name(shot.role, shot.pattern)
             _write_rgb(source.read(shot), target, bayer, bit_depth)
         (draft / PLAN_NAME).write_text(plan.model_dump_json(indent=1) + "\n", encoding="utf-8")
-        if points_mm is not None:
-            np.save(draft / DEPTH_NAME, np.moveaxis(points_mm, 0, -1) / 1000, allow_pickle=False)
         names = sorted(file.relative_to(draft) for file in draft.rglob("*") if file.is_file())
     return [folder / name for name in names]
 

@@ -130,16 +130,12 @@ class FolderSurvey:
         self.add(FileRecord(expected, found, status, advice), place, path)
 
 
-def check_dataset(root: Path, plan: CapturePlan) -> list[FileRecord]:
-    """The table of a dataset folder: a line for every file that a plan needs or that is in its way.
-
-    A folder that is missing as a whole has one line.
-    """
-    return survey(root, plan).records
-
-
 def survey(root: Path, plan: CapturePlan) -> FolderSurvey:
-    """Look for every shot of a plan below ``root``."""
+    """Look for every shot of a plan below ``root``.
+
+    Its table has a line for every file that the plan needs or that is in its way, one for a folder that is
+    missing as a whole.
+    """
     result = FolderSurvey(root, plan)
     counts = Counter((shot.role, shot.setting) for shot in plan.shots())
     for (role, setting), count in counts.items():

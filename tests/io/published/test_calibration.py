@@ -107,7 +107,7 @@ def _tables(folder: Path, **changes: NDArray[np.generic]) -> None:
         ("CRF", np.ones((3, 47)), r"CRF\.npy has shape \(3, 47\); \(bands, 3\)"),
         ("DG", np.ones((47, 3)), r"DG\.npy has shape \(47, 3\); \(3, bands\)"),
         ("PEF", np.ones((47, 3, 1)), r"PEF\.npy has shape"),
-        ("PEF", np.ones((31, 3)), r"31 bands; published tables have 24, 25, 29, 47\. Give the wavelengths"),
+        ("PEF", np.ones((31, 3)), r"31 bands; published tables have 24, 25, 29, 47\. Resample"),
         ("CRF", np.full((47, 3), np.nan), "negative or non-finite"),
         ("DG", np.full((3, 47), -1.0), "negative or non-finite"),
         ("CRF", np.full((47, 3), "x"), "a single array of numbers"),
@@ -127,13 +127,6 @@ def test_unreadable_and_missing_tables(tmp_path: Path) -> None:
     (tmp_path / "CRF.npy").unlink()
     with pytest.raises(CalibrationError, match=r"CRF\.npy does not exist"):
         load_tables(tmp_path)
-
-
-def test_other_wavelengths_can_be_given(tmp_path: Path) -> None:
-    _tables(tmp_path, CRF=np.ones((5, 3)), PEF=np.ones((5, 3)), DG=np.ones((3, 5)))
-    assert load_tables(tmp_path, [500, 510, 530, 540, 600]).response[0].wavelengths_nm[2] == 530
-    with pytest.raises(CalibrationError, match="5 bands, but 2 wavelengths"):
-        load_tables(tmp_path, [500, 510])
 
 
 def test_a_rig_without_first_orders_cannot_be_exported(tmp_path: Path) -> None:

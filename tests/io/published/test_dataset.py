@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import Cancelled, StoreError
 from dsl_core.io.published.dataset import export_dataset, open_dataset
-from dsl_core.io.published.layout import FileRecord, check_dataset
+from dsl_core.io.published.layout import FileRecord, survey
 from dsl_core.model.plan import CapturePlan, ScanLines, Setting, Shot
 from dsl_core.progress import CallbackProgress
 
@@ -45,26 +45,23 @@ def folder(tmp_path: Path) -> Path:
 
 
 def _table(folder: Path) -> dict[str, FileRecord]:
-    return {record.expected or str(record.found): record for record in check_dataset(folder, PLAN)}
+    return {record.expected or str(record.found): record for record in survey(folder, PLAN).records}
 
 
 @pytest.mark.parametrize("bayer", ["RGGB", "GBRG"])
 @pytest.mark.parametrize("bit_depth", [12, 16])
 def test_a_scan_comes_back_to_the_bit(tmp_path: Path, bayer: str, bit_depth: int) -> None:
-    points = np.random.default_rng(1).uniform(600, 900, (3, 7, 10))
     export_dataset(
         Memory(),
         tmp_path / "scene",
         bayer=bayer,  # type: ignore[arg-type]
         bit_depth=bit_depth,
-        points_mm=points,
     )
     scan = open_dataset(tmp_path / "scene", bayer=bayer, bit_depth=bit_depth)  # type: ignore[arg-type]
     assert scan.plan == PLAN
-    assert {record.status for record in scan.table} == {"ok"}
+    assert {record.status for record in scan.table} == {"ok", "optional"}
     for shot in scan.plan.shots():
         np.testing.assert_array_equal(scan.read(shot), Memory().read(shot))
-    np.testing.assert_allclose(scan.points_mm(), points, rtol=1e-6)
 
 
 def test_files_are_laid_out_as_published(folder: Path) -> None:
@@ -240,21 +237,6 @@ def test_a_truncated_body_is_an_error_and_no_picture(folder: Path) -> None:
         open_dataset(folder).read(shot)
 
 
-def test_points_without_depth_are_nan_and_wrong_files_refused(folder: Path) -> None:
-    points = np.full((7, 10, 3), 0.7)
-    points[0, 0], points[1, 1], points[2, 2, 0] = 0, -1, np.inf
-    np.save(folder / "depth.npy", points)
-    read = open_dataset(folder).points_mm()
-    assert np.argwhere(np.isnan(read[2])).tolist() == [[0, 0], [1, 1], [2, 2]]
-    assert np.nanmax(np.abs(read - 700)) < 1e-3
-    np.save(folder / "depth.npy", points[..., 0])
-    with pytest.raises(StoreError, match=r"has shape \(7, 10\); \(7, 10, 3\) is needed"):
-        open_dataset(folder).points_mm()
-    (folder / "depth.npy").write_bytes(b"")
-    with pytest.raises(StoreError, match="cannot be read"):
-        open_dataset(folder).points_mm()
-
-
 def test_folders_that_are_no_dataset(tmp_path: Path, folder: Path) -> None:
     with pytest.raises(StoreError, match="is not a folder"):
         open_dataset(tmp_path / "nowhere")
@@ -264,9 +246,6 @@ def test_folders_that_are_no_dataset(tmp_path: Path, folder: Path) -> None:
     (folder / "plan.json").write_text("{")
     with pytest.raises(StoreError, match="not a capture plan"):
         open_dataset(folder)
-    alien = Shot(0, "code", 99, 0, 1, 1)
-    with pytest.raises(StoreError, match="no code pattern 99"):
-        open_dataset(folder, PLAN).read(alien)
 
 
 def test_a_cancelled_export_leaves_nothing_and_replaces_nothing(tmp_path: Path, folder: Path) -> None:
