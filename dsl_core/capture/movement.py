@@ -15,6 +15,8 @@ from dsl_core.model.plan import Shot
 
 #: Pixels are averaged over blocks of this many rows and columns, so that noise does not pass for movement.
 BLOCK_PX = 8
+#: Changes of brightness or structure that a scan may continue with.
+ALLOWED = 0.03
 
 
 @dataclass(frozen=True)
@@ -28,12 +30,11 @@ class MovementReport:
     shots: tuple[int, ...]
     brightness_ratio: float
     change: float
-    limit: float
 
     @property
     def is_stable(self) -> bool:
         """Whether the scan may continue as one scan."""
-        return max(self.change, abs(self.brightness_ratio - 1.0)) <= self.limit
+        return max(self.change, abs(self.brightness_ratio - 1.0)) <= ALLOWED
 
     @property
     def message(self) -> str:
@@ -44,7 +45,7 @@ class MovementReport:
             return f"Nothing moved since the scan stopped ({seen})."
         return (
             f"The scene, the rig or the light changed since the scan stopped ({seen}, allowed"
-            f" {100 * self.limit:.1f} %). Start a new scan, or put everything back in place."
+            f" {100 * ALLOWED:.1f} %). Start a new scan, or put everything back in place."
         )
 
 
@@ -57,12 +58,7 @@ def pick_reference_shots(done: Iterable[Shot]) -> list[Shot]:
 
 
 def check_movement(
-    rig: DeviceRig,
-    source: FrameSource,
-    shots: Iterable[Shot],
-    pattern_image: PatternImage,
-    limit: float = 0.03,
-    policy: RetryPolicy | None = None,
+    rig: DeviceRig, source: FrameSource, shots: Iterable[Shot], pattern_image: PatternImage
 ) -> MovementReport:
     """Take ``shots`` again and compare them with the stored ones; nothing is stored.
 
@@ -72,7 +68,7 @@ def check_movement(
     chosen = list(shots)
     if not chosen:
         raise ValueError("a check for movement needs at least one shot that was captured before")
-    taker = ShotTaker(rig, source.plan, pattern_image, policy or RetryPolicy())
+    taker = ShotTaker(rig, source.plan, pattern_image, RetryPolicy())
     black_dn = rig.calibration.sensor.black_level_dn if rig.calibration else 0.0
     try:
         pairs = [
@@ -85,7 +81,7 @@ def check_movement(
     new_light = sum(float(new.sum()) for _, new in pairs)
     ratio = new_light / old_light if old_light > 0 else float("inf")
     change = max(_change(old * ratio, new) for old, new in pairs) if np.isfinite(ratio) else float("inf")
-    return MovementReport(tuple(shot.index for shot in chosen), ratio, change, limit)
+    return MovementReport(tuple(shot.index for shot in chosen), ratio, change)
 
 
 def _blocks(pixels: NDArray[np.uint16]) -> NDArray[np.float64]:

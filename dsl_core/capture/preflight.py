@@ -21,12 +21,7 @@ def fit_plan(plan: CapturePlan, rig: DeviceRig) -> CapturePlan:
     if plan.settings == CapturePlan().settings:
         known = rig.calibration or projector
         plan = on_cycles(plan, known.frame_period_ms)
-    return plan.model_copy(
-        update={
-            "camera_size_px": (camera.width_px, camera.height_px),
-            "projector_size_px": (projector.width_px, projector.height_px),
-        }
-    )
+    return plan.sized(camera, projector)
 
 
 def find_obstacles(rig: DeviceRig, plan: CapturePlan) -> list[str]:

@@ -89,23 +89,22 @@ class Peak:
 
     centre_nm: float
     height: float
-    baseline: float
     fwhm_nm: float
     complete: bool
 
 
-def peak_width(wavelengths_nm: Floats, values: Floats, baseline: float | None = None) -> Peak:
+def peak_width(wavelengths_nm: Floats, values: Floats) -> Peak:
     """Full width at half maximum above a baseline, linear between samples, both arrays of shape (bands,).
 
-    The maximum is that of the samples, nothing is fitted. The baseline is the median of all samples
-    unless given, which is right for peaks narrower than half the bands. Where a flank does not come
+    The maximum is that of the samples, nothing is fitted. The baseline is the median of all samples, which is
+    right for peaks narrower than half the bands. Where a flank does not come
     down to half height, the other one counts twice and ``complete`` is false. Raises `DecodeError` for
     values that are not finite or a curve without a peak.
     """
     curve = np.asarray(values, np.float64)
     if not np.isfinite(curve).all():
         raise DecodeError("A spectrum with values that are not finite has no width; leave such pixels out.")
-    floor = float(np.median(curve)) if baseline is None else baseline
+    floor = float(np.median(curve))
     top = int(curve.argmax())
     half = (curve[top] + floor) / 2.0
     left = _half_width(wavelengths_nm[top::-1], curve[top::-1], half)
@@ -115,7 +114,7 @@ def peak_width(wavelengths_nm: Floats, values: Floats, baseline: float | None = 
         raise DecodeError("The spectrum does not fall to half its maximum, so it has no width.")
     low, high = flanks[0], flanks[-1]
     centre = float(wavelengths_nm[top]) + (high - low) / 2
-    return Peak(centre, float(curve[top]), floor, low + high, len(flanks) == 2)
+    return Peak(centre, float(curve[top]), low + high, len(flanks) == 2)
 
 
 def _half_width(wavelengths_nm: Floats, values: Floats, level: float) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Protocol, Self
 
 from pydantic import Field, model_validator
 
@@ -129,6 +129,18 @@ class Shot:
     level: float
 
 
+class Sized(Protocol):
+    """A lens or a device with so many pixels."""
+
+    @property
+    def width_px(self) -> int:
+        """Columns."""
+
+    @property
+    def height_px(self) -> int:
+        """Rows."""
+
+
 class CapturePlan(Record):
     """Everything a scan will do, known before it starts.
 
@@ -157,6 +169,14 @@ class CapturePlan(Record):
                 f"code_settings {self.code_settings} must name settings 0 to {len(self.settings) - 1}"
             )
         return self
+
+    def sized(self, camera: Sized, projector: Sized) -> Self:
+        """The same plan for the image sizes of a camera and a projector."""
+        sizes = {
+            "camera_size_px": (camera.width_px, camera.height_px),
+            "projector_size_px": (projector.width_px, projector.height_px),
+        }
+        return self.model_copy(update=sizes)
 
     @property
     def code_bits(self) -> tuple[int, int]:

@@ -95,7 +95,7 @@ def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: flo
 
 def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
     """All combinations on a rig, the published plan first."""
-    yield sized(CapturePlan(name="published"), rig)
+    yield CapturePlan(name="published").sized(rig.camera, rig.projector)
     for (name, spectral), bracket in product(pattern_sets(rig).items(), BRACKETS):
         settings = tuple(
             Setting(exposure_ms=cycles * rig.frame_period_ms, level=level) for cycles, level in bracket
@@ -108,7 +108,7 @@ def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
             settings=settings,
             code_settings=tuple(range(len(settings))),
         )
-        yield sized(plan, rig)
+        yield plan.sized(rig.camera, rig.projector)
 
 
 def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
@@ -123,16 +123,6 @@ def possible_plans(devices: DeviceRig, rig: Rig) -> list[CapturePlan]:
             f" {devices.name!r}: {'; '.join(found[0][1])}. Name a rig and a calibration of one kind."
         )
     return able
-
-
-def sized(plan: CapturePlan, rig: Rig) -> CapturePlan:
-    """A plan for the image sizes of a calibrated rig."""
-    return plan.model_copy(
-        update={
-            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
-            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
-        }
-    )
 
 
 def pattern_sets(rig: Rig) -> dict[str, SpectralSet]:

@@ -45,12 +45,7 @@ class Judge:
         response = rig.projector_response.model_copy(update={"black_fraction": 0.0})
         self.rig = rig.model_copy(update={"projector_response": response})
         self.grid = grid or WavelengthGrid()
-        self.plan = plan.model_copy(
-            update={
-                "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
-                "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
-            }
-        )
+        self.plan = plan.sized(rig.camera, rig.projector)
         self.spectra = training_spectra()
         self.view = self._places()
 

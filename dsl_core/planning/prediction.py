@@ -22,7 +22,6 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import Bands
 from dsl_core.planning import references
-from dsl_core.planning.references import References
 from dsl_core.planning.samples import SamplePixels, plane_samples
 from dsl_core.planning.virtual import Outcome, VirtualPixels
 from dsl_core.reconstruction.scan_result import DECIDED_FROM
@@ -75,28 +74,20 @@ def predict(
     view: SamplePixels | None = None,
     *,
     grid: WavelengthGrid | None = None,
-    palette: References | None = None,
-    binning: int = 1,
     latency_ms: float = 0.0,
     peaks: bool = True,
 ) -> Prediction:
     """Expected figures of a plan on a rig.
 
-    ``view`` is by default a plane at `REFERENCE_MM`, and ``palette`` the classic chart; a view of a quick
-    look brings its own spectra. Raises `PlanError` for plans without spectral patterns or binary code, and
+    ``view`` is by default a plane at `REFERENCE_MM` with the classic chart's spectra; a view of a quick look
+    brings its own. Raises `PlanError` for plans without spectral patterns or binary code, and
     patterns that do not fit.
     """
     if isinstance(plan.spectral, NoSpectral) or plan.code_count == 0:
         raise PlanError(f"The plan {plan.name!r} has no spectral patterns or no binary code to predict for.")
-    grid, rig = grid or WavelengthGrid(), binned(rig, binning)
-    plan = plan.model_copy(
-        update={
-            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
-            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
-        }
-    )
+    grid, plan = grid or WavelengthGrid(), plan.sized(rig.camera, rig.projector)
     with one_kernel_thread():
-        return _predict(rig, plan, view or plane_samples(rig, REFERENCE_MM), grid, palette, latency_ms, peaks)
+        return _predict(rig, plan, view or plane_samples(rig, REFERENCE_MM), grid, latency_ms, peaks)
 
 
 def _predict(
@@ -104,12 +95,11 @@ def _predict(
     plan: CapturePlan,
     view: SamplePixels,
     grid: WavelengthGrid,
-    palette: References | None,
     latency_ms: float,
     peaks: bool,
 ) -> Prediction:
     pixels = VirtualPixels(rig, plan, grid, view)
-    nodes = _nodes(view, pixels.bands, palette or references.chart())
+    nodes = _nodes(view, pixels.bands)
     outcome = pixels.run(nodes, *pixels.signals(torch.as_tensor(nodes, dtype=torch.float32)))
     nm = grid.centres_nm
     calm, rough = (_Errors.of(each, outcome, nm) for each in (outcome.unbiased, outcome.mean))
@@ -132,13 +122,12 @@ def _predict(
     )
 
 
-def _nodes(view: SamplePixels, bands: Bands, palette: References) -> Floats:
-    """True spectra (samples, spectra, internal bands): the view's own, or the palette everywhere."""
+def _nodes(view: SamplePixels, bands: Bands) -> Floats:
+    """True spectra (samples, spectra, internal bands): the view's own, or those of the chart everywhere."""
     if view.spectra is not None and view.wavelengths_nm is not None:
         rows = [np.interp(bands.centres_nm, view.wavelengths_nm, row) for row in view.spectra]
         return np.stack(rows)[:, None]
-    spectra = palette.at(bands.centres_nm)
-    return np.tile(spectra, (len(view.pixels), 1, 1))
+    return np.tile(references.chart().at(bands.centres_nm), (len(view.pixels), 1, 1))
 
 
 @dataclass(frozen=True)
@@ -181,27 +170,6 @@ def _width(rig: Rig, plan: CapturePlan, grid: WavelengthGrid, view: SamplePixels
         except DecodeError:  # too faint or too wide to have a half maximum
             continue
     return float(np.mean(widths)) if widths else None
-
-
-def binned(rig: Rig, factor: int) -> Rig:
-    """The rig with ``factor x factor`` pixels of a colour averaged into one; raises `PlanError`.
-
-    A mean of n values has n times the electrons a DN and a read noise smaller by the root of n; lenses see
-    the same field with fewer pixels. The black level and the full scale stay.
-    """
-    lens = rig.camera
-    if factor < 1 or min(lens.width_px, lens.height_px) // factor < 16:
-        raise PlanError(f"Binning by {factor} leaves too few of {lens.width_px} x {lens.height_px} pixels.")
-    if factor == 1:
-        return rig
-    sensor = rig.sensor.model_copy(
-        update={
-            "electrons_per_dn": rig.sensor.electrons_per_dn * factor**2,
-            "read_noise_dn": rig.sensor.read_noise_dn / factor,
-        }
-    )
-    camera = lens.resized(lens.width_px // factor // 2 * 2, lens.height_px // factor // 2 * 2)
-    return rig.model_copy(update={"camera": camera, "sensor": sensor})
 
 
 def computing_seconds(plan: CapturePlan, grid: WavelengthGrid, cores: int = 2) -> float:

@@ -84,8 +84,6 @@ class SmoothSolution:
 
     values: Floats
     covariance: Floats
-    amplitude: float
-    length: float
     noise_factor: float
     prior: Floats
     log_evidence: float
@@ -112,18 +110,11 @@ def solve_smooth(
     noise_factors: Sequence[float] = NOISE_FACTORS,
 ) -> SmoothSolution:
     """Functions, one after the other, then single unknowns of given prior deviation, from their equations."""
-    best: SmoothSolution | None = None
-    for length in lengths:
-        for amplitude in amplitudes:
-            prior = _prior(functions, others_std, amplitude, length)
-            for factor in noise_factors:
-                found = solve_given(equations, prior, factor)
-                if best is None or found.log_evidence > best.log_evidence:
-                    best = SmoothSolution(
-                        found.values, found.covariance, amplitude, length, factor, prior, found.log_evidence
-                    )
-    assert best is not None
-    return best
+    priors = (
+        _prior(functions, others_std, amplitude, length) for length in lengths for amplitude in amplitudes
+    )
+    found = (solve_given(equations, prior, factor) for prior in priors for factor in noise_factors)
+    return max(found, key=lambda solution: solution.log_evidence)
 
 
 def solve_given(equations: Equations, prior: Floats, noise_factor: float) -> SmoothSolution:
@@ -136,7 +127,7 @@ def solve_given(equations: Equations, prior: Floats, noise_factor: float) -> Smo
     explained = float(values @ equations.right) * precision
     misfit = equations.square * precision - explained
     log_evidence = -0.5 * (log_determinant(system) + misfit + 2 * equations.count * np.log(noise_factor))
-    return SmoothSolution(values, covariance, np.nan, np.nan, noise_factor, prior, float(log_evidence))
+    return SmoothSolution(values, covariance, noise_factor, prior, float(log_evidence))
 
 
 def _prior(

@@ -18,12 +18,13 @@ from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sett
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.planning.prediction import Prediction, binned, predict
+from dsl_core.planning.prediction import Prediction, predict
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.sim_devices import LATENCY_MS
 from tests.benchmarks.common import options, print_table, write_json
 from tests.benchmarks.front_cases import front_cases
 from tests.benchmarks.sweep import Case, Point, run_sweep, write_csv
+from tests.cases.binning import binned
 from tests.cases.trial import trial_samples
 
 PERIOD_MS = 1000 / 60
@@ -69,9 +70,9 @@ def all_cases(rig: Rig) -> list[Case]:
 
 
 def _predict(rig: Rig, case: Case) -> Prediction:
-    view = trial_samples(binned(rig, case.binning), references.chart())
-    grid = WavelengthGrid(step_nm=case.step_nm)
-    return predict(rig, case.plan, view, grid=grid, binning=case.binning, latency_ms=LATENCY_MS)
+    rig = binned(rig, case.binning)
+    view, grid = trial_samples(rig, references.chart()), WavelengthGrid(step_nm=case.step_nm)
+    return predict(rig, case.plan, view, grid=grid, latency_ms=LATENCY_MS)
 
 
 def main() -> None:

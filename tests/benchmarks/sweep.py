@@ -20,8 +20,8 @@ from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.planning import references
-from dsl_core.planning.prediction import binned
 from dsl_core.progress import NoProgress, Progress
+from tests.cases.binning import binned
 from tests.cases.trial import run_trial
 
 #: Part of every key: points measured by another method than today's are measured again.

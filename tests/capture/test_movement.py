@@ -72,9 +72,9 @@ def test_fading_and_motion_are_found(change: Change, brightness_ratio: float) ->
 
 
 def test_a_report_states_both_changes_in_percent() -> None:
-    moved = MovementReport((7,), brightness_ratio=0.9, change=0.25, limit=0.03).message
+    moved = MovementReport((7,), brightness_ratio=0.9, change=0.25).message
     assert "brightness changed by -10.0 %, structure by 25.0 %, allowed 3.0 %" in moved
-    still = MovementReport((7,), brightness_ratio=1.01, change=0.004, limit=0.03).message
+    still = MovementReport((7,), brightness_ratio=1.01, change=0.004).message
     assert "brightness changed by +1.0 %, structure by 0.4 %" in still
 
 

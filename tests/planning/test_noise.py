@@ -9,7 +9,6 @@ import torch
 from dsl_core.model.plan import CapturePlan, Setting
 from dsl_core.optics.demosaic import demosaic_variance
 from dsl_core.planning.noise import Bracket, demosaic_factors, own_channel
-from dsl_core.planning.prediction import binned
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, setting_gains_ms
 from tests.cases.small_rig import small_rig
 
@@ -46,13 +45,3 @@ def test_factors_are_those_of_demosaicing() -> None:
     variance = demosaic_variance(np.ones((height, width), np.float32), rig.sensor.bayer).reshape(3, -1)
     assert np.allclose(demosaic_factors(rig, pixels), variance[:, pixels].T)
     assert own_channel(rig, pixels).tolist() == [0, 1, 1, 2]
-
-
-def test_binning_keeps_the_field_and_lowers_the_noise() -> None:
-    rig = small_rig()
-    half = binned(rig, 2)
-    assert half.camera.width_px == rig.camera.width_px // 2 // 2 * 2
-    assert half.camera.fx_px / half.camera.width_px == pytest.approx(
-        rig.camera.fx_px / rig.camera.width_px, rel=0.01
-    )
-    assert half.sensor.electrons_per_dn == 4 * rig.sensor.electrons_per_dn

@@ -38,12 +38,10 @@ class ChartPose:
     ``corners_px`` (4, 2) are column and row of the outer corners of the grid of patches: at the first
     patch (dark skin), the sixth (bluish green), the last (black) and the nineteenth (white).
     ``quarter_turns`` says how far the chart is turned clockwise, to the nearest right angle.
-    ``colour_distance`` is the mean logarithmic distance of the patches' colours from those expected.
     """
 
     corners_px: Floats
     quarter_turns: int
-    colour_distance: float
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def orient_chart(
         )
     along = corners[1] - corners[0]
     turns = round(float(np.degrees(np.arctan2(along[1], along[0]))) / 90) % 4
-    return ChartPose(corners, turns, float(distance))
+    return ChartPose(corners, turns)
 
 
 def patch_samples(corners_px: Floats, shape: tuple[int, int]) -> PatchSamples:

@@ -31,7 +31,7 @@ from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 
 CHART = "BabelColor Average"
-POSE = ChartPose(np.array([[10.0, 8.0], [130.0, 8.0], [130.0, 88.0], [10.0, 88.0]]), 0, 0.0)
+POSE = ChartPose(np.array([[10.0, 8.0], [130.0, 8.0], [130.0, 88.0], [10.0, 88.0]]), 0)
 PLANE = Plane(np.array([0.0, 0.1, 1.0]) / 700.0)
 
 

@@ -145,11 +145,7 @@ class ForecastJob:
 
     def _of(self, plan: CapturePlan, store: ForecastStore, preset: str) -> ForecastPoint | Refused:
         rig = self.rigging.rig
-        size = {
-            "camera_size_px": (rig.camera.width_px, rig.camera.height_px),
-            "projector_size_px": (rig.projector.width_px, rig.projector.height_px),
-        }
-        sized = plan.model_copy(update=size)
+        sized = plan.sized(rig.camera, rig.projector)
         known = store.find(sized)
         if known is not None:
             return ForecastPoint(plan, known, preset)
