@@ -11,7 +11,6 @@ change too little in a slice for the second; those that vary both ways are taken
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +23,8 @@ from dsl_core.simulation.rendering.order_tables import OrderTables
 from dsl_core.simulation.rendering.pattern_table import Edge, PatternTable, between
 from dsl_core.simulation.rendering.spectral_tables import NM, Slicing
 
+#: Slices times pixels that are worked out at once: they stay in the cache of a core.
+BLOCK = 1 << 16
 #: Bands of white columns: start and stop (px), level 0..1.
 Runs = list[tuple[float, float, float]]
 
@@ -64,67 +65,74 @@ def add_band(
 
 
 def order_light(
-    tables: OrderTables,
-    table: PatternTable,
-    led: int,
-    of_led: slice,
-    material_channel: Tensor,
-    slicing: Slicing,
+    tables: OrderTables, table: PatternTable, material_channel: Tensor, slicing: Slicing
 ) -> Tensor:
-    """Light of an order on its active pixels, (A,), for one of the pattern's LEDs.
+    """Light of an order on its active pixels, (A,), of all of the projector's LEDs.
 
-    ``of_led`` are the LEDs of the projector that show it.
+    All slices of a block of pixels are worked out at once: small pictures would otherwise pay for thousands
+    of tiny operations, and large ones for memory.
     """
     step = slicing.rows_nm if table.has_rows and not table.along_rows else slicing.nm
     slices = tables.spectra.slices[step]
-    weights, tilts = slices.mean[:, of_led].sum(1), slices.tilt[:, of_led].sum(1)
-    material = material_channel[tables.active]
-    total = torch.zeros_like(tables.middle_px)
-    strongest = weights.amax(1)
-    used = torch.nonzero(strongest >= slicing.floor * strongest.max()).ravel().tolist()
-    for i, mean, place in _stretches(tables, table, led, step, used):
-        total.addcmul_(mean, weights[i][material])
-        if place is not None:
-            total.addcmul_(place, tilts[i][material])
+    lit = []
+    for led, of_led in enumerate(table.leds_shown):
+        mean, tilt = slices.mean[:, of_led].sum(1), slices.tilt[:, of_led].sum(1)
+        strongest = mean.amax(1)
+        used = torch.nonzero(strongest >= slicing.floor * strongest.max()).ravel()
+        lit.append((led, slice(int(used[0]), int(used[-1]) + 1), mean, tilt))
+    edges_nm = np.arange(NM[0], NM[-1] + 1, step)
+    total = torch.empty_like(tables.middle_px)
+    pixels = max(BLOCK // len(edges_nm), 1)
+    for start in range(0, len(total), pixels):
+        part = slice(start, start + pixels)
+        stretches = _Stretches(tables, table, edges_nm, part)
+        material = material_channel[tables.active[part]]
+        total[part] = sum(stretches.light(led, used, mean, tilt, material) for led, used, mean, tilt in lit)
     return total
 
 
-def _stretches(
-    tables: OrderTables, table: PatternTable, led: int, step: int, used: list[int]
-) -> Iterator[tuple[int, Tensor, Tensor | None]]:
-    """What slices see of a pattern: its mean, and the mean of it times the place in the slice, -1 to 1."""
-    nodes = chebyshev_nodes(NM[0], NM[-1])
-    edges_nm = np.arange(NM[0], NM[-1] + 1, step)
-    centres_nm = 0.5 * (edges_nm[1:] + edges_nm[:-1])
-    to_edges = like(interpolation_matrix(nodes, edges_nm), tables.middle_px)
-    to_centres = like(interpolation_matrix(nodes, centres_nm), tables.middle_px)
-    low, high = float(tables.limits_nm[0].max()), float(tables.limits_nm[1].min())
-    stop: Edge | None = None
-    last = -2
-    for i in used:
-        place: Tensor | None
+class _Stretches:
+    """Where the edges of slices (nm) of a part of an order's pixels are on a pattern."""
+
+    def __init__(
+        self, tables: OrderTables, table: PatternTable, edges_nm: NDArray[np.float64], part: slice
+    ) -> None:
+        nodes = chebyshev_nodes(NM[0], NM[-1])
+        to_edges = like(interpolation_matrix(nodes, edges_nm), tables.middle_px)
+        self._table = table
+        self._columns = to_edges @ tables.node_columns[:, part]
         if table.along_rows:
-            columns = [to_edges[k] @ tables.node_columns for k in (i, i + 1)]
-            rows = [to_edges[k] @ tables.node_rows for k in (i, i + 1)]
-            # Rows change so little in a slice that it does not matter where in it.
-            mean = table.mean_of_rows(led, rows[0], rows[1]) * table.inside(columns[0], columns[1])
-            place = None
+            self._rows = to_edges @ tables.node_rows[:, part]
         elif table.has_rows:
-            columns = [to_edges[k] @ tables.node_columns for k in (i, i + 1)]
-            row = to_centres[i] @ tables.node_rows
-            mean, place = table.mean_between(led, columns[0], columns[1], row), None
-        else:
-            start = stop if stop is not None and last == i - 1 else None
-            start = start or table.edge(led, to_edges[i] @ tables.node_columns)
-            stop, last = table.edge(led, to_edges[i + 1] @ tables.node_columns), i
-            mean, place = between(start, stop)
-        if not table.along_rows and not (low <= edges_nm[i] and edges_nm[i + 1] <= high):
-            share = _share_within(tables.limits_nm, float(edges_nm[i]), float(edges_nm[i + 1]))
-            mean, place = mean * share, None if place is None else place * share
-        yield i, mean, place
+            centres_nm = 0.5 * (edges_nm[1:] + edges_nm[:-1])
+            self._rows = (
+                like(interpolation_matrix(nodes, centres_nm), self._columns) @ tables.node_rows[:, part]
+            )
+        self._limits_nm = tables.limits_nm[0][part], tables.limits_nm[1][part]
+        self._edges_nm = like(edges_nm, self._columns)[:, None]
 
+    def light(self, led: int, used: slice, weights: Tensor, tilts: Tensor, material: Tensor) -> Tensor:
+        """Light of the slices ``used`` of an LED, (pixels,), with weights and tilts (slices, materials)."""
+        mean, place = self._means(led, used)
+        total = mean * weights[used].index_select(1, material)
+        if place is not None:
+            total.addcmul_(place, tilts[used].index_select(1, material))
+        low, high = self._limits_nm
+        edges = self._edges_nm[used.start : used.stop + 1]
+        if not self._table.along_rows and bool((low > edges[0]).any() | (high < edges[-1]).any()):
+            # Share of each slice between the limits of each pixel's wavelengths.
+            start, stop = (torch.clip(limit, edges[:-1], edges[1:]) for limit in self._limits_nm)
+            total *= stop.sub_(start).clip_(min=0).div_(edges[1:] - edges[:-1])
+        return total.sum(0)
 
-def _share_within(limits_nm: tuple[Tensor, Tensor], start_nm: float, stop_nm: float) -> Tensor:
-    """Share of a slice between the limits of each pixel's wavelengths, (A,)."""
-    low, high = (limit.clip(start_nm, stop_nm) for limit in limits_nm)
-    return (high - low).clip(min=0) / (stop_nm - start_nm)
+    def _means(self, led: int, used: slice) -> tuple[Tensor, Tensor | None]:
+        """Mean of the pattern in slices, and mean of it times the place in the slice, -1 to 1."""
+        table, ends = self._table, self._columns[used.start : used.stop + 1]
+        if table.along_rows:
+            rows = self._rows[used.start : used.stop + 1]
+            # Rows change so little in a slice that it does not matter where in it.
+            return table.mean_of_rows(led, rows[:-1], rows[1:]) * table.inside(ends[:-1], ends[1:]), None
+        if table.has_rows:
+            return table.mean_between(led, ends[:-1], ends[1:], self._rows[used]), None
+        edges = table.edge(led, ends)
+        return between(Edge(*(at[:-1] for at in edges)), Edge(*(at[1:] for at in edges)))

@@ -95,6 +95,11 @@ class PatternTable:
         return len(self.blurred)
 
     @property
+    def leds_shown(self) -> tuple[slice, ...]:
+        """The projector's LEDs that show each of the pattern's."""
+        return (slice(0, 3),) if self.leds == 1 else tuple(slice(i, i + 1) for i in range(3))
+
+    @property
     def along_rows(self) -> bool:
         """Whether the pattern varies along rows only."""
         return self.across is not None
@@ -124,10 +129,10 @@ class PatternTable:
         assert second is not None
         kept = self.oversample[0]
         samples = (at + 0.5) * kept
-        reached = _lookup(first[led], samples, None)
+        reached, own = _lookups((first[led], second[led]), samples)
         # Beyond the frame there is no light: the integral is constant, and its own integral still rises.
-        beyond = (samples - (first.shape[2] - 1)).clip(min=0) / kept
-        return Edge(at, reached, _lookup(second[led], samples, None) + reached * beyond)
+        beyond = samples.sub_(first.shape[2] - 1).clip_(min=0).mul_(1 / kept)
+        return Edge(at, reached, own.add_(beyond.mul_(reached)))
 
     def mean_of_rows(self, led: int, start: Tensor, stop: Tensor) -> Tensor:
         """Mean along rows (px), zero outside the frame; for patterns that vary along rows only."""
@@ -165,13 +170,20 @@ def between(start: Edge, stop: Edge) -> tuple[Tensor, Tensor]:
 
 def _lookup(table: Tensor, position: Tensor, offset: Tensor | None) -> Tensor:
     """Linear interpolation in a table (rows, samples), the row given by the offset of its first sample."""
-    p = position.clip(0, table.shape[1] - 1.001)
+    return _lookups((table,), position, offset)[0]
+
+
+def _lookups(tables: tuple[Tensor, ...], position: Tensor, offset: Tensor | None = None) -> list[Tensor]:
+    """`_lookup` in tables of the same shape."""
+    p = position.clip(0, tables[0].shape[1] - 1.001)
     index = p.int()
     p -= index
     if offset is not None:
         index += offset
-    flat = table.reshape(-1)
-    return torch.lerp(flat.index_select(0, index), flat.index_select(0, index + 1), p)
+    index, after, p = index.reshape(-1), (index + 1).reshape(-1), p.reshape(-1)
+    flat = (table.reshape(-1) for table in tables)
+    ends = ((table.index_select(0, index), table.index_select(0, after)) for table in flat)
+    return [torch.lerp(low, high, p).reshape(position.shape) for low, high in ends]
 
 
 def _radiance(levels: NDArray[np.uint8], response: ProjectorResponse) -> NDArray[np.float64]:

@@ -174,19 +174,15 @@ class Renderer:
             add_band(signal, tables, self.material_channel, start, stop, radiance)
 
     def _sliced(self, table: PatternTable) -> Tensor:
-        leds = [slice(0, 3)] if table.leds == 1 else [slice(i, i + 1) for i in range(3)]
         signal = torch.zeros_like(self.column)
-        tasks: list[tuple[OrderTables, PatternTable, int, slice]] = []
-        for led, of_led in enumerate(leds):
-            zero = self.zero_table[of_led].sum(0)[self.material_channel]
+        for led, shown in enumerate(table.leds_shown):
+            zero = self.zero_table[shown].sum(0)[self.material_channel]
             signal += zero * table.at(led, self.column, self.row)
-            tasks += [(tables, table, led, of_led) for tables in self.orders if len(tables.active)]
+        orders = [tables for tables in self.orders if len(tables.active)]
         # Orders are independent, so each core takes its share of them.
         with ThreadPoolExecutor(THREADS) as pool:
-            parts = pool.map(
-                lambda t: order_light(t[0], t[1], t[2], t[3], self.material_channel, self.slicing), tasks
-            )
-            for (tables, *_), part in zip(tasks, parts, strict=True):
+            parts = pool.map(lambda t: order_light(t, table, self.material_channel, self.slicing), orders)
+            for tables, part in zip(orders, parts, strict=True):
                 signal[tables.active] += part
         return signal
 
