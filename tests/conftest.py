@@ -13,7 +13,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def _written(_: object) -> None:
+def _written(fd: object) -> None:
     """No test pulls the plug, and waiting for the disk would take a tenth of the suite's time.
 
     The tests that need `os.fsync` to be called or to fail put their own in its place.
