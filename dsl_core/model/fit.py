@@ -24,6 +24,7 @@ Part = Literal[
     "bands",
     "coverage",
     "geometry",
+    "lateral colour",
 ]
 
 #: The parts as a sentence names them.
@@ -38,6 +39,7 @@ PARTS: dict[Part, str] = {
     "bands": "the width of the bands",
     "coverage": "the part of the picture that was measured",
     "geometry": "the geometry",
+    "lateral colour": "the lateral colour of the lenses",
 }
 
 

@@ -13,6 +13,7 @@ from dsl_core.model.calibration.accepted import CalibrationNote
 from dsl_core.model.conditions import BayerPattern as BayerPattern
 from dsl_core.model.conditions import CaptureConditions
 from dsl_core.model.geometry import Lens, Pose
+from dsl_core.model.lateral_colour import LateralColour
 from dsl_core.model.line_spread import LineSpread, Spread
 from dsl_core.model.spectral import SpectralCurve
 
@@ -210,6 +211,7 @@ class Rig(Record):
     relative gain if it has a ``flat_field``, and the efficiency of order zero equal to one by definition.
     ``conditions`` are the settings under which all this holds, None where nobody noted them; ``calibrations``
     say when each part was found and how well.
+    ``lateral_colour`` is that of both lenses, None where nothing is known of it.
     ``residual`` corrects the columns of the grating equation; ``correspondence`` is the data-driven model.
     ``geometry_covariance`` is that of the 24 parameters of lenses and pose (see `GeometryCalibration`).
     ``white_scale_rel_std`` and, for each wavelength, ``chain_rel_std`` are relative standard deviations that
@@ -237,6 +239,7 @@ class Rig(Record):
     correspondence: CorrespondenceGrid | None = None
     residual: ColumnResidual | None = None
     flat_field: FlatField | None = None
+    lateral_colour: LateralColour | None = None
     geometry_covariance: tuple[float, ...] | None = None
     provenance: Provenance = Provenance()
     conditions: CaptureConditions | None = None

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.errors import CalibrationError
-from dsl_core.model.rig import CorrespondenceGrid, Rig
+from dsl_core.model.rig import BayerPattern, CorrespondenceGrid, Rig
+from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.column_residual import residual_columns
 from dsl_core.optics.grating import FilmFrame, Vectors, incoming_direction
 from dsl_core.optics.pinhole import pixel_rays, project
@@ -61,16 +62,43 @@ def _rays_in_projector(rig_key: tuple[object, ...], device: torch.device, dtype:
     return torch.as_tensor(np.ascontiguousarray(rays), device=device, dtype=dtype)
 
 
+@lru_cache(maxsize=8)
+def _mosaic(bayer: BayerPattern, height: int, width: int) -> Tensor:
+    """Colour, 0 to 2, of every pixel of a picture, flat."""
+    return torch.as_tensor(bayer_colours(bayer, *np.divmod(np.arange(height * width), width)))
+
+
+def _of_colour(values: tuple[float, float, float], rig: Rig, pixels: Tensor, other: Tensor) -> Tensor:
+    """That of three values which belongs to the colour of each pixel."""
+    colours = _mosaic(rig.sensor.bayer, rig.camera.height_px, rig.camera.width_px)[pixels.cpu()]
+    return like(np.array(values), other)[colours.to(other.device)]
+
+
 def projector_points(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> Vectors:
     """Points seen by flat pixel indices at a depth, in projector coordinates (mm), shape of ``depth_mm``."""
     rays = _rays_in_projector((rig.camera, rig.pose), depth_mm.device, depth_mm.dtype)[:, pixels]
     t = rig.pose.translation_mm
+    if rig.lateral_colour is not None:
+        # A colour that the camera's lens magnifies comes from nearer to its axis, which is where z is.
+        axis = like(rig.pose.matrix[:, 2], rays)[:, None]
+        rays = axis + (rays - axis) / (1 + _of_colour(rig.lateral_colour.camera, rig, pixels, rays))
     return Vectors(*(rays[i] * depth_mm + t[i] for i in range(3)))
 
 
 def zero_order(rig: Rig, pixels: Tensor, depth_mm: Tensor) -> tuple[Tensor, Tensor]:
     """Projector column and row (px) of the zero order: conventional structured light, seed Eq. (11)."""
-    return project(rig.projector, *projector_points(rig, pixels, depth_mm))
+    column, row = project(rig.projector, *projector_points(rig, pixels, depth_mm))
+    if rig.lateral_colour is None:
+        return column, row
+    return _magnified(
+        rig, column, row, _of_colour(rig.lateral_colour.projector_of_white, rig, pixels, column)
+    )
+
+
+def _magnified(rig: Rig, column: Tensor, row: Tensor, by: Tensor) -> tuple[Tensor, Tensor]:
+    """Projector pixels of light that the projector's lens magnifies by a share more than calibrated."""
+    lens = rig.projector
+    return column + (column - lens.cx_px) * by, row + (row - lens.cy_px) * by
 
 
 def triangulate(rig: Rig, pixels: Tensor, column_px: Tensor) -> tuple[Tensor, Tensor]:
@@ -165,9 +193,11 @@ class GratingModel:
         for i in range(0, len(pixels), CHUNK):
             part = slice(i, i + CHUNK)
             point = projector_points(self.rig, pixels[part], depth_mm[part])
-            columns[:, part], rows[:, part] = project(
-                self.rig.projector, *incoming_direction(self.film, point, order, nm)
-            )
+            seen = project(self.rig.projector, *incoming_direction(self.film, point, order, nm))
+            if self.rig.lateral_colour is not None:
+                magnified = like(self.rig.lateral_colour.projector(wavelengths_nm), depth_mm)[:, None]
+                seen = _magnified(self.rig, *seen, magnified)
+            columns[:, part], rows[:, part] = seen
         return Footprint(columns, rows)
 
     def trace(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import DEPTH_INVALID, REASONS, Flag
 from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import triangulate
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.patterns.gray_code import DecodedCode
@@ -57,6 +59,29 @@ class Geometry:
     offset_std: NDArray[np.float32]
     flags: NDArray[np.uint16]
     surface: Surface
+
+    def by(self, rig: Rig, column_error_px: NDArray[np.floating], window_px: int | None = None) -> Geometry:
+        """Depth and surface from the same columns with another rig.
+
+        ``column_error_px`` (rows, columns) is what their deviation has to hold besides; other arguments are
+        those of `reconstruct_geometry`.
+        """
+        good = np.flatnonzero(np.isfinite(self.depth_mm))
+        column = torch.as_tensor(self.column_px.ravel()[good], dtype=torch.float64)
+        found, slope = (v.numpy() for v in triangulate(rig, torch.as_tensor(good), column))
+        std_px = np.hypot(self.column_std_px, column_error_px).astype(np.float32)
+        depth, depth_std = np.full_like(self.depth_mm, np.nan), np.full_like(self.depth_std_mm, np.nan)
+        depth.ravel()[good], depth_std.ravel()[good] = found, slope * std_px.ravel()[good]
+        surface = reconstruct_surface(rig, depth, depth_std, window_px)
+        edge = np.where(surface.edge, int(Flag.DEPTH_EDGE), 0).astype(np.uint16)
+        return replace(
+            self,
+            column_std_px=std_px,
+            depth_mm=depth,
+            depth_std_mm=depth_std,
+            surface=surface,
+            flags=(self.flags & ~np.uint16(int(Flag.DEPTH_EDGE))) | edge,
+        )
 
     def points_mm(self, rig: Rig) -> NDArray[np.float32]:
         """Points in camera coordinates, (3, rows, columns), NaN where there is no depth."""

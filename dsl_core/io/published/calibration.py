@@ -36,6 +36,7 @@ TABLE_FOLDER = Path("dataset", "image_formation")
 _MEASURED_OF_BASE = {
     "residual": "residual columns",
     "flat_field": "flat field",
+    "lateral_colour": "lateral colour",
     "geometry_covariance": "covariance of lenses and pose",
     "column_std_px": "uncertainty of columns",
     "chain_rel_std": "uncertainty of the spectra",

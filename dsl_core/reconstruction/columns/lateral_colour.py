@@ -1,0 +1,149 @@
+"""Lateral colour of both lenses as a scan itself shows it.
+
+Neighbours of a row in the colour mosaic see the same lines in other colours. On smooth surfaces the column of
+a pixel is half way between those of its neighbours, unless lenses magnify their colours differently: then the
+columns of one colour are displaced by a share of the distance from the axes, with the other sign where
+colours change places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.lateral_colour import SHARES, LateralColour
+from dsl_core.model.rig import Rig
+from dsl_core.optics.colour_neighbours import bayer_colours
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import chain_response
+
+Floats = NDArray[np.float64]
+#: Distance of red and blue that matters, rms over the picture, px of the projector.
+MOST_APART_PX = 0.004
+#: How many deviations it must be away from zero.
+SIGMAS = 4.0
+#: How much less sure sums are than neighbours' columns seem to be, as each column is in three of them.
+SHARED = (8 / 3) ** 0.5
+#: Rows that are looked at have about so many pixels in all; with fewer than the second nobody can tell.
+PIXELS, FEWEST = 60_000, 1000
+#: A pixel that is farther than this from the middle of its neighbours is at an edge, px.
+EDGE_PX = 0.5
+#: Rounds of weights that lessen pixels which do not fit.
+ROUNDS = 6
+#: Deviation of the mean wavelength of one colour between materials, nm.
+MATERIAL_NM = 15.0
+#: Wavelengths of white light, nm.
+_WHITE_NM = np.arange(400.0, 701.0, 5.0)
+_GREEN, _BLUE = 1, 2
+
+
+@dataclass(frozen=True)
+class LateralFit:
+    """Lateral colour, and the distance of red and blue, rms over the picture, with its deviation (px)."""
+
+    colour: LateralColour
+    apart_px: float
+    apart_std_px: float
+
+    @property
+    def present(self) -> bool:
+        """Whether it matters and is not chance."""
+        return self.apart_px > max(MOST_APART_PX, SIGMAS * self.apart_std_px)
+
+
+def own_lateral_colour(
+    rig: Rig, lines: LineSet | None, column_px: NDArray[np.floating], refined: NDArray[np.bool_]
+) -> LateralFit | None:
+    """Lateral colour from columns (rows, columns) where lines refined them; None where too few did.
+
+    Nor is there any of other patterns, nor of a rig whose calibration holds it.
+
+    Unknown are the camera's magnifications of red and of blue against green, and the projector's per nm.
+    """
+    if lines is None or not lines.single or rig.lateral_colour is not None:
+        return None
+    white = white_nm(rig)
+    seen = _bends(rig, np.where(refined, column_px, np.nan).astype(np.float64))
+    if seen is None:
+        return None
+    bend_px, sign, blue, camera_px, projector_px = seen
+    step_nm = np.where(blue, white[_BLUE] - white[_GREEN], white[0] - white[_GREEN])
+    design = sign[:, None] * np.stack([-camera_px * ~blue, -camera_px * blue, projector_px * step_nm], 1)
+    weight = np.ones_like(bend_px)
+    for _ in range(ROUNDS):
+        heavy = design * weight[:, None]
+        inverse = np.linalg.pinv(heavy.T @ design, hermitian=True)
+        found = inverse @ (heavy.T @ bend_px)
+        residual = bend_px - design @ found
+        scatter = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
+        weight = 1 / (1 + (residual / (3 * scatter)) ** 2) ** 2
+    covariance = inverse * (SHARED * scatter) ** 2
+    apart = np.stack([-camera_px, camera_px, projector_px * (white[0] - white[_BLUE])], 1)
+    noise = float(np.mean(np.einsum("np,pq,nq->n", apart, covariance, apart)))
+    square = float(np.mean((apart @ found) ** 2))
+    green = -SHARES[0] * found[0] - SHARES[2] * found[1]
+    colour = LateralColour(
+        camera=(float(found[0] + green), float(green), float(found[1] + green)),
+        projector_per_nm=float(found[2]),
+        white_nm=white,
+    )
+    return LateralFit(colour, max(square - noise, 0.0) ** 0.5, noise**0.5)
+
+
+def white_nm(rig: Rig) -> tuple[float, float, float]:
+    """Mean wavelength of the projector's white as each colour of the camera sees it, nm."""
+    light = chain_response(rig, 0, _WHITE_NM).sum(1)
+    red, green, blue = (light @ _WHITE_NM / light.sum(1)).tolist()
+    return red, green, blue
+
+
+def material_std_px(rig: Rig, column_px: NDArray[np.floating]) -> NDArray[np.float64]:
+    """How far a column may be displaced as the colour of a material is not that of white, px."""
+    known = rig.lateral_colour
+    per_nm = 0.0 if known is None else known.projector_per_nm
+    return np.asarray(np.abs(per_nm * (column_px - rig.projector.cx_px)) * MATERIAL_NM, np.float64)
+
+
+def lateral_finding(found: LateralFit) -> FitFinding:
+    """What the scan says about the lateral colour of its lenses."""
+    return FitFinding(
+        part="lateral colour",
+        name="distance of red and blue",
+        value=found.apart_px,
+        std=found.apart_std_px,
+        unit="px",
+        limit=MOST_APART_PX,
+        significant=found.present,
+        sentence=(
+            f"Red and blue light of a line lie {found.apart_px:.4f} ± {found.apart_std_px:.4f} columns apart:"
+            " lenses magnify colours differently. Depth and spectra of this result are corrected for it."
+        ),
+        advice="Use lenses with less lateral colour, or the middle of the picture.",
+    )
+
+
+def _bends(rig: Rig, column_px: Floats) -> tuple[Floats, Floats, NDArray[np.bool_], Floats, Floats] | None:
+    """How far columns are from the middle of their neighbours in a row, px, flat over pixels on surfaces.
+
+    With it the sign, +1 where green is on both sides and -1 where it is between; whether the other colour is
+    blue; and the distance from the axes of camera and projector in columns.
+    """
+    height, width = column_px.shape
+    pairs = max(height * width // PIXELS, 1)
+    rows = np.flatnonzero(np.arange(height) // 2 % pairs == 0)
+    q = column_px[rows]
+    colours = bayer_colours(rig.sensor.bayer, rows[:, None], np.arange(width)[None])
+    own, other = colours[:, 1:-1], colours[:, :-2]
+    bend, slope = q[:, 1:-1] - 0.5 * (q[:, :-2] + q[:, 2:]), 0.5 * (q[:, 2:] - q[:, :-2])
+    with np.errstate(invalid="ignore"):
+        good = np.abs(bend) < EDGE_PX
+    if np.count_nonzero(good) < FEWEST:
+        return None
+    camera = (np.arange(1, width - 1) - rig.camera.cx_px) * slope
+    sign = np.where(own == _GREEN, -1.0, 1.0)
+    blue = (own == _BLUE) | (other == _BLUE)
+    projector = q[:, 1:-1] - rig.projector.cx_px
+    return bend[good], sign[good], blue[good], camera[good], projector[good]

@@ -1,0 +1,107 @@
+"""Lateral colour found from the columns of neighbouring colours, and depth that is corrected for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core import pipeline
+from dsl_core.model.fit import Fit
+from dsl_core.model.lateral_colour import SHARES, LateralColour
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import triangulate, zero_order
+from dsl_core.optics.line_set import LineSet
+from dsl_core.reconstruction.columns.lateral_colour import material_std_px, own_lateral_colour, white_nm
+from dsl_core.simulation.sim_devices import open_twin
+from dsl_core.workflows import scans
+from tests.cases.twin_scan import capture
+
+LINES = LineSet.of(CapturePlan(spectral=ScanLines(width_px=5, step_px=2)))
+NOISE_PX = 0.01
+
+
+@pytest.fixture(scope="module")
+def rig() -> Rig:
+    found = open_twin({"size": "112x72"}).calibration
+    assert found is not None
+    return found
+
+
+def coloured(rig: Rig, strength: float) -> Rig:
+    colour = LateralColour(
+        camera=(strength, -strength / 2, 0.0), projector_per_nm=strength / 80, white_nm=white_nm(rig)
+    )
+    return rig.model_copy(update={"lateral_colour": colour})
+
+
+def columns(rig: Rig) -> np.ndarray:
+    """Columns over a slanted plane, with noise and a step."""
+    height, width = rig.camera.height_px, rig.camera.width_px
+    y, x = np.mgrid[:height, :width]
+    depth = 700 + 0.5 * x - 0.3 * y + 40 * (x > 70)
+    found = zero_order(rig, torch.arange(depth.size), torch.as_tensor(depth.ravel()))[0].numpy()
+    noise = np.random.default_rng(0).normal(0, NOISE_PX, depth.size)
+    return np.asarray((found + noise).reshape(depth.shape))
+
+
+def test_magnifications_of_both_lenses_are_told_apart(rig: Rig) -> None:
+    true = coloured(rig, 8e-4)
+    seen = columns(true)
+    found = own_lateral_colour(rig, LINES, seen, np.ones(seen.shape, bool))
+    assert found is not None
+    assert true.lateral_colour is not None
+    assert found.present
+    assert found.colour.camera == pytest.approx(true.lateral_colour.camera, abs=2e-4)
+    assert found.colour.projector_per_nm == pytest.approx(1e-5, rel=0.2)
+    assert np.dot(SHARES, found.colour.camera) == pytest.approx(0, abs=1e-12)
+    assert np.dot(SHARES, found.colour.projector_of_white) == pytest.approx(0, abs=1e-12)
+
+
+def test_lenses_without_it_are_left_alone(rig: Rig) -> None:
+    seen = columns(rig)
+    found = own_lateral_colour(rig, LINES, seen, np.ones(seen.shape, bool))
+    assert found is not None
+    assert not found.present
+    assert found.apart_px < 4 * found.apart_std_px
+    assert own_lateral_colour(rig, None, seen, np.ones(seen.shape, bool)) is None
+    assert own_lateral_colour(rig, LINES, seen, np.zeros(seen.shape, bool)) is None
+    assert own_lateral_colour(coloured(rig, 1e-3), LINES, seen, np.ones(seen.shape, bool)) is None
+
+
+def test_triangulation_undoes_what_lenses_do_to_colours(rig: Rig) -> None:
+    true = coloured(rig, 1e-3)
+    depth = torch.full((500,), 730.0, dtype=torch.float64)
+    pixels = torch.arange(500) * 13
+    column = zero_order(true, pixels, depth)[0]
+    assert triangulate(true, pixels, column)[0].numpy() == pytest.approx(730, abs=1e-4)
+    assert np.ptp(triangulate(rig, pixels, column)[0].numpy()) > 0.5
+
+
+def test_columns_are_unsure_by_the_colours_of_materials(rig: Rig) -> None:
+    at = np.array([rig.projector.cx_px, rig.projector.cx_px - 100.0])
+    assert material_std_px(rig, at) == pytest.approx([0, 0])
+    assert material_std_px(coloured(rig, 8e-4), at) == pytest.approx([0, 0.015])
+
+
+def test_a_scan_through_such_lenses_is_corrected_and_says_so() -> None:
+    plan = CapturePlan(code=GrayCode(rows=False), spectral=ScanLines(width_px=5, step_px=2))
+    devices = open_twin({"size": "64x48", "scene": "color-checker", "foreign": "lateral-colour"})
+    scan, truth = capture(devices, plan), scans.twin_truth(devices, pipeline.Options().grid)
+    assert devices.calibration is not None
+    assert truth is not None
+    assert truth.depth_mm is not None
+    errors = {}
+    for as_calibrated in (True, False):
+        options = pipeline.Options(spectra=False, as_calibrated=as_calibrated)
+        result = pipeline.reconstruct(scan, devices.calibration, options)
+        error = np.abs(result["depth_mm"].values - truth.depth_mm)
+        errors[as_calibrated] = float(np.nanmedian(error))
+        fit = Fit.read(result.attrs)
+        assert fit is not None
+        assert ("lateral colour" in fit.parts) is not as_calibrated
+        known = np.isfinite(error)
+        held = float(np.mean(error[known] < 1.96 * result["depth_std_mm"].values[known]))
+        assert (held > 0.92) is not as_calibrated
+    assert errors[False] < 0.9 * errors[True]
