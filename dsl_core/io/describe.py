@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,16 @@ from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.plan_file import load_plan
-from dsl_core.io.result.result_file import load_result
+from dsl_core.io.reading import read_bounded, read_json
+from dsl_core.io.result.result_file import has_checksums, load_result
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.check import find_problems
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.sealed import is_sealed
 from dsl_core.model.plan import CapturePlan
 
+#: A file by hand, or one of an earlier version.
+_UNCHECKED = "none: damage would not be noticed"
 Facts = dict[str, Any]
 
 
@@ -58,6 +61,7 @@ def _session(path: Path, verify: bool) -> Facts:
         "bytes": sum(file.stat().st_size for file in path.rglob("*") if file.is_file()),
         "complete": not problems,
         "checked": "every pixel" if verify else "names, sizes and log",
+        "checksums": _checksum_of(path / MANIFEST_NAME),
         "problems": problems,
         "notes": manifest.notes,
     }
@@ -83,6 +87,7 @@ def _result(path: Path) -> Facts:
         "kind": "result",
         "size_px": [result.sizes["x"], result.sizes["y"]],
         "variables": [str(name) for name in result.data_vars],
+        "checksums": "of every chunk" if has_checksums(path) else _UNCHECKED,
     }
     if "wavelength_nm" in result.coords:
         centres = result["wavelength_nm"].values
@@ -98,20 +103,21 @@ def _result(path: Path) -> Facts:
 
 def _json(path: Path) -> Facts:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
     except (OSError, ValueError) as error:
         raise StoreError(
             f"{path} is not JSON ({error}). The file may be cut off; restore it from a copy."
         ) from error
     keys = set(content) if isinstance(content, dict) else set()
     if "camera_size_px" in keys or "spectral" in keys:
-        return {"kind": "plan", **_plan_facts(load_plan(path))}
+        return {"kind": "plan", **_plan_facts(load_plan(path)), "checksums": _checksum_of(path)}
     if "film" not in keys and "response" not in keys:
         raise StoreError(f"{path} contains neither a rig nor a plan. Give a file that dsl-scan wrote.")
     rig = load_rig(path)
     return {
         "kind": "rig",
         "name": rig.name,
+        "checksums": _checksum_of(path),
         "camera_px": [rig.camera.width_px, rig.camera.height_px],
         "projector_px": [rig.projector.width_px, rig.projector.height_px],
         "film_lines_per_mm": rig.film.lines_per_mm,
@@ -119,6 +125,11 @@ def _json(path: Path) -> Facts:
         "orders": sorted(rig.efficiency),
         "provenance": rig.provenance.model_dump(),
     }
+
+
+def _checksum_of(path: Path) -> str:
+    """Whether a JSON file that was read carries a checksum, which then agrees."""
+    return "agrees" if is_sealed(read_bounded(path)) else _UNCHECKED
 
 
 def _plan_facts(plan: CapturePlan) -> Facts:

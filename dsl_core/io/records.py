@@ -9,6 +9,8 @@ from pydantic import ValidationError
 
 from dsl_core.errors import DslError, StoreError
 from dsl_core.io.atomic import write_atomic
+from dsl_core.io.reading import read_bounded
+from dsl_core.io.sealed import SealError, seal, unseal
 from dsl_core.io.staging import write_text
 from dsl_core.model.base import Record, problems_in_words
 
@@ -16,13 +18,16 @@ R = TypeVar("R", bound=Record)
 
 
 def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path:
-    """Write a record as JSON, whole or not at all, and return its path; raises `StoreError`."""
-    return write_text(path, record.model_dump_json(indent=1) + "\n", overwrite=overwrite)
+    """Write a record as JSON with its checksum, whole or not at all, and return its path.
+
+    Raises `StoreError`.
+    """
+    return write_text(path, seal(record.model_dump_json(indent=1)).decode(), overwrite=overwrite)
 
 
 def replace_record(path: Path, record: Record) -> None:
-    """Write a record in place of an older one; raises `StoreError`."""
-    write_atomic(path, (record.model_dump_json(indent=1) + "\n").encode())
+    """Write a record with its checksum in place of an older one; raises `StoreError`."""
+    write_atomic(path, seal(record.model_dump_json(indent=1)))
 
 
 def read_record(
@@ -35,18 +40,24 @@ def read_record(
     error: type[DslError] = StoreError,
     most: int = 1,
 ) -> R:
-    """A record from its JSON file.
+    """A record from its JSON file, which must match its checksum if it has one.
 
     Raises ``error`` that says how the file is ``called`` and what its ``fault`` is, names the first ``most``
     fields that are wrong, and ends with a ``remedy``.
     """
     name = f"{called} {path}".strip()
     try:
-        return kind.model_validate_json(path.read_text(encoding="utf-8"))
+        return kind.model_validate_json(unseal(read_bounded(path)).decode())
     except (OSError, UnicodeDecodeError) as failure:
-        raise error(f"{name} cannot be read ({failure}). {remedy}") from failure
+        reason = getattr(failure, "strerror", None) or failure
+        raise error(f"{name} cannot be read ({reason}). {remedy}") from failure
     except ValidationError as failure:
         raise error(f"{name} {fault}: {_problems(failure, most)}. {remedy}") from failure
+    except SealError as failure:
+        raise error(
+            f"{name} was changed or damaged after it was written: {failure}. Restore it from a copy. If you"
+            " changed it yourself, delete its last field, checksum."
+        ) from failure
 
 
 def _problems(failure: ValidationError, most: int) -> str:

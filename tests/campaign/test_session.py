@@ -18,6 +18,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import CalibrationError, Cancelled, StoreError
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.rig_file import load_rig, save_rig
+from dsl_core.io.sealed import unseal
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure
 from dsl_core.progress import NoProgress
@@ -244,7 +245,7 @@ def test_a_scan_copied_from_another_rig_is_found(
     for step in one.steps:
         one.capture(step)
     manifest = one.bench.step_folder(one.steps[1]) / "scan.dsl" / "manifest.json"
-    content = json.loads(manifest.read_text())
+    content = json.loads(unseal(manifest.read_bytes()))
     content["projector"]["serial"] = "another"
     manifest.write_text(json.dumps(content))
     assert one.statuses()[0].state == "captured"
@@ -349,7 +350,7 @@ def test_a_damaged_record_and_a_foreign_folder_are_named(
     recipes = chain()
     calibrate_all(campaign, devices, Willing(), NoProgress(), recipes=recipes)
     path = campaign.path / "first.json"
-    content = json.loads(path.read_text())
+    content = json.loads(unseal(path.read_bytes()))
     content["record"] = {"means_dn": "many"}
     path.write_text(json.dumps(content))
     with pytest.raises(CalibrationError, match=r"first of .* another version \(means_dn"):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dsl_core.io import atomic
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.scan.frame_store import FrameStore
+from dsl_core.io.sealed import unseal
 from dsl_core.model.frames import Frame
 
 from .conftest import SMALL_PLAN, SMALL_RIG, Give
@@ -47,7 +48,7 @@ def _truncated(scan: Path) -> None:
 
 def _repeated(scan: Path) -> None:
     log = scan / "frames.jsonl"
-    entries = [json.loads(line) for line in log.read_text().splitlines()]
+    entries = [json.loads(unseal(line)) for line in log.read_bytes().splitlines()]
     entries[8]["frame_id"] = entries[7]["frame_id"]
     log.write_text("".join(json.dumps(entry) + "\n" for entry in entries))
 

@@ -14,6 +14,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.rig_file import load_rig
 from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.sealed import unseal
 from tests.cases import fake_recipe
 
 from .conftest import Give
@@ -169,7 +170,7 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
     folder = tmp_path / "campaign"
     assert give("selftest", folder, *TWIN, "--yes").code == 0
     path = folder / "selftest.json"
-    content = json.loads(path.read_text())
+    content = json.loads(unseal(path.read_bytes()))
     content["conditions"]["camera"]["serial"] = "A"
     path.write_text(json.dumps(content))
     ending = give("calibrate", "all", folder, "--yes")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from enum import Enum
 from itertools import chain, count
 from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
+from dsl_core.io.reading import read_json
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.
@@ -68,7 +68,7 @@ def _is_published(folder: Path) -> bool:
 
 def _kind_of_json(path: Path) -> Kind:
     try:
-        content = json.loads(path.read_bytes())
+        content = read_json(path)
     except (OSError, ValueError):
         return Kind.UNKNOWN
     keys = set(content) if isinstance(content, dict) else set()

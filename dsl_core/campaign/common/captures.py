@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from contextlib import contextmanager
@@ -16,8 +15,9 @@ from dsl_core.devices.base import CameraInfo, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import store_error, write_atomic
-from dsl_core.io.records import read_record
+from dsl_core.io.atomic import store_error
+from dsl_core.io.reading import read_json
+from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import CaptureConditions, differences
 
@@ -49,7 +49,7 @@ def write_note(folder: Path, note: CaptureNote) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise store_error(folder, error) from error
-    write_atomic(folder / NOTE_NAME, (note.model_dump_json(indent=1) + "\n").encode())
+    replace_record(folder / NOTE_NAME, note)
 
 
 def other_conditions(folder: Path, now: CaptureConditions) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ def _scanned_under(manifest: Path, changed_ns: int) -> CaptureConditions | None:
 
 def _content(manifest: Path) -> dict[str, dict[str, list[dict[str, float]]]]:
     try:
-        content: dict[str, dict[str, list[dict[str, float]]]] = json.loads(manifest.read_bytes())
+        content: dict[str, dict[str, list[dict[str, float]]]] = read_json(manifest)
     except (OSError, ValueError) as error:
         raise StoreError(
             f"{manifest} is damaged ({error}). Capture the step {manifest.parent.parent.name} again."

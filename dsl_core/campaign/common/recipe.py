@@ -16,8 +16,8 @@ from typing import Any, Generic, TypeVar
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import store_error, write_atomic
-from dsl_core.io.records import read_record
+from dsl_core.io.atomic import store_error
+from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.base import Record
 from dsl_core.model.figure import Figure
@@ -89,7 +89,7 @@ class Bench:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise store_error(folder, error) from error
-        write_atomic(folder / name, record.model_dump_json(indent=1).encode())
+        replace_record(folder / name, record)
 
     def kept(self, step: Step, name: str, kind: type[RecordT]) -> RecordT:
         """A record that `keep` wrote; raises `StoreError`."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from pydantic import ValidationError
-
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import set_aside, write_atomic
+from dsl_core.io.atomic import set_aside
+from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
 
 
@@ -61,7 +60,7 @@ def annotations_path(result: Path) -> Path:
 def save_annotations(annotations: Annotations, result: Path) -> Path:
     """Store the marks next to a result, whole or not at all; raises `StoreError`."""
     path = annotations_path(result)
-    write_atomic(path, annotations.model_dump_json(indent=1).encode())
+    replace_record(path, annotations)
     return path
 
 
@@ -72,11 +71,9 @@ def load_annotations(result: Path) -> Annotations:
     """
     path = annotations_path(result)
     try:
-        return Annotations.model_validate_json(path.read_bytes())
-    except FileNotFoundError:
-        return Annotations()
-    except (OSError, ValidationError) as error:
-        raise StoreError(
-            f"The marks in {path} cannot be read ({type(error).__name__}). The result is opened without them."
-            f"{set_aside(path)}"
-        ) from error
+        if not path.exists():
+            return Annotations()
+        remedy = "The result is opened without them."
+        return read_record(path, Annotations, remedy, called="The marks in", fault="cannot be read")
+    except StoreError as error:
+        raise StoreError(f"{error}{set_aside(path)}") from error

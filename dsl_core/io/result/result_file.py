@@ -4,12 +4,13 @@ Cubes are chunked one band a chunk and kept in one file a variable, so that a ba
 neighbours and few files need syncing. The three large cubes are stored as integers with a CF
 ``scale_factor``: reflectance and its standard deviation in steps of 0.00005, the data share in steps
 of 1/250. Half a step is far below the noise of a scan; a cube that does not fit the integer range is
-stored as float32 instead. NaN is kept.
+stored as float32 instead. NaN is kept. Every chunk ends with a checksum, and an inventory says which
+files belong to it: damage is told when it is read.
 """
 
 from __future__ import annotations
 
-import json
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,12 +19,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io.reading import read_json
+from dsl_core.io.result.inventory import CHECKSUM, INVENTORY, check_inventory, with_inventory
 from dsl_core.io.staging import FolderKind, staged
 from dsl_core.model.result import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     import xarray as xr
     import zarr
+
+
+_log = logging.getLogger(__name__)
+#: Attributes on disk that are not the result's.
+_OF_THE_FOLDER = ("labels", INVENTORY, CHECKSUM)
 
 
 @dataclass(frozen=True)
@@ -62,6 +70,7 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
         for name, variable in result.variables.items():
             if str(name) not in labels:
                 _write_variable(group, str(name), variable)
+        group.update_attributes(with_inventory(draft, dict(group.attrs)))
     return path
 
 
@@ -72,26 +81,41 @@ def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:
     """
     import xarray as xr
 
-    labels = _read_labels(path)
+    from dsl_core.io.result.stored_arrays import FAILURES, stored_variables
+
+    stored = _read_attributes(path)
+    if not check_inventory(path, stored):
+        _log.warning("%s was written without checksums: damage to it would not be noticed.", path)
+
+    def damaged(error: Exception) -> StoreError:
+        return StoreError(
+            f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames."
+        )
+
+    variables = stored_variables(path, damaged)
     try:
-        raw = xr.open_zarr(path, chunks=None, consolidated=False, mask_and_scale=False)
-        for variable in raw.variables.values():
+        attributes = {key: value for key, value in stored.items() if key not in _OF_THE_FOLDER}
+        labels = stored.get("labels", {})
+        for variable in variables.values():
             # A scale factor read from JSON is a Python float, from which xarray would decode to float64.
             if "scale_factor" in variable.attrs:
                 variable.attrs["scale_factor"] = np.float32(variable.attrs["scale_factor"])
+        raw = xr.Dataset(variables, attrs=attributes)
         result = xr.decode_cf(raw).assign_coords({n: (n, np.array(v)) for n, v in labels.items()})
-        del result.attrs["labels"]
         return result if lazy else result.load()
-    except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
-        raise StoreError(
-            f"The result {path} is damaged ({error}). Reconstruct it again from the scan's frames."
-        ) from error
+    except FAILURES as error:
+        raise damaged(error) from error
+
+
+def has_checksums(path: Path) -> bool:
+    """Whether damage to a result is noticed; False for those of earlier versions."""
+    return INVENTORY in _read_attributes(path)
 
 
 def _node(path: Path) -> dict[str, Any]:
     """What zarr says of a folder; nothing where it is none of zarr's, or cannot be read."""
     try:
-        content = json.loads((path / "zarr.json").read_text("utf-8"))
+        content = read_json(path / "zarr.json")
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}
@@ -111,19 +135,21 @@ def _is_of_result(entry: Path) -> bool:
 RESULT_FOLDER = FolderKind("a result", _is_result, _is_of_result)
 
 
-def _read_labels(path: Path) -> dict[str, list[str]]:
-    """Names along the axes without numbers, after checking that this is a result that can be read."""
+def _read_attributes(path: Path) -> dict[str, Any]:
+    """The attributes of a folder, after checking that it is a result that can be read."""
     if not (path / "zarr.json").is_file():
         raise StoreError(f"{path} is not a result: a folder with a file zarr.json is needed.")
     try:
-        attributes = json.loads((path / "zarr.json").read_text("utf-8"))["attributes"]
-        version, labels = attributes.get("schema_version"), dict(attributes.get("labels", {}))
+        attributes: dict[str, Any] = read_json(path / "zarr.json")["attributes"]
+        version, labels = attributes.get("schema_version"), attributes.get("labels", {})
+        if not all(isinstance(names, list) for names in labels.values()):
+            raise ValueError("the names along an axis must be a list")
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise StoreError(
             f"{path / 'zarr.json'} is damaged ({error}). Reconstruct the result again from the scan's frames."
         ) from error
     _check_version(version, path)
-    return labels
+    return attributes
 
 
 def _check_version(version: object, path: Path) -> None:
@@ -138,7 +164,7 @@ def _check_version(version: object, path: Path) -> None:
 
 
 def _write_variable(group: zarr.Group, name: str, variable: xr.Variable) -> None:
-    from zarr.codecs import BloscCodec
+    from zarr.codecs import BloscCodec, Crc32cCodec
 
     values, encoding = _encode(name, variable)
     plane = values.shape[-2:]
@@ -149,7 +175,7 @@ def _write_variable(group: zarr.Group, name: str, variable: xr.Variable) -> None
         dtype=values.dtype,
         chunks=one_band,
         shards=values.shape if values.ndim > 2 else None,
-        compressors=BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle"),
+        compressors=[BloscCodec(cname="zstd", clevel=1, shuffle="bitshuffle"), Crc32cCodec()],
         dimension_names=[str(d) for d in variable.dims],
         attributes={**{str(k): _plain(v) for k, v in variable.attrs.items()}, **encoding},
         # Looking for chunks that hold only the fill value costs more than writing them.

@@ -10,10 +10,12 @@ import contextlib
 import os
 from pathlib import Path
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import store_error, sync_folder, write_all, write_atomic
+from dsl_core.io.reading import read_bounded
+from dsl_core.io.sealed import seal, unseal
 from dsl_core.model.base import Record
 
 
@@ -38,16 +40,20 @@ class LogEntry(Record):
 def read_log(path: Path) -> tuple[list[LogEntry], int]:
     """All whole lines of a log, and how many bytes of the file they fill; raises `StoreError`."""
     try:
-        data = path.read_bytes()
+        data = read_bounded(path)
     except FileNotFoundError:
         return [], 0
+    except OSError as error:
+        raise StoreError(
+            f"{path} cannot be read ({error.strerror or error}). Restore it from a copy of the scan."
+        ) from error
     entries: list[LogEntry] = []
     good = 0
     lines = data.split(b"\n")
     for number, line in enumerate(lines[:-1], start=1):
         try:
-            entries.append(LogEntry.model_validate_json(line))
-        except ValidationError as error:
+            entries.append(LogEntry.model_validate_json(unseal(line)))
+        except ValueError as error:
             if number == len(lines) - 1:
                 break
             raise StoreError(
@@ -59,7 +65,7 @@ def read_log(path: Path) -> tuple[list[LogEntry], int]:
 
 
 def _line(entry: LogEntry) -> bytes:
-    return entry.model_dump_json().encode() + b"\n"
+    return seal(entry.model_dump_json())
 
 
 class CaptureLog:

@@ -15,8 +15,7 @@ from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import write_atomic
-from dsl_core.io.records import read_record
+from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
@@ -54,7 +53,7 @@ def describe_scan(plan: CapturePlan, rig: DeviceRig | None, notes: dict[str, str
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
     """Store the manifest atomically; raises `StoreError`."""
-    write_atomic(folder / MANIFEST_NAME, manifest.model_dump_json(indent=2).encode())
+    replace_record(folder / MANIFEST_NAME, manifest)
 
 
 def read_manifest(folder: Path) -> Manifest:

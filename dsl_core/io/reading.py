@@ -1,0 +1,56 @@
+"""Reading files that may come from a stranger: plain files only, and of bounded size."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+from dsl_core.io.sealed import unseal
+
+#: More than any plan, rig or campaign file of this program holds.
+MOST_BYTES = 64 << 20
+
+
+def read_bounded(path: Path, most_bytes: int = MOST_BYTES) -> bytes:
+    """The content of a file; raises `OSError` for a pipe, a device, a folder and what is larger."""
+    if require_plain(path) > most_bytes:
+        raise _refusal(path, f"it is larger than {most_bytes / 1e6:.0f} MB, which no file of its kind is")
+    with path.open("rb") as file:
+        return file.read()
+
+
+def read_json(path: Path) -> Any:
+    """The value in a JSON file, its checksum removed once it is found to match.
+
+    Raises `OSError` as `read_bounded` does, and ``ValueError`` for what is no JSON, is nested too deeply, or
+    does not match its checksum.
+    """
+    try:
+        return json.loads(unseal(read_bounded(path)))
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+
+
+def require_plain(path: Path) -> int:
+    """The size of a plain file, links to one included.
+
+    Raises `FileNotFoundError`, and `OSError` for anything that is not a plain file: reading a pipe would wait
+    for ever.
+    """
+    try:
+        found = os.stat(path)
+    except ValueError as error:
+        raise _refusal(path, "its name contains a character that no file can have") from error
+    if stat.S_ISDIR(found.st_mode):
+        raise _refusal(path, "it is a folder, not a file")
+    if not stat.S_ISREG(found.st_mode):
+        raise _refusal(path, "it is a pipe or a device, not a file")
+    return found.st_size
+
+
+def _refusal(path: Path, why: str) -> OSError:
+    return OSError(errno.EINVAL, why, str(path).replace("\0", "\\0"))

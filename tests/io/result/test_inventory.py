@@ -1,0 +1,115 @@
+"""A bit flipped anywhere in a result is told or changes nothing; a file that is missing is told."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from dsl_core.errors import StoreError
+from dsl_core.io.describe import describe
+from dsl_core.io.result.result_file import has_checksums, load_result, save_result
+from tests.cases.small_result import small_result
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return save_result(small_result(), tmp_path_factory.mktemp("stored") / "a.zarr")
+
+
+@pytest.fixture
+def copied(stored: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(stored, tmp_path / "a.zarr"))
+
+
+def test_flipped_bits_are_told_or_harmless(stored: Path, copied: Path) -> None:
+    whole = load_result(stored, lazy=False)
+    rng = np.random.default_rng(1)
+    files = sorted(path for path in copied.rglob("*") if path.is_file())
+    told = 0
+    for path in files:
+        data = path.read_bytes()
+        place = int(rng.integers(0, 8 * len(data)))
+        flipped = bytearray(data)
+        flipped[place // 8] ^= 1 << place % 8
+        path.write_bytes(flipped)
+        try:
+            xr.testing.assert_identical(load_result(copied, lazy=False), whole)
+        except StoreError:
+            told += 1
+        path.write_bytes(data)
+    assert told > 0.8 * len(files)
+
+
+def test_a_damaged_band_is_told_when_it_is_read(copied: Path) -> None:
+    path = copied / "reflectance" / "c" / "0" / "0" / "0"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    lazy = load_result(copied)
+    lazy["depth_mm"].load()
+    with pytest.raises(StoreError, match="is damaged"):
+        lazy["reflectance"].load()
+    with pytest.raises(StoreError, match="Reconstruct it again"):
+        load_result(copied, lazy=False)
+
+
+@pytest.mark.parametrize("name", ["reflectance/c/0/0/0", "depth_mm/c/0/0", "flags/zarr.json"])
+def test_a_file_that_is_missing_or_cut_off_is_told(copied: Path, name: str) -> None:
+    path = copied / name
+    path.write_bytes(path.read_bytes()[:-3])
+    with pytest.raises(StoreError, match=rf"{name} has \d+ of \d+ bytes"):
+        load_result(copied)
+    path.unlink()
+    with pytest.raises(StoreError, match=f"{name} cannot be read"):
+        load_result(copied)
+
+
+def test_an_array_that_was_added_is_told(copied: Path) -> None:
+    shutil.copytree(copied / "depth_mm", copied / "more")
+    with pytest.raises(StoreError, match=r"more/zarr\.json was added"):
+        load_result(copied)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes have no place in folders there")
+@pytest.mark.parametrize("is_old", [False, True])
+def test_a_pipe_in_the_place_of_a_chunk_is_not_waited_for(copied: Path, is_old: bool) -> None:
+    if is_old:
+        _without_checksums(copied)
+    (copied / "depth_mm" / "c" / "0" / "0").unlink()
+    os.mkfifo(copied / "depth_mm" / "c" / "0" / "0")
+    with pytest.raises(StoreError, match="a pipe or a device"):
+        load_result(copied, lazy=False)
+
+
+def _without_checksums(folder: Path) -> None:
+    content = json.loads((folder / "zarr.json").read_text())
+    del content["attributes"]["inventory"], content["attributes"]["attributes_crc32"]
+    (folder / "zarr.json").write_text(json.dumps(content))
+
+
+def test_a_result_of_an_earlier_version_opens_and_says_so(
+    copied: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert describe(copied)["checksums"] == "of every chunk"
+    _without_checksums(copied)
+    assert load_result(copied).sizes["wavelength_nm"] == 5
+    assert "was written without checksums" in caplog.text
+    assert not has_checksums(copied)
+    assert "damage would not be noticed" in describe(copied)["checksums"]
+
+
+def test_an_array_that_declares_more_than_it_can_hold_is_refused(copied: Path) -> None:
+    _without_checksums(copied)
+    path = copied / "depth_mm" / "zarr.json"
+    content = json.loads(path.read_text())
+    content["shape"] = [6_000_000, 9_000]
+    path.write_text(json.dumps(content))
+    with pytest.raises(StoreError, match=r"which its .* bytes cannot hold"):
+        load_result(copied)
