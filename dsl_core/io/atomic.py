@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import re
+import shutil
 from itertools import chain, count
 from pathlib import Path
 
@@ -11,6 +13,11 @@ from dsl_core.errors import StoreError
 
 PARTIAL_SUFFIX = ".partial"
 _DISK_FULL = {errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)}
+
+#: NumPy's ``tofile`` and Pillow's encoders, when the system takes less than they give it.
+_SHORT_WRITE = re.compile(r"\d+ requested and \d+ written|encoder error -2")
+#: Less than any file system needs for itself.
+_LITTLE_BYTES = 1 << 16
 
 
 def write_atomic(path: Path, data: bytes | bytearray | memoryview) -> None:
@@ -20,8 +27,10 @@ def write_atomic(path: Path, data: bytes | bytearray | memoryview) -> None:
     """
     partial = path.with_name(path.name + PARTIAL_SUFFIX)
     try:
+        # A new file: what bears the name may be a link out of the folder.
+        partial.unlink(missing_ok=True)
         descriptor = os.open(
-            partial, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o644
+            partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o644
         )
         try:
             write_all(descriptor, data)
@@ -69,14 +78,24 @@ def set_aside(path: Path) -> str:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it where they do not exist; raises `StoreError`."""
+    """Make a folder and those above it, to be there also after a power cut; raises `StoreError`."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_durable(folder)
     except OSError as error:
+        if error.errno in _DISK_FULL:
+            raise store_error(folder, error) from error
         raise StoreError(
             f"The folder {folder} cannot be created ({error.strerror}). Check its parent folder's"
             " permissions."
         ) from error
+
+
+def make_durable(folder: Path) -> None:
+    """Make a folder and those above it; a new name is only safe once the folder that it is in is synced."""
+    new = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in reversed(new):
+        sync_folder(each.parent)
 
 
 def remove_partials(folder: Path) -> None:
@@ -87,12 +106,27 @@ def remove_partials(folder: Path) -> None:
 
 def store_error(path: Path, error: OSError) -> StoreError:
     """The sentence for a failed write."""
-    if error.errno in _DISK_FULL:
-        return StoreError(
-            f"The disk is full: {path} could not be written. Nothing saved before is lost;"
-            " free some space and resume."
-        )
+    if error.errno in _DISK_FULL or (
+        error.errno is None and (_SHORT_WRITE.search(str(error)) or is_full(path))
+    ):
+        return disk_full(path)
     reason = error.strerror or str(error)
     return StoreError(
         f"{path} could not be written ({reason}). Check the folder's permissions and its drive."
     )
+
+
+def disk_full(path: Path) -> StoreError:
+    """The sentence for a disk without space."""
+    return StoreError(
+        f"The disk is full: {path} could not be written. Nothing saved before is lost;"
+        " free some space and resume."
+    )
+
+
+def is_full(path: Path) -> bool:
+    """Whether the disk of a file has no space; for writers that do not say why they fail."""
+    try:
+        return shutil.disk_usage(path.parent).free < _LITTLE_BYTES
+    except OSError:
+        return False

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
 import os
+import re
 import shutil
+import time
 import uuid
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,7 +16,15 @@ from pathlib import Path
 
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME
-from dsl_core.io.atomic import PARTIAL_SUFFIX, store_error, sync_folder
+from dsl_core.io.atomic import PARTIAL_SUFFIX, make_durable, store_error, sync_folder
+from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.swap import exchange
+
+_log = logging.getLogger(__name__)
+_LOCK_NAME, _OLD_SUFFIX = "writer.lock", ".old"
+#: How the private folder of a writer is called.
+_ROOM = re.compile(rf"\..+\.[0-9a-f]{{8}}{re.escape(PARTIAL_SUFFIX)}")
+_DAY_S = 86_400.0
 
 
 @contextmanager
@@ -25,11 +37,15 @@ def staged(
     are as before and nothing is left behind. Raises `StoreError` when a target exists and may not be
     replaced, when the folder cannot be used, or when the disk fails.
     """
-    check_targets(targets, overwrite=overwrite, kind=kind)
     home = targets[0].parent
+    clear_leftovers(home)
+    check_targets(targets, overwrite=overwrite, kind=kind)
     room = home / f".{targets[0].name}.{uuid.uuid4().hex[:8]}{PARTIAL_SUFFIX}"
+    lock: FolderLock | None = None
     try:
-        room.mkdir(parents=True)
+        make_durable(home)
+        room.mkdir()
+        lock = FolderLock(room / _LOCK_NAME)
         drafts = [room / target.name for target in targets]
         yield drafts
         for draft in drafts:
@@ -42,7 +58,33 @@ def staged(
     except OSError as error:
         raise store_error(targets[0], error) from error
     finally:
+        if lock is not None:
+            lock.release()
         _clear(room, targets)
+
+
+def clear_leftovers(home: Path) -> None:
+    """Remove what writers that were killed left in a folder; what they had moved aside returns to its place.
+
+    A writer holds a lock while it lives. One of an earlier version holds none: its room is left for a day.
+    """
+    for room in home.glob(f".*{PARTIAL_SUFFIX}"):
+        if not _ROOM.fullmatch(room.name) or not room.is_dir() or _is_in_use(room):
+            continue
+        _log.warning("%s was left by a writer that was killed, and is removed.", room)
+        olds = room.glob(f"*{_OLD_SUFFIX}")
+        with contextlib.suppress(StoreError):
+            _clear(room, [home / old.name.removesuffix(_OLD_SUFFIX) for old in olds])
+
+
+def _is_in_use(room: Path) -> bool:
+    try:
+        if not (room / _LOCK_NAME).is_file():
+            return time.time() - room.stat().st_mtime < _DAY_S
+        FolderLock(room / _LOCK_NAME).release()
+    except (OSError, StoreError):
+        return True
+    return False
 
 
 def write_text(path: Path, text: str | Callable[[], str], *, overwrite: bool = False) -> Path:
@@ -94,8 +136,10 @@ def _sync_tree(path: Path) -> None:
 
 
 def _move_in(draft: Path, target: Path, room: Path) -> None:
-    # A folder cannot be replaced in one step: the old one steps aside, and `_clear` says what becomes of it.
     if target.is_dir():
+        if exchange(draft, target):
+            return
+        # Two steps where it cannot be one: the old one steps aside, and `_clear` says what becomes of it.
         os.replace(target, _aside(target, room))
     os.replace(draft, target)
 
@@ -119,7 +163,7 @@ def _clear(room: Path, targets: Sequence[Path]) -> None:
 
 
 def _aside(target: Path, room: Path) -> Path:
-    return room / (target.name + ".old")
+    return room / (target.name + _OLD_SUFFIX)
 
 
 #: What is nowhere else, by the file that tells it.

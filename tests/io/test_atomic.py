@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import remove_partials, set_aside, write_atomic
+from dsl_core.io import atomic
+from dsl_core.io.atomic import make_folder, remove_partials, set_aside, store_error, write_atomic
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot
@@ -81,3 +83,39 @@ def test_only_leftovers_are_removed(tmp_path: Path) -> None:
         (tmp_path / name).write_text("x")
     remove_partials(tmp_path)
     assert [each.name for each in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        OSError(errno.ENOSPC, "No space left on device"),
+        OSError("8000 requested and 512 written"),  # ndarray.tofile
+        OSError("encoder error -2 when writing image file"),  # Pillow
+    ],
+)
+def test_every_writer_says_that_the_disk_is_full(error: OSError) -> None:
+    assert str(store_error(Path("a/b.img"), error)).startswith("The disk is full")
+
+
+def test_another_failure_is_not_called_a_full_disk(tmp_path: Path) -> None:
+    for error in (PermissionError(13, "Permission denied"), OSError("no reason")):
+        assert "permissions" in str(store_error(tmp_path / "b.img", error))
+
+
+def test_a_link_in_the_place_of_the_neighbour_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "theirs").write_text("theirs")
+    (tmp_path / "file.partial").symlink_to(tmp_path / "theirs")
+    write_atomic(tmp_path / "file", b"mine")
+    assert (tmp_path / "theirs").read_text() == "theirs"
+    assert (tmp_path / "file").read_bytes() == b"mine"
+
+
+def test_new_folders_are_synced_where_their_names_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    monkeypatch.setattr(atomic, "sync_folder", synced.append)
+    make_folder(tmp_path / "a" / "b")
+    assert synced == [tmp_path, tmp_path / "a"]
+    make_folder(tmp_path / "a" / "b")
+    assert len(synced) == 2

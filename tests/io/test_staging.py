@@ -12,10 +12,13 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io import staging
 from dsl_core.io.published.dataset import export_dataset
 from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
 from dsl_core.io.scan.folder import ScanReader
-from dsl_core.io.staging import staged
+from dsl_core.io.scan.lock import FolderLock
+from dsl_core.io.staging import staged, write_text
+from dsl_core.io.swap import exchange
 from dsl_core.model.plan import CapturePlan, LineComb, Shot
 from tests.cases.small_result import small_result
 
@@ -173,6 +176,11 @@ def _replace(path: Path, content: str) -> None:
         (draft / "zarr.json").write_text(json.dumps({"attributes": attributes}))
 
 
+def _in_two_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a system that cannot exchange two names."""
+    monkeypatch.setattr(staging, "exchange", lambda one, other: False)
+
+
 def _interrupt_at(monkeypatch: pytest.MonkeyPatch, number: int, *, after: bool = False) -> None:
     """Let Ctrl-C arrive at a rename, before or after it is done."""
     real, count = os.replace, iter(range(1, 100))
@@ -194,6 +202,7 @@ def test_ctrl_c_between_the_renames_leaves_the_old_result(
     path = tmp_path / "r.zarr"
     _replace(path, "old")
     before = _tree(path)
+    _in_two_steps(monkeypatch)
     _interrupt_at(monkeypatch, number, after=after)
     with pytest.raises(KeyboardInterrupt):
         _replace(path, "new")
@@ -206,6 +215,7 @@ def test_ctrl_c_after_the_renames_leaves_the_new_result(
 ) -> None:
     path = tmp_path / "r.zarr"
     _replace(path, "old")
+    _in_two_steps(monkeypatch)
     _interrupt_at(monkeypatch, 2, after=True)
     with pytest.raises(KeyboardInterrupt):
         _replace(path, "new")
@@ -225,8 +235,62 @@ def test_an_old_result_that_cannot_come_back_is_kept_aside(
             raise PermissionError(13, "Permission denied")
         real(source, target)
 
+    _in_two_steps(monkeypatch)
     monkeypatch.setattr(os, "replace", one_way)
     with pytest.raises(StoreError, match=r"old one is kept as .*r\.zarr\.old; move it back"):
         _replace(path, "new")
     (kept,) = tmp_path.glob(".r.zarr.*/r.zarr.old")
     assert _tree(kept) == before
+
+
+def test_a_kept_old_result_returns_with_the_next_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.zarr"
+    _replace(path, "old")
+    before = _tree(path)
+    _leave_room(tmp_path, killed=True)
+    os.replace(path, tmp_path / ".r.zarr.0123abcd.partial" / "r.zarr.old")
+    write_text(tmp_path / "other.txt", "anything")
+    assert _tree(path) == before
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["other.txt", "r.zarr"]
+
+
+def test_the_one_step_never_leaves_the_name_without_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "r.zarr"
+    _replace(path, "old")
+    if not exchange(path, path):
+        pytest.skip("this file system cannot exchange two names")
+
+    def no_rename(source: Path, target: Path) -> None:
+        raise AssertionError("the old one steps aside")
+
+    monkeypatch.setattr(os, "replace", no_rename)
+    _replace(path, "new")
+    assert b'"new"' in _tree(path)["zarr.json"]
+    assert [each.name for each in tmp_path.iterdir()] == ["r.zarr"]
+
+
+def _leave_room(home: Path, *, killed: bool) -> FolderLock:
+    room = home / ".r.zarr.0123abcd.partial"
+    room.mkdir()
+    (room / "half").write_text("half a result")
+    lock = FolderLock(room / "writer.lock")
+    if killed:
+        lock.release()
+    return lock
+
+
+def test_what_a_killed_writer_left_is_removed_but_not_what_another_is_writing(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    lock = _leave_room(tmp_path, killed=False)
+    (tmp_path / ".mine.partial").mkdir()
+    write_text(tmp_path / "a.txt", "a")
+    assert (tmp_path / ".r.zarr.0123abcd.partial" / "half").exists()
+    lock.release()
+    write_text(tmp_path / "b.txt", "b")
+    assert sorted(each.name for each in tmp_path.iterdir()) == [".mine.partial", "a.txt", "b.txt"]
+    assert "was left by a writer that was killed" in caplog.text

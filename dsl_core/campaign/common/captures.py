@@ -15,7 +15,7 @@ from dsl_core.devices.base import CameraInfo, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import store_error
+from dsl_core.io.atomic import make_folder, sync_folder
 from dsl_core.io.reading import read_json
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
@@ -45,10 +45,7 @@ def read_note(folder: Path) -> CaptureNote | None:
 
 def write_note(folder: Path, note: CaptureNote) -> None:
     """Write the note of a step; raises `StoreError`."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise store_error(folder, error) from error
+    make_folder(folder)
     replace_record(folder / NOTE_NAME, note)
 
 
@@ -77,8 +74,8 @@ def replacing(folder: Path) -> Iterator[None]:
     """Move the captures of a step aside, and put them back unless the block makes complete new ones."""
     aside = _aside(folder)
     if folder.exists():
-        aside.parent.mkdir(exist_ok=True)
-        os.replace(folder, aside)
+        make_folder(aside.parent)
+        _move(folder, aside)
     try:
         yield
     except BaseException:
@@ -105,7 +102,14 @@ def _aside(folder: Path) -> Path:
 def _put_back(folder: Path) -> None:
     if _aside(folder).exists():
         shutil.rmtree(folder, ignore_errors=True)
-        os.replace(_aside(folder), folder)
+        _move(_aside(folder), folder)
+
+
+def _move(source: Path, target: Path) -> None:
+    """Rename a folder so that it has one of both names also after a power cut."""
+    os.replace(source, target)
+    sync_folder(target.parent)
+    sync_folder(source.parent)
 
 
 @lru_cache(maxsize=1024)

@@ -16,7 +16,7 @@ from typing import Any, Generic, TypeVar
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, Cancelled, DslError, StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.atomic import store_error
+from dsl_core.io.atomic import make_folder
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.base import Record
@@ -78,17 +78,14 @@ class Bench:
             plan = self.scan_of(step).plan
         else:
             plan = pipeline.fit_plan(make_plan(), self.devices)
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
         pipeline.scan(self.devices, plan, folder / SCAN_NAME, progress)
         return plan
 
     def keep(self, step: Step, name: str, record: Record) -> None:
         """Write a record into a step's folder; raises `StoreError`."""
         folder = self.step_folder(step)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise store_error(folder, error) from error
+        make_folder(folder)
         replace_record(folder / name, record)
 
     def kept(self, step: Step, name: str, kind: type[RecordT]) -> RecordT:

@@ -39,7 +39,7 @@ from dsl_core.campaign.selftest.recorder import BLACK, Recorder
 from dsl_core.campaign.selftest.survey import Survey, survey
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
-from dsl_core.io.atomic import store_error, write_atomic
+from dsl_core.io.atomic import make_folder, write_atomic
 from dsl_core.progress import Progress
 
 SEED = 20240617
@@ -154,10 +154,7 @@ def save_capture(capture: SelfTestCapture, folder: Path) -> Path:
     about |= {"version": _VERSION, "bit_depth": capture.sizes.bit_depth, "parts": list(capture.parts)}
     buffer = io.BytesIO()
     np.savez_compressed(buffer, about=np.array(json.dumps(about)), **arrays)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise store_error(folder, error) from error
+    make_folder(folder)
     write_atomic(folder / ARCHIVE_NAME, buffer.getbuffer())
     return folder / ARCHIVE_NAME
 

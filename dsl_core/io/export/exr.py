@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
+from dsl_core.io.atomic import disk_full, is_full
 from dsl_core.io.export.common import plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
 from dsl_core.solve.many import Check, never
@@ -69,6 +70,8 @@ def export_exr(
         try:
             OpenEXR.File(header, channels).write(str(draft))
         except (RuntimeError, ValueError, TypeError) as error:
+            if is_full(draft):
+                raise disk_full(path) from error
             raise StoreError(f"{path} could not be written as OpenEXR ({error}).") from error
     return [path]
 

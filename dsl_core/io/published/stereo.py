@@ -105,12 +105,11 @@ def save_stereo(stereo: Stereo, path: Path, *, overwrite: bool = False) -> Path:
     if path.suffix.lower() not in {".xml", ".yml", ".yaml"}:
         raise StoreError(f"{path.name!r} does not end in .xml or .yml. Add the ending to the name.")
     with staged([path], overwrite=overwrite) as (draft,):
-        file = cv2.FileStorage(str(draft), cv2.FILE_STORAGE_WRITE)
-        try:
-            for name, value in _nodes_of(stereo).items():
-                file.write(name, value)
-        finally:
-            file.release()
+        # OpenCV does not say when a disk is full: the text is made in memory and written here.
+        file = cv2.FileStorage(draft.name, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+        for name, value in _nodes_of(stereo).items():
+            file.write(name, value)
+        draft.write_bytes(file.releaseAndGetString().encode())
     return path
 
 

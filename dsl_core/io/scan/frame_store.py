@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import write_atomic
+from dsl_core.io.atomic import make_folder, write_atomic
 from dsl_core.io.reading import read_bounded, read_json
 
 #: Blocks of 256 KiB decompress 1.7 times faster than Blosc's own choice for Zstandard, at the same size.
@@ -49,7 +49,7 @@ class FrameStore:
 
     def create(self) -> None:
         """Write the array's metadata; frames follow one by one."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self.folder)
         write_atomic(self._metadata_path, json.dumps(self._metadata(), indent=2).encode())
 
     def check(self) -> None:

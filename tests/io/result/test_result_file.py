@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 from dsl_core.errors import StoreError
+from dsl_core.io import staging
 from dsl_core.io.result import result_file
 from dsl_core.io.result.result_file import load_result, save_result
 from tests.cases.small_result import UNLIT, WAVELENGTHS_NM, small_result
@@ -142,6 +143,7 @@ def test_the_old_result_returns_when_the_last_rename_fails(
             raise PermissionError(13, "Permission denied")
         real(source, target)
 
+    monkeypatch.setattr(staging, "exchange", lambda one, other: False)
     monkeypatch.setattr(os, "replace", last_step_fails)
     with pytest.raises(StoreError, match="permissions"):
         save_result(small_result(), path, overwrite=True)
