@@ -87,12 +87,16 @@ def calibrate_all(
     """Run every calibration in order and assemble the rig; resumes where it was interrupted.
 
     ``recipes`` are all calibrations, those of this installation if not given; ``stage`` surrounds each one
-    under its title, to measure it.
+    under its title, to measure it. However it ends, a rig that places targets puts back what was there.
     """
     recipes = campaign_recipes(campaign) if recipes is None else recipes
-    for recipe in recipes:
-        with stage(recipe.title) if stage else nullcontext():
-            run_calibration(CalibrationSession(recipe, devices, campaign, recipes), guide, progress)
+    try:
+        for recipe in recipes:
+            with stage(recipe.title) if stage else nullcontext():
+                run_calibration(CalibrationSession(recipe, devices, campaign, recipes), guide, progress)
+    finally:
+        if devices.put_back is not None:
+            devices.put_back()
     return calibrated_rig(campaign, devices, name, recipes)
 
 

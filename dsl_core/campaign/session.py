@@ -116,6 +116,7 @@ class CalibrationSession:
 
     def look(self, step: Step) -> tuple[Figure, ...]:
         """Check with a few frames whether the target is right; nothing is kept."""
+        self.place(step)
         return self.recipe.look(self.bench, step)
 
     def capture(self, step: Step, progress: Progress | None = None) -> None:
@@ -139,6 +140,8 @@ class CalibrationSession:
         note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
         write_note(folder, note)
         self.campaign.discard(self.recipe.name)
+        # A scan may have come between the look and this, and put back what was there before.
+        self.place(step)
         try:
             self.recipe.capture(self.bench, step, progress)
         except CalibrationError as error:

@@ -157,8 +157,9 @@ class DeviceRig:
 
     ``calibration`` is what is known of the rig (the twin knows itself); ``sleep`` is how its clock
     waits, so that a simulated rig does not have to. ``place`` puts a target before the camera where a rig can
-    do that itself, as the twin can; where it is None, a person does it. ``nominal`` is what data sheets say
-    of the rig, the start of a calibration. ``filters`` holds measured
+    do that itself, as the twin can; where it is None, a person does it. A rig that places targets puts back
+    what was there before with ``put_back``, and says in words with ``standing`` what is there now.
+    ``nominal`` is what data sheets say of the rig, the start of a calibration. ``filters`` holds measured
     transmissions of bandpass filters by their nominal centres, nm, as far as there are any.
     """
 
@@ -170,6 +171,8 @@ class DeviceRig:
     calibration: Rig | None = None
     sleep: Callable[[float], None] | None = None
     place: Callable[[Placement], None] | None = None
+    put_back: Callable[[], None] | None = None
+    standing: Callable[[], str] | None = None
     nominal: Rig | None = None
     filters: dict[float, SpectralCurve] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)

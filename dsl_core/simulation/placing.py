@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from dsl_core.errors import DeviceError, PlanError
 from dsl_core.model.placement import Placement
+from dsl_core.model.spectral import SpectralCurve
 from dsl_core.simulation.bandpass_filters import true_transmission
 from dsl_core.simulation.scenes.catalogue import make_scene
 from dsl_core.simulation.scenes.truth import Scene
@@ -18,6 +19,17 @@ from dsl_core.simulation.world import World
 STAGE_MM = 700.0
 
 
+@dataclass(frozen=True)
+class _Before:
+    """What was there before the first target was placed."""
+
+    scene_at: Callable[[float], Scene]
+    position_mm: float
+    film: bool
+    filter: SpectralCurve | None
+    noise_key: tuple[int, ...]
+
+
 @dataclass
 class TwinHand:
     """Does for the twin what instructions ask of a person; ``filter_seed`` draws the set of filters."""
@@ -26,12 +38,18 @@ class TwinHand:
     filter_seed: int
     mishaps: TwinOptions
     _standing: tuple[str, dict[str, float | str]] | None = None
+    _before: _Before | None = None
+    _placement: Placement | None = None
 
     def __call__(self, placement: Placement) -> None:
         """Place a target; raises `DeviceError` or `PlanError` for one that there is not."""
         label = placement.filter_nm
         if label is not None and self.mishaps.wrong_filter_nm is not None:
             label = self.mishaps.wrong_filter_nm
+        if self._before is None:
+            setup = self.world.setup
+            own = self.world.scene_at, self.world.position_mm
+            self._before = _Before(*own, setup.film, setup.filter, self.world.noise_key)
         tilt = self.mishaps.filter_tilt_deg
         curve = None if label is None else true_transmission(float(label), self.filter_seed, tilt)
         if placement.target != "as it is":
@@ -45,6 +63,34 @@ class TwinHand:
             self.world.move_to(position)
         self.world.insert(placement.film, curve)
         self.world.noise_key = (zlib.crc32(placement.model_dump_json().encode()),)
+        self._placement = placement
+
+    def put_back(self) -> None:
+        """Put scene, film and filter back as they were before the first target was placed."""
+        if self._before is None:
+            return
+        self.world.place(self._before.scene_at, self._before.position_mm)
+        self.world.insert(self._before.film, self._before.filter)
+        self.world.noise_key = self._before.noise_key
+        self._before = self._standing = self._placement = None
+
+    def standing(self) -> str:
+        """What is before the camera: the twin's scene, or the target of a calibration with its options.
+
+        What is placed "as it is" leaves the scene, and changes film and filter only.
+        """
+        placed = self._placement
+        if placed is None:
+            return self.mishaps.scene
+        target = self.mishaps.scene if self._standing is None else self._standing[0]
+        options = {} if self._standing is None else self._standing[1]
+        words = [
+            f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"
+            for name, value in options.items()
+        ]
+        film = [] if placed.film else ["film off"]
+        beam = [] if placed.filter_nm is None else [f"filter {placed.filter_nm:g} nm"]
+        return ", ".join([" ".join([target, *words]), *film, *beam])
 
     def _scene(self, placement: Placement) -> tuple[Callable[[float], Scene], float]:
         """The scene at each stage position, and the requested position."""

@@ -238,7 +238,8 @@ def open_twin(options: dict[str, str]) -> DeviceRig:
     devices = assemble(world)
     drawn = chosen.truth or 0
     devices.nominal, devices.filters = nominal, measured_transmissions(drawn)
-    devices.place = TwinHand(world, drawn, chosen)
+    hand = TwinHand(world, drawn, chosen)
+    devices.place, devices.put_back, devices.standing = hand, hand.put_back, hand.standing
     if chosen.choice != USUAL_CHOICE:
         devices.notes["effects"] = describe(world.effect_plan(), chosen.effects).model_dump_json()
     if chosen.truth is not None:

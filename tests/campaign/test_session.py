@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -369,3 +370,38 @@ def test_a_damaged_record_and_a_foreign_folder_are_named(
         CampaignFolder.begin(campaign.path, None, {"size": "64x48"})
     kept = CampaignFolder.begin(campaign.path, None, {}, {"first": {"keys": "a,b"}})
     assert kept.info.settings == {"first": {"keys": "a,b"}}
+
+
+class Placer:
+    """A rig's own hand, which notes what it was asked."""
+
+    def __init__(self) -> None:
+        self.done: list[str] = []
+
+    def place(self, placement: object) -> None:
+        self.done.append("place")
+
+    def put_back(self) -> None:
+        self.done.append("put back")
+
+
+def test_a_rig_that_places_targets_puts_back_what_was_there(
+    devices: DeviceRig, campaign: CampaignFolder
+) -> None:
+    for accepts in (False, True):
+        hand = Placer()
+        devices.place, devices.put_back = hand.place, hand.put_back
+        with nullcontext() if accepts else pytest.raises(CalibrationError):
+            calibrate_all(campaign, devices, Willing(accepts=accepts), NoProgress(), recipes=chain())
+        assert hand.done[0] == "place"
+        assert hand.done.count("put back") == 1
+        assert hand.done[-1] == "put back"
+
+
+def test_a_target_is_placed_again_before_it_is_captured(devices: DeviceRig, campaign: CampaignFolder) -> None:
+    one, hand = session(devices, campaign, FakeRecipe()), Placer()
+    devices.place, devices.put_back = hand.place, hand.put_back
+    one.place(one.steps[0])
+    hand.put_back()  # as a scan does that comes between
+    one.capture(one.steps[0])
+    assert hand.done == ["place", "put back", "place"]

@@ -234,3 +234,22 @@ def test_a_drawn_camera_sees_its_corners_darker() -> None:
     gain = uneven / np.maximum(even.expected(white), 1e-12)
     assert 0.9 <= gain[gain > 0].min() <= 0.96
     assert gain.max() == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_hand_puts_back_what_was_there_and_says_what_is() -> None:
+    rig, world = twin(scene="plane", depth_mm="760")
+    assert rig.put_back is not None
+    assert rig.standing is not None
+    before = shine(rig)
+    rig.put_back()  # nothing was placed yet
+    assert rig.standing() == "plane"
+    place(rig, Placement(target="spectralon", options={"depth_mm": 650.0}, film=False, filter_nm="550"))
+    assert rig.standing() == "spectralon depth_mm=650, film off, filter 550 nm"
+    place(rig, Placement(target="board"))
+    assert world.scene_at(world.position_mm).name != "plane"
+    rig.put_back()
+    assert rig.standing() == "plane"
+    assert world.truth.depth_mm == pytest.approx(760.0)
+    np.testing.assert_array_equal(shine(rig), before)
+    place(rig, PLANE)
+    assert world.truth.depth_mm == pytest.approx(650.0), "it is placed again after it was put back"

@@ -56,6 +56,8 @@ class ScanJob:
         from dsl_core.workflows import scans
 
         request = self.request
+        if request.devices.put_back is not None:
+            request.devices.put_back()  # a calibration may have left its target before the camera
         if request.is_resumed:
             progress.report("check for movement", 0, 0)
             devices, plan = scans.prepare_resume(request.devices, request.folder, request.check_drift)

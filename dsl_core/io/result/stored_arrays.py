@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
 import zarr
 from numpy.typing import NDArray
 from xarray import Variable
@@ -13,9 +14,6 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from dsl_core.errors import StoreError
-
-if TYPE_CHECKING:
-    import numpy as np
 
 #: What zarr, its codecs and the file system raise for damaged chunks.
 FAILURES = (OSError, ValueError, KeyError, RuntimeError, TypeError)
@@ -37,7 +35,7 @@ class _Checked(BackendArray):
 
     def _read(self, key: tuple[Any, ...]) -> NDArray[Any]:
         try:
-            values: NDArray[Any] = self._array.oindex[key]
+            values: NDArray[Any] = np.asarray(self._array.oindex[key])
         except FAILURES as error:
             raise self._damaged(error) from error
         return values
@@ -61,7 +59,8 @@ def _variable(array: zarr.Array[Any], folder: Path, damaged: Callable[[Exception
     dims = array.metadata.dimension_names or ()  # type: ignore[union-attr]
     if len(dims) != array.ndim or None in dims:
         raise ValueError(f"{folder.name} does not name its axes")
-    return Variable(dims, indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazy)), dict(array.attrs))
+    kept = indexing.MemoryCachedArray(indexing.CopyOnWriteArray(lazy))  # type: ignore[no-untyped-call, arg-type]
+    return Variable(dims, kept, dict(array.attrs))
 
 
 def _require_honest(array: zarr.Array[Any], folder: Path) -> None:

@@ -21,6 +21,9 @@ from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 
+#: The note that says what was before the camera, by a rig that knows.
+STANDING = "before_camera"
+
 
 class Manifest(Record):
     """Written once, before the first frame; never changed afterwards."""
@@ -38,7 +41,9 @@ class Manifest(Record):
 
 def describe_scan(plan: CapturePlan, rig: DeviceRig | None, notes: dict[str, str] | None = None) -> Manifest:
     """The manifest of a scan that starts now; notes of the caller come after those of the rig."""
-    own = notes or {}
+    own = dict(notes or {})
+    if rig is not None and rig.standing is not None:
+        own |= {STANDING: rig.standing()}
     return Manifest(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         versions={"dsl_core": dsl_core.__version__, "python": platform.python_version()},

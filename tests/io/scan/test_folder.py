@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dsl_core.devices.registry import open_rig
 from dsl_core.errors import StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
+from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, Shot
 
 FrameOf = Callable[[Shot], Frame]
@@ -264,3 +266,13 @@ def test_a_really_full_disk_loses_nothing(
             np.testing.assert_array_equal(reader.read(shot), frame_of(shot).pixels)
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_the_manifest_says_what_was_before_the_camera(
+    tmp_path: Path, plan: CapturePlan, frame_of: FrameOf
+) -> None:
+    rig = open_rig("twin", {"size": "24x16", "scene": "plane"})
+    assert rig.place is not None
+    rig.place(Placement(target="spectralon"))
+    with ScanWriter.create(tmp_path / "scan.dsl", plan, rig, {"scene": "plane"}) as writer:
+        assert writer.manifest.notes["before_camera"] == "spectralon"
