@@ -243,7 +243,7 @@ def test_the_hand_puts_back_what_was_there_and_says_what_is() -> None:
     before = shine(rig)
     rig.put_back()  # nothing was placed yet
     assert rig.standing() == "plane"
-    place(rig, Placement(target="spectralon", options={"depth_mm": 650.0}, film=False, filter_nm="550"))
+    place(rig, Placement(target="spectralon", options={"depth_mm": 650.0}, film=False, filter_nm=550.0))
     assert rig.standing() == "spectralon depth_mm=650, film off, filter 550 nm"
     place(rig, Placement(target="board"))
     assert world.scene_at(world.position_mm).name != "plane"
