@@ -23,6 +23,7 @@ from dsl_core.evaluation.report.scan_report import ReportContent, render_report
 from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.io.scan.folder import ScanWriter
 from dsl_core.io.staging import write_text
+from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
@@ -85,7 +86,8 @@ def reconstruct(
         material_std_px,
         own_lateral_colour,
     )
-    from dsl_core.reconstruction.columns.line_spread import own_spread, spread_finding, with_own_spread
+    from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
+    from dsl_core.reconstruction.fit.spread import spread_findings
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
@@ -101,11 +103,11 @@ def reconstruct(
     with timer.stage("read and merge the line frames"):
         stack = stack_lines(merged, progress)
     with timer.stage("columns, depth, normals"):
-        findings = []
+        findings: list[FitFinding] = []
         if options.refine_columns and not options.as_calibrated:
             found = own_spread(rig, LineSet.of(plan), code, white, stack)
             if found is not None:
-                findings.append(spread_finding(rig.projector_response, found))
+                findings += spread_findings(rig.projector_response, found)
             rig = with_own_spread(rig, found)
         geometry = reconstruct_geometry(
             rig,

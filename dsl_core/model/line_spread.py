@@ -83,6 +83,16 @@ class LineSpread(Record):
         """The same after a further Gaussian blur."""
         return self.model_copy(update={"core_px": math.hypot(self.core_px, blur_px)})
 
+    def stretched(self, factor: float) -> Self:
+        """The same with all distances times a factor."""
+        sizes = {name: getattr(self, name) * factor for name in ("first_px", "step_px", "core_px")}
+        return self.model_copy(update=sizes)
+
 
 #: How a narrow line's light is spread: the rms width of a Gaussian (px), or a measured curve.
 Spread = float | LineSpread
+
+
+def stretched(spread: Spread, factor: float) -> Spread:
+    """A spread with all distances times a factor."""
+    return spread.stretched(factor) if isinstance(spread, LineSpread) else spread * factor

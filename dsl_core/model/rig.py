@@ -16,6 +16,7 @@ from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.lateral_colour import LateralColour
 from dsl_core.model.line_spread import LineSpread, Spread
 from dsl_core.model.spectral import SpectralCurve
+from dsl_core.model.spread_field import SpreadField
 
 Range = tuple[float, float]
 Rgb = tuple[SpectralCurve, SpectralCurve, SpectralCurve]
@@ -124,7 +125,8 @@ class ProjectorResponse(Record):
 
     The halo is light of the zero order scattered sideways in the film: a column at distance ``d``
     px contributes ``halo_peak_per_px * exp(-|d| / halo_decay_px)`` of its radiance. Without a measured
-    ``spread`` the blur is a Gaussian of rms width ``blur_px``; with one, that is the curve's rms width.
+    ``spread`` the blur is a Gaussian of rms width ``blur_px``; with one, that is the curve's rms width. Where
+    a ``field`` was measured, all its distances are wider or narrower by place.
     """
 
     gamma: float = Field(default=2.2, gt=0)
@@ -133,6 +135,7 @@ class ProjectorResponse(Record):
     halo_peak_per_px: float = Field(default=0.0, ge=0)
     halo_decay_px: float = Field(default=30.0, gt=0)
     spread: LineSpread | None = None
+    field: SpreadField | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:

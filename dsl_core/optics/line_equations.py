@@ -12,7 +12,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
-from dsl_core.model.line_spread import Spread
+from dsl_core.model.line_spread import Spread, stretched
 from dsl_core.optics.correspondence import like
 from dsl_core.optics.line_profile import SAMPLES, ProfileTable
 from dsl_core.optics.line_set import LineSet
@@ -86,13 +86,18 @@ class LineEquations:
         radiance: Tensor,
         weight: Tensor,
         first_line: int,
+        width: float = 1.0,
     ) -> None:
         """Add one order: ``radiance`` and ``weight`` are (frames, pixels), frame 0 being ``first_line``.
+
+        ``width`` is that of the spread relative to the usual one.
 
         Bands are taken in groups that share one window of lines, so that data are gathered once a group.
         """
         half = self.bands.half_width_px(columns)
-        table = _table(self.lines.width_px, self.spread, half, columns.device, columns.dtype)
+        table = _table(
+            self.lines.width_px, stretched(self.spread, width), half, columns.device, columns.dtype
+        )
         # On the table's grid a band has the same profile in every group, and the matrix is a true square.
         columns = (columns * SAMPLES).round() / SAMPLES
         spacing = ((columns[-1] - columns[0]).abs().min() / (self.bands.count - 1)).clip(

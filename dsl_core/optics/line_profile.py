@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 from torch import Tensor
 
-from dsl_core.model.line_spread import REACH, LineSpread, Spread
+from dsl_core.model.line_spread import REACH, LineSpread, Spread, stretched
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.spread.curves import EvenTable, density, mixed, reach_px, step_response
 
@@ -19,6 +19,8 @@ from dsl_core.optics.spread.curves import EvenTable, density, mixed, reach_px, s
 SAMPLES = 256
 #: Widths of a Gaussian blur beyond a line's band at which its profile ends.
 ENDS = 2.2
+#: Step of the logarithm of the width between tables of a spread that varies over the field.
+WIDTH_STEP = 0.005
 
 
 def band_profile(
@@ -125,19 +127,46 @@ def zero_order_profile(
 class LineTable:
     """A line's profile in the zero order and its slope, tabulated: many times as fast as working them out."""
 
-    def __init__(self, width_px: float, response: ProjectorResponse, reach_px: float, like: Tensor) -> None:
-        """For distances up to ``reach_px`` from the line's middle, in the precision of ``like``."""
-        half, spread = width_px / 2, response.line_spread
-        distance = np.arange(-math.ceil(reach_px * SAMPLES), math.ceil(reach_px * SAMPLES) + 1) / SAMPLES
-        profile = zero_order_profile(torch.as_tensor(distance), -half, half, response).numpy()
-        near, far = distance + half, distance - half
-        halo = np.exp(-np.abs(near) / response.halo_decay_px) - np.exp(-np.abs(far) / response.halo_decay_px)
-        slope = density(spread, near) - density(spread, far) + response.halo_peak_per_px * halo
-        self._table = EvenTable(float(distance[0]), 1 / SAMPLES, (profile, slope), like)
+    def __init__(
+        self,
+        width_px: float,
+        response: ProjectorResponse,
+        reach_px: float,
+        like: Tensor,
+        widths: Tensor | None = None,
+    ) -> None:
+        """For distances up to ``reach_px`` from the line's middle, in the precision of ``like``.
+
+        ``widths`` (pixels,) are those of the spread relative to the response's, pixel by pixel.
+        """
+        self._width_px, self._response = width_px, response
+        half = math.ceil(reach_px * SAMPLES)
+        self._distance = np.arange(-half, half + 1) / SAMPLES
+        self._row: Tensor | None = None
+        curves = [self._curves(response.line_spread)]
+        if widths is not None:
+            level = (widths.log() * (1 / WIDTH_STEP)).round().long()
+            first, last = int(level.min()), int(level.max())
+            self._row = level - first
+            curves = [
+                self._curves(stretched(response.line_spread, math.exp(WIDTH_STEP * k)))
+                for k in range(first, last + 1)
+            ]
+        joined = [np.concatenate(each) for each in zip(*curves, strict=True)]
+        self._table = EvenTable(float(self._distance[0]), 1 / SAMPLES, joined, like, len(curves))
+
+    def _curves(self, spread: Spread) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        half, decay = self._width_px / 2, self._response.halo_decay_px
+        near, far = self._distance + half, self._distance - half
+        halo = [halo_integral(torch.as_tensor(edge), self._response).numpy() for edge in (near, far)]
+        profile = step_response(spread, near) - step_response(spread, far) + halo[0] - halo[1]
+        halo_slope = np.exp(-np.abs(near) / decay) - np.exp(-np.abs(far) / decay)
+        slope = density(spread, near) - density(spread, far) + self._response.halo_peak_per_px * halo_slope
+        return profile, slope
 
     def at(self, distance_px: Tensor) -> tuple[Tensor, Tensor]:
-        """Profile and its slope (1/px) at distances from the line's middle, each of the same shape."""
-        profile, slope = self._table.at(distance_px)
+        """Profile and its slope (1/px) at distances from the line's middle, each (..., pixels) as given."""
+        profile, slope = self._table.at(distance_px, self._row)
         return profile, slope
 
 

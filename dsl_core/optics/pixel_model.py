@@ -13,6 +13,7 @@ light from outside.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -27,12 +28,15 @@ from dsl_core.optics.image_formation import BlurredProfiles, ImageFormation, Ord
 from dsl_core.optics.line_equations import LineEquations
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS, Bands
+from dsl_core.optics.spread.field import relative_width
 
 #: How far the light of a band or a line is spread, px: bands whose centre is this far outside the projector's
 #: frame still belong to the model, and lines this far beyond a band still light it.
 EDGE_PX = 8.0
 #: Mean squared offset (camera px) of the samples that bilinear demosaicing averages.
 DEMOSAIC_SPREAD = 0.4
+#: Step of the logarithm of the width of lines that vary over the field: pixels of a tile share one.
+WIDTH_STEP = 0.02
 #: Relative error of the linear model (correspondence, profile, interpolation), added to each variance.
 MODEL_ERROR = 0.01
 #: Relative error granted to the zero-order colour as a constraint on the spectrum.
@@ -181,6 +185,14 @@ class PixelModel:
         assert self.lines is not None
         spread = self.rig.projector_response.line_spread
         return LineEquations(self.bands, self.lines, spread, colour, other, offsets)
+
+    def width(self, footprint: Footprint, inside: Tensor) -> float:
+        """How much wider than the usual one lines are where the bands (bands, pixels) that are inside lie."""
+        field = self.rig.projector_response.field
+        if field is None or not bool(inside.any()):
+            return 1.0
+        typical = relative_width(field, footprint.columns[inside], footprint.rows[inside]).log().mean()
+        return math.exp(round(float(typical) / WIDTH_STEP) * WIDTH_STEP)
 
     def frames(self, columns_px: Tensor, inside: Tensor) -> range:
         """Frames of single lines that light any band (bands, pixels) that is inside; empty when none does."""

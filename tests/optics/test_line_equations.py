@@ -162,3 +162,19 @@ def test_the_guard_is_what_both_sides_of_the_main_diagonal_leave_out(pitch_px: f
     kept = len(system.matrix) - 1
     assert sum(overlaps[kept:]) < DROPPED <= sum(overlaps[kept - 1 :])
     assert system.dropped == pytest.approx(max(2 * sum(overlaps[kept:]), 1e-6), rel=0.2)
+
+
+def test_wider_lines_are_those_of_a_wider_spread() -> None:
+    rig = published_rig()
+    bands = Bands.of(rig, WavelengthGrid())
+    lines = LineSet(5, 2, 2.0, 320, 320)
+    columns = 100.0 + 2.5 * torch.arange(bands.count, dtype=torch.float64)[:, None]
+    one = torch.ones((lines.frames, 1), dtype=torch.float64)
+    inside = torch.ones_like(columns, dtype=torch.bool)
+    blur_px = rig.projector_response.blur_px
+    matrices = []
+    for width, own_px in ((1.4, blur_px), (1.0, 1.4 * blur_px)):
+        system = LineEquations(bands, lines, own_px, torch.tensor([1]), columns[0])
+        system.add(1, columns, inside, one, one, 0, width)
+        matrices.append(system.matrix)
+    assert torch.equal(*matrices)

@@ -15,6 +15,7 @@ from dsl_core.model.geometry import Lens, Pose
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.optics.demosaic import demosaic_variance
@@ -311,6 +312,20 @@ def test_frames_are_those_whose_lines_touch_a_band() -> None:
     assert 100 - reach - LINES.step_px < centres[0] <= 100 - reach
     assert 140 + reach <= centres[1] < 140 + reach + LINES.step_px
     assert not model.frames(columns, torch.zeros_like(some))
+
+
+def test_lines_are_as_wide_as_where_the_light_of_a_tile_comes_from() -> None:
+    model, pixels, depth = some_model()
+    traced = model.trace(pixels, depth)
+    footprint = traced.orders[1]
+    inside = model.inside(footprint)
+    assert model.width(footprint, inside) == 1.0
+    middle = float(footprint.columns[inside].mean())
+    field = SpreadField(centre_px=(middle - 100, 0.0), half_px=(2000.0, 180.0), coefficients=(0.1, 2.0))
+    response = model.rig.projector_response.model_copy(update={"field": field})
+    model.rig = model.rig.model_copy(update={"projector_response": response})
+    assert model.width(footprint, inside) == pytest.approx(np.exp(0.1 + 2.0 * 100 / 2000), rel=0.011)
+    assert model.width(footprint, torch.zeros_like(inside)) == 1.0
 
 
 def test_demosaicing_blurs_by_the_typical_distance_of_neighbours() -> None:

@@ -72,16 +72,25 @@ def density(spread: Spread, distance_px: Floats) -> Floats:
 class EvenTable:
     """Curves tabulated at even distances, interpolated linearly, and constant beyond the ends."""
 
-    def __init__(self, low: float, step: float, curves: Sequence[Floats], like: Tensor) -> None:
-        """Curves (samples,) from ``low`` in steps of ``step``, looked up in the precision of ``like``."""
-        self.low, self.step, self.last = low, step, len(curves[0]) - 1.001
+    def __init__(
+        self, low: float, step: float, curves: Sequence[Floats], like: Tensor, rows: int = 1
+    ) -> None:
+        """Curves (samples,) from ``low`` in steps of ``step``, looked up in the precision of ``like``.
+
+        Each may be one of several ``rows``, (rows * samples,).
+        """
+        self.samples = len(curves[0]) // rows
+        self.low, self.step, self.last = low, step, self.samples - 1.001
         self.curves = [torch.as_tensor(curve).to(like) for curve in curves]
 
-    def at(self, distance: Tensor) -> list[Tensor]:
-        """Each curve at distances, same shape."""
+    def at(self, distance: Tensor, row: Tensor | None = None) -> list[Tensor]:
+        """Each curve at distances, same shape, from the rows (distance.shape[-1],) if there are several."""
         position = torch.nan_to_num_((distance - self.low) * (1 / self.step)).clip_(0, self.last)
         whole = position.int()
-        share, flat = position - whole, whole.reshape(-1)
+        share = position - whole
+        if row is not None:
+            whole = whole + row.int() * self.samples
+        flat = whole.reshape(-1)
         above = flat + 1
         return [
             torch.lerp(

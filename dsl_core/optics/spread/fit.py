@@ -18,35 +18,25 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.special import ndtr
 from torch import Tensor
 
 from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import LineTable, halo_integral
-from dsl_core.optics.spread.curves import SAMPLES, EvenTable, gaussian
-from dsl_core.optics.spread.wave import column_wave
+from dsl_core.optics.spread.curves import gaussian
+from dsl_core.optics.spread.equations import STEP_PX, Normal, Peaks, View
+from dsl_core.optics.spread.field import FieldFamily, FieldFit
 
 Floats = NDArray[np.float64]
-#: Distance between the Gaussians of a curve and how far it reaches, px.
-STEP_PX, REACH_PX = 0.125, 6.0
-#: Steps of each pixel's amplitude and column between those of the curve, and the longest, px.
-SETTLING, LONGEST_PX = 3, 0.5
+#: How far a curve reaches, px.
+REACH_PX = 6.0
 #: Steps in which a curve is stretched, and in which it takes any shape.
 STRETCHINGS, ROUNDS = 3, 4
+#: How often curve and field are fitted in turn.
+FIELD_ROUNDS = 2
 #: A shape that explains the lines so much worse than it first promised has gone astray.
 WORSE = 1.2
-#: Relative error of a modelled profile, added to each variance.
-MODEL_ERROR = 0.0015
-#: A pixel whose chi-square is so many times the others' sees something else.
-MAX_CHI_SQUARE = 5.0
-MAX_SHIFT_PX = 2.0
-#: Deviation of a column of which nothing is known.
-FREE_PX = 1e3
-MIN_PIXELS = 200
 #: Factors by which a curve may be stretched, and how often the search among them is repeated, finer.
 STRETCHES, FINER = np.geomspace(0.4, 2.5, 25), 3
 #: Strengths of the pull towards the stretched curve, relative to the data's.
@@ -56,36 +46,13 @@ CLEARLY, CLEAR_SHARE = 30.0, 0.01
 
 
 @dataclass(frozen=True)
-class Peaks:
-    """Lines around the zero order of pixels, (window, P): values, variances (infinite: unused), centres (px).
-
-    Each ``run`` pixels are neighbours of a row. ``width_px`` and ``step_px`` are those of the lines.
-    """
-
-    y: Tensor
-    variance: Tensor
-    centres: Tensor
-    width_px: int
-    step_px: int
-    run: int
-
-    def of(self, pixels: Tensor) -> Peaks:
-        """Some of the pixels."""
-        return replace(
-            self,
-            y=self.y[:, pixels],
-            variance=self.variance[:, pixels],
-            centres=self.centres[:, pixels],
-        )
-
-
-@dataclass(frozen=True)
 class SpreadFit:
     """The response that explains the lines best and how it was found.
 
     ``changed`` says whether the lines call for another one than was given. ``rms_std_px`` is the deviation of
     its width. Chi-squares are those of a degree of freedom, by pixels that did not enter the fit, for the
-    response ``before`` and ``after``; ``pixels`` were used.
+    response ``before`` and ``after``; ``pixels`` were used. ``field`` is given where the width varies
+    over the projector's frame otherwise than it was known to.
     """
 
     response: ProjectorResponse
@@ -94,39 +61,47 @@ class SpreadFit:
     before: float
     after: float
     pixels: int
+    field: FieldFit | None = None
 
 
-@dataclass(frozen=True)
-class _Normal:
-    """Weighted squares of some pixels as a function of the shares: ``w N w - 2 b w + c``."""
-
-    matrix: Floats
-    right: Floats
-    square: float
-    count: int
-    pixels: int
-
-    def cost(self, shares: Floats) -> float:
-        return float(shares @ self.matrix @ shares - 2 * self.right @ shares + self.square)
-
-    def __add__(self, other: _Normal) -> _Normal:
-        return _Normal(
-            self.matrix + other.matrix,
-            self.right + other.right,
-            self.square + other.square,
-            self.count + other.count,
-            self.pixels + other.pixels,
-        )
-
-
-def fit_spread(peaks: Peaks, column_px: Tensor, start: ProjectorResponse) -> SpreadFit | None:
+def fit_spread(
+    peaks: Peaks, column_px: Tensor, start: ProjectorResponse, place_px: Tensor | None = None
+) -> SpreadFit | None:
     """The response with the line spread that some pixels see; None when too few of them see a line.
 
-    ``column_px`` (P,) are columns to about half a pixel, ``start`` the response as it was known.
+    ``column_px`` (P,) are columns to about half a pixel, ``start`` the response as it was known. Where
+    places (column and row on the projector, px, (2, P)) are given, the width may vary over them.
     """
-    family, view = _Family(start), _View(peaks, column_px, column_px.clone(), peaks.y.amax(0))
+    family = _Family(start)
+    view = View(peaks, column_px, column_px.clone(), peaks.y.amax(0))
+    if place_px is None:
+        return _fit_curve(view, family)
+    fields = FieldFamily(place_px)
+    known = None if start.field is None else fields.widths(start.field)
+    view.width = known
+    found = _fit_curve(view, family)
+    varies = None if found is None else fields.fit(view, found.response)
+    if found is None or varies is None or not varies.matters(known):
+        return found
+    better = found
+    for _ in range(FIELD_ROUNDS):
+        view.width = varies.width
+        curve = _fit_curve(view, family)
+        again = None if curve is None else fields.fit(view, curve.response)
+        if curve is None or again is None:
+            return found
+        better, varies = curve, again
+    # Held-out squares of a degree of freedom: a field has few parameters.
+    if found.after - better.after < better.after * CLEARLY / better.pixels:
+        return found
+    response = better.response.model_copy(update={"field": varies.field})
+    return replace(better, response=response, changed=True, field=varies, before=found.before)
+
+
+def _fit_curve(view: View, family: _Family) -> SpreadFit | None:
+    """The curve that pixels see whose relative widths are known."""
     # First as if nothing was known of the columns: what the known curve explains, stretched or not, stands.
-    halves = view.equations(start, family.centres_px, waves=False)
+    halves = view.equations(family.start, family.centres_px, waves=False)
     for _ in range(STRETCHINGS):
         if halves is None:
             return None
@@ -146,112 +121,6 @@ def fit_spread(peaks: Peaks, column_px: Tensor, start: ProjectorResponse) -> Spr
             return found
         better = _choose(halves, family, shapes=True)
     return better if better.after < WORSE * first.after else found
-
-
-@dataclass
-class _View:
-    """What pixels see, and the columns and amplitudes found so far."""
-
-    peaks: Peaks
-    start_px: Tensor
-    column: Tensor
-    amplitude: Tensor
-
-    def equations(
-        self, response: ProjectorResponse, centres_px: Floats, *, waves: bool
-    ) -> list[_Normal] | None:
-        """Normal equations of two halves of the pixels; None when too few of them see a line.
-
-        With ``waves`` the columns are held to what is smooth over runs of neighbours.
-        """
-        peaks, run = self.peaks, self.peaks.run
-        self.column, self.amplitude, chi_square = _settle(peaks, self.column, self.amplitude, response)
-        used = (self.amplitude > 0) & torch.isfinite(self.column) & torch.isfinite(chi_square)
-        used &= (self.column - self.start_px).abs() < MAX_SHIFT_PX
-        if used.any():
-            used &= chi_square < MAX_CHI_SQUARE * max(float(chi_square[used].median()), 1.0)
-        column, std_px = self.column, FREE_PX
-        if waves:
-            wave = column_wave(column.reshape(-1, run), used.reshape(-1, run), peaks.step_px)
-            used &= wave.smooth.repeat_interleave(run)
-            column, std_px = column - wave.px.ravel(), wave.std_px
-        if int(used.sum()) < MIN_PIXELS:
-            return None
-        which = torch.nonzero(used).ravel()
-        parts = (which[which // run % 2 == half] for half in (0, 1))
-        return [
-            _normal(peaks.of(part), column[part], self.amplitude[part], response, centres_px, std_px)
-            for part in parts
-        ]
-
-
-def _settle(
-    peaks: Peaks, column: Tensor, amplitude: Tensor, response: ProjectorResponse
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Columns and amplitudes for a response, and the chi-square of each pixel, each (P,)."""
-    reach = float((column - peaks.centres).abs().max()) + (SETTLING + 1) * LONGEST_PX
-    table = LineTable(peaks.width_px, response, reach, column)
-    for _ in range(SETTLING):
-        g, slope = table.at(column - peaks.centres)
-        weight = 1 / (peaks.variance + (MODEL_ERROR * amplitude) ** 2)
-        wg = weight * g
-        gg = (wg * g).sum(0).clip(min=1e-30)
-        amplitude = (wg * peaks.y).sum(0) / gg
-        residual = peaks.y - amplitude * g
-        along = slope - g * ((wg * slope).sum(0) / gg)
-        information = (amplitude * (weight * along * along).sum(0)).clip(min=1e-12)
-        column = column + ((weight * along * residual).sum(0) / information).clip(-LONGEST_PX, LONGEST_PX)
-    chi_square = (weight * residual**2).sum(0) / ((weight > 0).sum(0) - 2).clip(min=1)
-    return column, amplitude, chi_square
-
-
-def _normal(
-    peaks: Peaks,
-    column: Tensor,
-    amplitude: Tensor,
-    response: ProjectorResponse,
-    centres_px: Floats,
-    column_std_px: float,
-) -> _Normal:
-    """Normal equations of the shares: each pixel has an amplitude, and a column known to a deviation."""
-    distance = column - peaks.centres
-    half = peaks.width_px / 2
-    g, slope = LineTable(peaks.width_px, response, float(distance.abs().max()) + 1, column).at(distance)
-    halo = halo_integral(distance + half, response) - halo_integral(distance - half, response)
-    root = (peaks.variance + (MODEL_ERROR * amplitude) ** 2).rsqrt()
-    shapes = _shapes(peaks.width_px, distance, centres_px)
-    rows = shapes * (root * amplitude)[..., None]
-    target = root * (peaks.y - amplitude * halo)
-    # What a change of the amplitude does is each pixel's own, and so, in part, what one of the column does.
-    first = _unit(g * root)
-    second = slope * root
-    second = second - first * (first * second).sum(0)
-    moved = (amplitude * column_std_px * second.norm(dim=0)) ** 2
-    for own, share in ((first, torch.ones_like(moved)), (_unit(second), 1 - (1 + moved).rsqrt())):
-        taken = own * share
-        rows = rows - taken[..., None] * (own[..., None] * rows).sum(0)
-        target = target - taken * (own * target).sum(0)
-    flat, values = rows.flatten(0, 1), target.flatten()
-    count = int(torch.isfinite(peaks.variance).sum()) - 2 * len(column)
-    return _Normal(
-        (flat.T @ flat).numpy(), (flat.T @ values).numpy(), float(values @ values), count, len(column)
-    )
-
-
-def _unit(values: Tensor) -> Tensor:
-    """Columns of length one."""
-    unit: Tensor = values / values.norm(dim=0).clip(min=1e-30)
-    return unit
-
-
-def _shapes(width_px: int, distance_px: Tensor, centres_px: Floats) -> Tensor:
-    """Light of a line through a Gaussian at each centre, (window, P, Gaussians)."""
-    reach = float(distance_px.abs().max()) + float(np.abs(centres_px).max()) + 1
-    at = np.arange(-math.ceil(reach * SAMPLES), math.ceil(reach * SAMPLES) + 1) / SAMPLES
-    half = width_px / 2
-    one = ndtr((at + half) / STEP_PX) - ndtr((at - half) / STEP_PX)
-    table = EvenTable(float(at[0]), 1 / SAMPLES, [one], distance_px)
-    return table.at(distance_px[..., None] - torch.as_tensor(centres_px).to(distance_px))[0]
 
 
 class _Family:
@@ -288,7 +157,7 @@ class _Family:
         np.add.at(shares, whole + 1, light * (position - whole))
         return shares
 
-    def best(self, normal: _Normal) -> float:
+    def best(self, normal: Normal) -> float:
         """The factor that explains some pixels best."""
         factors = STRETCHES
         for _ in range(FINER):
@@ -298,13 +167,13 @@ class _Family:
             factors = np.linspace(low, high, len(STRETCHES))
         return float(factors[len(factors) // 2])
 
-    def std(self, normal: _Normal, factor: float, chi_square: float) -> float:
+    def std(self, normal: Normal, factor: float, chi_square: float) -> float:
         """Relative deviation of a factor where chi-squares have this size, by how fast they grow off it."""
         low, middle, high = (normal.cost(self.stretched(factor * by)) for by in (0.98, 1.0, 1.02))
         return math.sqrt(2 * chi_square / max((low + high - 2 * middle) / 0.02**2, 1e-30))
 
 
-def _choose(halves: list[_Normal], family: _Family, *, shapes: bool) -> SpreadFit:
+def _choose(halves: list[Normal], family: _Family, *, shapes: bool) -> SpreadFit:
     """The simplest response that pixels ask for which did not enter its fit; any shape where these may be."""
     whole = halves[0] + halves[1]
     near = [family.stretched(family.best(half)) for half in halves]
@@ -337,7 +206,7 @@ def _choose(halves: list[_Normal], family: _Family, *, shapes: bool) -> SpreadFi
     )
 
 
-def _any(normal: _Normal, near: Floats, pull: float) -> Floats:
+def _any(normal: Normal, near: Floats, pull: float) -> Floats:
     """Shares of the curve that explains some pixels best, pulled towards one in its curvature."""
     second = np.diff(np.eye(len(near)), 2, axis=0)
     penalty = second.T @ second + 1e-4 * np.eye(len(near))

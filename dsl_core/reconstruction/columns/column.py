@@ -44,22 +44,30 @@ class Column:
 
 
 def refine(
-    coarse_px: Tensor, radiance: Tensor, std: Tensor, lines: LineSet, response: ProjectorResponse
+    coarse_px: Tensor,
+    radiance: Tensor,
+    std: Tensor,
+    lines: LineSet,
+    response: ProjectorResponse,
+    widths: Tensor | None = None,
 ) -> Column:
     """Refine decoded columns.
 
     ``coarse_px`` (pixels,) float; ``radiance`` and ``std`` (frames, pixels), DN per ms, infinite where
-    saturated. Where the fit fails, the decoded column stays, with the deviation of a whole pixel,
-    ``1/sqrt(12)``. Its amplitude is that of the brightest frame near it, or of the fit to what is left where
-    frames are saturated, with an infinite deviation: less would make light of the zero order next to them.
+    saturated; ``widths`` (pixels,) are those of the spread relative to the response's. Where the fit fails,
+    the decoded column stays, with the deviation of a whole pixel, ``1/sqrt(12)``. Its amplitude is that of
+    the brightest frame near it, or of the fit to what is left where frames are saturated, with an infinite
+    deviation: less would make light of the zero order next to them.
     """
-    y, variance, centres = _window(coarse_px, radiance, std, lines, response)
+    widest = 1.0 if widths is None else float(widths.max())
+    y, variance, centres = _window(coarse_px, radiance, std, lines, response.blur_px * widest)
     # Measured spreads may end sharply: from the middle between two frames no frame shows a slope.
     q = coarse_px.clone() if response.spread is None else coarse_px + ASIDE_PX
     brightest = amplitude = y.amax(0)
     error = MODEL_ERROR if lines.single else COMB_ERROR
     # No distance grows by more than the steps of all iterations.
-    table = LineTable(lines.width_px, response, float((q - centres).abs().max()) + ITERATIONS * STEP_PX, q)
+    reach_px = float((q - centres).abs().max()) + ITERATIONS * STEP_PX
+    table = LineTable(lines.width_px, response, reach_px, q, widths)
     for _ in range(ITERATIONS):
         g, slope = table.at(q - centres)
         weight = 1 / (variance + (error * amplitude) ** 2)
@@ -121,10 +129,10 @@ def dark_offset(
 
 
 def _window(
-    coarse: Tensor, radiance: Tensor, std: Tensor, lines: LineSet, response: ProjectorResponse
+    coarse: Tensor, radiance: Tensor, std: Tensor, lines: LineSet, blur_px: float
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Values, variances and line centres of the frames around the peak, each (window, pixels)."""
-    half = math.ceil((lines.width_px / 2 + 3 * response.blur_px + 1) / lines.step_px)
+    half = math.ceil((lines.width_px / 2 + 3 * blur_px + 1) / lines.step_px)
     offsets = torch.arange(-half, half + 1, device=coarse.device)[:, None]
     line = lines.nearest(coarse) + offsets
     frame = lines.frame(line)

@@ -10,11 +10,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.model.fit import FitFinding
-from dsl_core.model.rig import ProjectorResponse, Rig
+from dsl_core.model.rig import Rig
 from dsl_core.optics.line_set import LineSet
-from dsl_core.optics.spread.curves import density
-from dsl_core.optics.spread.fit import REACH_PX, Peaks, SpreadFit, fit_spread
+from dsl_core.optics.spread.equations import Peaks
+from dsl_core.optics.spread.field import places_of
+from dsl_core.optics.spread.fit import REACH_PX, SpreadFit, fit_spread
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
@@ -26,12 +26,6 @@ PIXELS, RUN = 4000, 10
 DARKER = 0.3
 #: Pixels whose decoded column is so many times the usual step from a neighbour's are at an edge.
 EDGE_STEPS = 4.0
-#: A share of the light that falls elsewhere than calibrated which matters: as much as 5 % of a wider blur do.
-MOST_ELSEWHERE = 0.025
-#: Light farther than this from its place is told separately, px.
-TAIL_PX = 2.0
-#: Places at which two curves are compared, px.
-FAR_PX, GRID_PX = 10.0, 0.01
 
 
 def own_spread(
@@ -45,7 +39,8 @@ def own_spread(
         return None
     column = torch.as_tensor(code.likely_column.ravel()[pixels].astype(np.float64))
     with one_kernel_thread():
-        return fit_spread(_peaks(stack, lines, pixels, column), column, rig.projector_response)
+        place = places_of(rig, torch.as_tensor(pixels), column)
+        return fit_spread(_peaks(stack, lines, pixels, column), column, rig.projector_response, place)
 
 
 def with_own_spread(rig: Rig, found: SpreadFit | None) -> Rig:
@@ -53,31 +48,6 @@ def with_own_spread(rig: Rig, found: SpreadFit | None) -> Rig:
     if found is None or not found.changed:
         return rig
     return rig.model_copy(update={"projector_response": found.response})
-
-
-def spread_finding(calibrated: ProjectorResponse, found: SpreadFit) -> FitFinding:
-    """What the scan says about the line spread that it was calibrated with."""
-    own = found.response
-    places = np.arange(-FAR_PX, FAR_PX, GRID_PX)
-    curves = [density(response.line_spread, places) for response in (calibrated, own)]
-    elsewhere = 0.5 * float(np.abs(curves[1] - curves[0]).sum()) * GRID_PX
-    far = np.abs(places) > TAIL_PX
-    tails = [float(curve[far].sum()) * GRID_PX for curve in curves]
-    return FitFinding(
-        part="profile",
-        name="line spread",
-        value=100 * elsewhere,
-        unit="% of the light of a line elsewhere than calibrated",
-        limit=100 * MOST_ELSEWHERE,
-        significant=elsewhere > MOST_ELSEWHERE,
-        sentence=(
-            f"The projector spreads light over {own.blur_px:.3f} ± {found.rms_std_px:.3f} px (rms), by its"
-            f" calibration over {calibrated.blur_px:.3f} px; {elsewhere:.1%} of it falls elsewhere, and"
-            f" {tails[1]:.1%} instead of {tails[0]:.1%} farther than {TAIL_PX:g} px away. The own spread"
-            " of the scan was used."
-        ),
-        advice="Focus the projector as for its calibration, or calibrate again.",
-    )
 
 
 def _sample(code: DecodedCode, white: MergedFrame) -> NDArray[np.intp]:

@@ -13,6 +13,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import triangulate
 from dsl_core.optics.image_formation import one_if_grey
 from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spread.field import widths_at
 from dsl_core.optics.unlit import unlit_px
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.column import Column, dark_offset, refine
@@ -121,7 +122,8 @@ class ColumnFinder:
         std = torch.as_tensor(stack.std.reshape(len(stack.std), -1)[:, where], device=self.device)
         if self.lines is None:
             return self._of_patterns(where, start, y, std), torch.zeros_like(start), black_std
-        column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig)
+        widths = widths_at(self.rig, _indices(where, start), start)
+        column, offset, offset_std = _on_lines(start, y, std, self.lines, self.rig, widths)
         known = offset_std < OFFSET_KNOWN * black_std
         return column, offset, torch.where(known, 0.0, torch.minimum(offset_std, black_std))
 
@@ -129,8 +131,7 @@ class ColumnFinder:
         """Columns from any pattern set, with what the first orders of a grey surface add to its frames."""
         assert self.profiles is not None
         profiles = one_if_grey(self.profiles)
-        index = np.arange(where.start, where.stop) if isinstance(where, slice) else where
-        light = first_order_share(self.rig, profiles, torch.as_tensor(index, device=self.device), start)
+        light = first_order_share(self.rig, profiles, _indices(where, start), start)
         return refine_by_profiles(start, y, std, profiles, self.rig.projector_response, light)
 
     def _of_white(self, where: Indices | slice, start: Tensor) -> Column:
@@ -141,10 +142,15 @@ class ColumnFinder:
         return Column(start, torch.full_like(start, WHOLE_PX_STD), amplitude, spread, none)
 
 
+def _indices(where: Indices | slice, like: Tensor) -> Tensor:
+    index = np.arange(where.start, where.stop) if isinstance(where, slice) else where
+    return torch.as_tensor(index, device=like.device)
+
+
 def _on_lines(
-    start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig
+    start: Tensor, y: Tensor, std: Tensor, lines: LineSet, rig: Rig, widths: Tensor | None
 ) -> tuple[Column, Tensor, Tensor]:
     response = rig.projector_response
-    column = refine(start, y, std, lines, response)
+    column = refine(start, y, std, lines, response, widths)
     unlit = unlit_px(rig, lines.width_px)
     return column, *dark_offset(column.column_px, column.amplitude, y, std, lines, response, unlit)

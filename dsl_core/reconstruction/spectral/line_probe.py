@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.line_profile import zero_order_profile
+from dsl_core.optics.line_profile import LineTable
 from dsl_core.optics.line_set import LineSet
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
 
@@ -79,10 +79,12 @@ def probe_lines(
     radiance: NDArray[np.float32],
     std: NDArray[np.floating],
     targets: NDArray[np.intp],
+    widths: Tensor | None = None,
 ) -> LineProbe:
     """Probe the lines near the columns of pixels (flat indices).
 
-    ``radiance`` and ``std`` are (frames, rows, columns).
+    ``radiance`` and ``std`` are (frames, rows, columns), ``widths`` (n,) those of the line spread relative to
+    the response's.
     """
     column, offset = (
         torch.as_tensor(values.ravel()[targets], dtype=torch.float64)
@@ -97,10 +99,12 @@ def probe_lines(
     weight = weight * lines.exists(index)
     distance = column[:, None] - lines.centre_px(index)
 
+    reach_px = float(distance.abs().max()) + 2 * STEP_PX
+    own = torch.ones_like(column) if widths is None else widths
+
     def light(blur: float = 1.0, shift_px: float = 0.0) -> Tensor:
-        own = response.model_copy(update={"blur_px": response.blur_px * blur})
-        half = lines.width_px / 2
-        return zero_order_profile(distance + shift_px, -half, half, own)
+        table = LineTable(lines.width_px, response, reach_px, column, own * blur)
+        return table.at(distance.T + shift_px)[0].T
 
     base = light()
     slope = (light(shift_px=STEP_PX) - light(shift_px=-STEP_PX)) / (2 * STEP_PX)

@@ -19,12 +19,14 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from dsl_core.model.line_spread import Spread, stretched
 from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
+from dsl_core.optics.spread.field import widths_at
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
 from dsl_core.reconstruction.spectral.solver import Prior, band_mean, roughness
@@ -112,9 +114,11 @@ def probe(scan: ProbedScan) -> Probe | None:
     lines = scan.model.lines
     assert lines is not None
     response = scan.model.response(0.0)
+    column = torch.as_tensor(scan.pixels.column_px.ravel()[targets], dtype=torch.float64)
+    widths = widths_at(scan.model.rig, torch.as_tensor(targets), column)
     return Probe(
         **together,
-        lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets),
+        lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
     )
 
@@ -229,14 +233,14 @@ class _OrderLight:
     time: Tensor
 
 
-def _changed_profiles(width_px: float, blur_px: float, band_px: float, like: Tensor) -> Tensor:
+def _changed_profiles(width_px: float, spread: Spread, band_px: float, like: Tensor) -> Tensor:
     """Profiles of a line on a band at even distances, `SAMPLES` a column, zero at both ends: (distances, 4).
 
     As it is, and what it gains per column of shift, per share of blur and per share of light in the tail.
     """
     own, blurred, tail = (
-        ProfileTable(width_px, each, band_px, like.device, like.dtype).values
-        for each in (blur_px, blur_px * (1 + BLUR_STEP), blur_px * TAIL_BLUR)
+        ProfileTable(width_px, stretched(spread, by), band_px, like.device, like.dtype).values
+        for by in (1.0, 1 + BLUR_STEP, TAIL_BLUR)
     )
     own, blurred = (
         torch.nn.functional.pad(each, ((len(tail) - len(each)) // 2,) * 2) for each in (own, blurred)
@@ -279,7 +283,8 @@ class _Light:
         assert lines is not None
         columns, inside = footprint.columns, scan.model.inside(footprint)
         half = scan.model.bands.half_width_px(columns)
-        table = _changed_profiles(lines.width_px, scan.model.response(0.0).blur_px, half, columns)
+        spread = stretched(scan.model.response(0.0).line_spread, scan.model.width(footprint, inside))
+        table = _changed_profiles(lines.width_px, spread, half, columns)
         reach = (len(table) - 1) / 2 / SAMPLES
         low = torch.where(inside, columns, torch.inf).amin(0)
         high = torch.where(inside, columns, -torch.inf).amax(0)

@@ -247,7 +247,8 @@ class SpectralReconstruction:
             if lit and self.model.lines is not None:
                 check()
                 radiance, weight = frames.samples(lit, self.model.lines)
-                system.add(order, footprint.columns, inside, radiance, weight, lit.start)
+                width = self.model.width(footprint, inside)
+                system.add(order, footprint.columns, inside, radiance, weight, lit.start, width)
         return system, None if system.offset is None else variance * system.offset**2
 
     def _colour_rows(self, frames: TileFrames, shading: Tensor, right: Tensor) -> Tensor | None:

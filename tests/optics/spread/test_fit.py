@@ -10,7 +10,8 @@ from dsl_core.model.line_spread import LineSpread
 from dsl_core.model.rig import ProjectorResponse
 from dsl_core.optics.line_profile import zero_order_profile
 from dsl_core.optics.spread.curves import density
-from dsl_core.optics.spread.fit import MIN_PIXELS, Peaks, fit_spread
+from dsl_core.optics.spread.equations import MIN_PIXELS, Peaks
+from dsl_core.optics.spread.fit import fit_spread
 
 WIDTH_PX, STEP_PX, RUN = 5, 2, 8
 PLACES = np.arange(-48, 49) / 8

@@ -20,11 +20,13 @@ PIXELS = 4000
 UNLIT_PX = (80.0, 160.0)
 
 
-def peaks(column: torch.Tensor, amplitude: torch.Tensor) -> torch.Tensor:
+def peaks(
+    column: torch.Tensor, amplitude: torch.Tensor, response: ProjectorResponse = RESPONSE
+) -> torch.Tensor:
     """Exact zero-order signal of every line frame, (frames, pixels)."""
     centre = LINES.centre_px(torch.arange(LINES.lines))[:, None]
     half = LINES.width_px / 2
-    return amplitude * zero_order_profile(column - centre, -half, half, RESPONSE)
+    return amplitude * zero_order_profile(column - centre, -half, half, response)
 
 
 def noisy(noise: float) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -53,6 +55,20 @@ def test_refinement_is_unbiased_and_states_its_deviation() -> None:
     assert float(error.std()) < 0.06
     relative = (found.amplitude - amplitude) / found.amplitude_std
     assert 0.8 < float(relative.std()) < 1.1
+
+
+def test_every_pixel_is_refined_by_its_own_width_of_the_spread() -> None:
+    column, amplitude, _, std = noisy(0.01)
+    widths = torch.where(torch.arange(PIXELS) % 2 == 0, 0.8, 1.3)
+    radiance = torch.zeros_like(std)
+    for width in (0.8, 1.3):
+        own = RESPONSE.with_gaussian(0.6 * width)
+        radiance[:, widths == width] = peaks(column, amplitude, own)[:, widths == width]
+    found = refine(column.round(), radiance, std, LINES, RESPONSE, widths)
+    assert found.refined.all()
+    assert (found.column_px - column).abs().max() < 2e-3
+    common = refine(column.round(), radiance, std, LINES, RESPONSE)
+    assert (common.column_px - column).abs().max() > 0.02
 
 
 def test_refinement_of_exact_data_is_exact() -> None:

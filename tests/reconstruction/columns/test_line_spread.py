@@ -11,6 +11,7 @@ from dsl_core import pipeline
 from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.rig import Rig
+from dsl_core.model.spread_field import SpreadField
 from dsl_core.optics.line_set import LineSet
 from dsl_core.reconstruction.columns.line_spread import own_spread
 from dsl_core.reconstruction.merge import MergedScan, decode_columns, stack_lines
@@ -46,9 +47,16 @@ def depth_error_mm(scanned: Scanned, rig: Rig, as_calibrated: bool) -> tuple[flo
     return float(np.sqrt(np.nanmean((result["depth_mm"].values - truth) ** 2))), fit
 
 
-def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scanned) -> None:
-    right, fit = depth_error_mm(scanned, scanned[0], as_calibrated=False)
+@pytest.fixture(scope="module")
+def right(scanned: Scanned) -> float:
+    """Error of depth (mm) with the right calibration, which nothing is said against."""
+    error, fit = depth_error_mm(scanned, scanned[0], as_calibrated=False)
     assert "line spread" not in {finding.name for finding in fit.significant}
+    assert "line spread over the field" not in {finding.name for finding in fit.findings}
+    return error
+
+
+def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scanned, right: float) -> None:
     wrong = blurred(scanned[0], 0.7)
     before, fit = depth_error_mm(scanned, wrong, as_calibrated=True)
     assert "line spread" not in {finding.name for finding in fit.findings}
@@ -59,6 +67,17 @@ def test_a_wrong_blur_of_the_calibration_does_no_harm_and_is_told(scanned: Scann
     assert told.part == "profile"
     assert re.search(r"over 0\.(599|600) ± 0\.00\d px", told.sentence)
     assert "by its calibration over 0.700 px" in told.sentence
+
+
+def test_a_field_that_the_calibration_has_wrong_does_no_harm(scanned: Scanned, right: float) -> None:
+    """Columns follow the field that is stated, and the scan states its own."""
+    field = SpreadField(
+        centre_px=(320.0, 180.0), half_px=(320.0, 180.0), coefficients=(0.0, 0.1, 0.1, 0.1, 0.0, 0.1)
+    )
+    response = scanned[0].projector_response.model_copy(update={"field": field})
+    wrong = scanned[0].model_copy(update={"projector_response": response})
+    assert depth_error_mm(scanned, wrong, as_calibrated=True)[0] > 2 * right
+    assert depth_error_mm(scanned, wrong, as_calibrated=False)[0] < 1.05 * right
 
 
 def test_only_single_lines_without_gaps_show_the_spread(scanned: Scanned) -> None:
