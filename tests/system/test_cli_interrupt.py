@@ -46,13 +46,13 @@ def _interrupted(arguments: list[str], log: Path, lines: int) -> tuple[int, str]
         stderr=subprocess.PIPE,
         text=True,
     )
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while process.poll() is None and time.monotonic() < deadline:
         if log.exists() and log.read_bytes().count(b"\n") >= lines:
             process.send_signal(signal.SIGINT)
             break
         time.sleep(0.005)
-    _, complaint = process.communicate(timeout=60)
+    _, complaint = process.communicate(timeout=300)
     return process.returncode, complaint
 
 
@@ -67,8 +67,12 @@ def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_interrupted_scan_says_how_to_resume_and_does(
     give: Give, unbroken: Path, tmp_path: Path, lines: int
 ) -> None:
-    scan = tmp_path / "scan.dsl"
-    code, complaint = _interrupted(["scan", str(scan), *SCAN], scan / "frames.jsonl", lines)
+    # On a busy machine a scan may end before it is interrupted, which says nothing: try again.
+    for attempt in range(5):
+        scan = tmp_path / f"scan-{attempt}.dsl"
+        code, complaint = _interrupted(["scan", str(scan), *SCAN], scan / "frames.jsonl", lines)
+        if code != 0:
+            break
     assert code == 130, complaint
     assert without_progress(complaint).count("\n") == 1, complaint
     assert f"Resume with: dsl-scan resume {scan}" in complaint
