@@ -110,7 +110,7 @@ class CalibrateController:
             if self.state.campaign.value == facts:
                 self.state.rows.set(rows)
 
-        self._runner.submit(Job("Read the campaign", work, done, self._tell, is_minor=True))
+        self._runner.submit(Job("Read the campaign", work, done, is_minor=True))
 
     def _fits(self, facts: CampaignFacts) -> bool:
         choice = self._rig.state.choice.value
@@ -216,7 +216,7 @@ class CalibrateController:
             self.state.note.set(products_text(made))
             self.library.load()
 
-        self._runner.submit(Job("Keep the rig", work, done, self._tell))
+        self._runner.submit(Job("Keep the rig", work, done))
 
     # Obstacles --------------------------------------------------------------------------------------
 
@@ -266,9 +266,6 @@ class CalibrateController:
             self._notifier.tell("error", str(error))
             return False
         return True
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
 
     def command_line(self, name: str = "") -> str:
         """The command that runs one calibration, or all of them for an empty name.

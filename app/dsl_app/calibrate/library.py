@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.connection.controller import RIG, RigController
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
+from dsl_app.shared.notify import NO_RIG, Notifier
 from dsl_core.io.calibration_library import CalibrationLibrary, LibraryEntry, LibraryLine
 from dsl_core.progress import Progress
 
@@ -46,7 +45,7 @@ class LibraryController:
             progress.report("read the library", 0, 0)
             return self._library.lines()
 
-        self._submit("Read the library", work, self._state.library.set)
+        self._runner.submit(Job("Read the library", work, self._state.library.set))
 
     def use(self, key: str) -> None:
         """Scan with a calibration from now on."""
@@ -60,7 +59,8 @@ class LibraryController:
             self._state.note.set(f"The current version of {name} is now {entry.stamp}.")
             self.load()
 
-        self._submit(f"Restore {name}", lambda progress: self._library.restore(name, stamp), done)
+        work = lambda progress: self._library.restore(name, stamp)  # noqa: E731
+        self._runner.submit(Job(f"Restore {name}", work, done))
 
     def export(self, key: str, target: Path, form: str, overwrite: bool) -> None:
         """Export a calibration for another computer or program; ``form`` is entry, rig or published."""
@@ -73,7 +73,7 @@ class LibraryController:
         def done(files: list[Path]) -> None:
             self._notifier.tell("info", f"Exported to {', '.join(map(str, files))}.")
 
-        self._submit(f"Export {key}", work, done)
+        self._runner.submit(Job(f"Export {key}", work, done))
 
     def offer(self, path: Path) -> bool:
         """Import a file if it looks like a calibration; False if it does not."""
@@ -97,7 +97,7 @@ class LibraryController:
             self._state.note.set(f"{entry.name} is in the library, version {entry.stamp}.")
             self.load()
 
-        self._submit(f"Import {path.name}", work, done)
+        self._runner.submit(Job(f"Import {path.name}", work, done))
 
     def report(self, key: str) -> None:
         """Write the report of a calibration and show it."""
@@ -111,7 +111,7 @@ class LibraryController:
                 folder / f"{entry.name}.html", entry.rig, entry.accepted, entry.history
             )
 
-        self._submit(f"Report on {key}", work, self._state.opened.emit)
+        self._runner.submit(Job(f"Report on {key}", work, self._state.opened.emit))
 
     @property
     def must_be_placed(self) -> bool:
@@ -156,10 +156,4 @@ class LibraryController:
             self._state.note.set(said.sentence)
             self._state.drift.set(said)
 
-        self._rig.run(Job(f"Check {key} for drift", work, done, self._tell, exclusive=RIG))
-
-    def _submit(self, title: str, work: Callable[..., object], done: Callable[..., object]) -> None:
-        self._runner.submit(Job(title, work, done, self._tell))
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
+        self._rig.run(Job(f"Check {key} for drift", work, done, exclusive=RIG))

@@ -60,7 +60,7 @@ class DemoController:
             self._is_made = True
             self._notifier.tell("info", "Making the demo for the first time. This takes about a minute.")
             self._runner.submit(
-                Job("Make the demo", self._make, self._made, self._failed, self._end, exclusive="the demo")
+                Job("Make the demo", self._make, self._present, self._failed, on_ended=self._end)
             )
 
     def _make(self, progress: Progress) -> Path:
@@ -80,12 +80,7 @@ class DemoController:
         save_result(reconstruct_scan(session, progress=progress), target)
         return target
 
-    def _made(self, result: Path) -> None:
-        self._end()
-        self._present(result)
-
     def _failed(self, error: Exception) -> None:
-        self._end()
         self._notifier.tell("error", f"The demo could not be made: {error}")
 
     def _end(self) -> None:

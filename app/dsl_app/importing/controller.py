@@ -88,16 +88,18 @@ class ImportController:
         def looked(found: Found) -> None:
             # The outcome of a check is dropped once another one has begun.
             if number == self._looks:
-                self.state.busy.set("")
                 done(found)
 
         def failed(error: Exception) -> None:
-            self.state.busy.set("")
             self.state.trouble.set(sentence_of(error))
-            self._tell(error)
+            self._notifier.tell("error", sentence_of(error))
 
-        ended = lambda: self.state.busy.set("")  # noqa: E731
-        self._runner.submit(Job(f"Check {request.folder.name}", work, looked, failed, ended, is_minor=True))
+        def ended() -> None:
+            if number == self._looks:
+                self.state.busy.set("")
+
+        title = f"Check {request.folder.name}"
+        self._runner.submit(Job(title, work, looked, failed, is_minor=True, on_ended=ended))
 
     def _show(self, found: Found) -> None:
         assert self.state.request.value is not None
@@ -120,11 +122,8 @@ class ImportController:
             return False
         carry_out = import_calibration if found.kind == "calibration" else import_scan
         work = lambda progress: carry_out(request, self._library, progress)  # noqa: E731
-        self._runner.submit(Job(f"Import {request.folder.name}", work, self.state.done.emit, self._tell))
+        self._runner.submit(Job(f"Import {request.folder.name}", work, self.state.done.emit))
         return True
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
 
 
 def look_at(request: ImportRequest, library: CalibrationLibrary) -> Found:

@@ -17,7 +17,7 @@ from dsl_app.results.state import DAYLIGHT, Limits, ResultsState, ResultView
 from dsl_app.shared.evented import Event
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import RESULT_NAME, Kind, kind_of
-from dsl_app.shared.notify import Notifier
+from dsl_app.shared.notify import Notifier, sentence_of
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.errors import DslError
@@ -110,22 +110,14 @@ class ResultsController:
                 observer_weights(arrays.wavelengths_nm)
             return arrays, picture_of(arrays["rgb"]) if "rgb" in arrays.arrays else None
 
-        job = Job(
-            title,
-            both,
-            self._opened,
-            self._failed,
-            lambda: self.state.busy.set(""),
-            exclusive="opening",
-            is_minor=is_minor,
-        )
+        idle = lambda: self.state.busy.set("")  # noqa: E731
+        job = Job(title, both, self._opened, exclusive="opening", is_minor=is_minor, on_ended=idle)
         self._loading = job if is_minor else None
         self._runner.submit(job)
 
     def _opened(self, opened: tuple[ResultArrays, NDArray[np.uint8] | None]) -> None:
         arrays, picture = opened
         state = self.state
-        state.busy.set("")
         state.offer.set(None)
         state.search.set(None)
         state.graph.set(None)
@@ -144,13 +136,6 @@ class ResultsController:
             state.view.set(ResultView.DEPTH)
         self.marks.load()
         self.opened.emit(arrays)
-
-    def _failed(self, error: Exception) -> None:
-        self.state.busy.set("")
-        self._tell(error)
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", str(error))
 
     def command_line(self) -> str:
         """The command that reconstructs the offered scan or exports the open result."""
@@ -236,7 +221,7 @@ class ResultsController:
 
         def failed(error: Exception) -> None:
             undone()
-            self._tell(error)
+            self._notifier.tell("error", sentence_of(error))
 
         self._choose_light(light, adapted)
         self._runner.submit(Job(f"Light {light}", work, done, failed, undone, is_minor=True))
@@ -264,7 +249,7 @@ class ResultsController:
                 self._block, graph = found
                 self.state.graph.set(graph)
 
-        self._runner.submit(Job("Intensity graph", work, done, self._tell, is_minor=True))
+        self._runner.submit(Job("Intensity graph", work, done, is_minor=True))
 
 
 def is_complete(session: Path) -> bool:

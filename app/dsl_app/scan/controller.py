@@ -246,15 +246,12 @@ class ScanController:
 
         def failed(error: Exception) -> None:
             ended("failed")
-            self._tell(error)
+            self._notifier.tell("error", sentence_of(error))
 
         self.state.note.set(waiting)
         self._runner.submit(
             Job(f"Reconstruct {session.stem}", work, done, failed, lambda: ended("was cancelled"))
         )
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
 
     # Scans on disk --------------------------------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from dsl_app.scan.state import (
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import NO_RIG, Notifier, sentence_of
+from dsl_app.shared.notify import NO_RIG, Notifier
 from dsl_app.shared.undo import Change, UndoStack
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import check_conditions
@@ -117,10 +117,8 @@ class ScanPlanController:
             is_same = kind_of(path) is Kind.PLAN and self.state.plan.value == plan
             self.state.plan_file.set(path if is_same else None)
 
-        def work(progress: Progress) -> CapturePlan:
-            return read_plan(path, now)
-
-        self._runner.submit(Job(f"Open {path.name}", work, done, self._tell, is_minor=True))
+        work = lambda progress: read_plan(path, now)  # noqa: E731
+        self._runner.submit(Job(f"Open {path.name}", work, done, is_minor=True))
 
     def save_plan(self, path: Path) -> None:
         """Save the plan to a file; the file dialog has asked before replacing one."""
@@ -132,10 +130,8 @@ class ScanPlanController:
                 self.state.plan_file.set(written)
             self._notifier.tell("info", f"The plan is saved in {written}.")
 
-        def work(progress: Progress) -> Path:
-            return save_plan(plan, target, overwrite=True)
-
-        self._runner.submit(Job(f"Save {target.name}", work, done, self._tell, is_minor=True))
+        work = lambda progress: save_plan(plan, target, overwrite=True)  # noqa: E731
+        self._runner.submit(Job(f"Save {target.name}", work, done, is_minor=True))
 
     def _is_locked(self) -> bool:
         """Whether a scan has begun, whose plan must not change."""
@@ -217,7 +213,7 @@ class ScanPlanController:
             for trouble in read[1]:
                 self._notifier.tell("warning", trouble)
 
-        self._runner.submit(Job("Read the calibrations", work, done, self._tell, is_minor=True))
+        self._runner.submit(Job("Read the calibrations", work, done, is_minor=True))
 
     def choose_calibration(self, choice: CalibrationChoice) -> None:
         """Scan with another calibration; a running scan keeps its own."""
@@ -247,7 +243,7 @@ class ScanPlanController:
 
         work = lambda progress: self._library.find(choice.key).rig  # noqa: E731
         title = f"Open the calibration {choice.key}"
-        self._runner.submit(Job(title, work, done, self._tell, is_minor=True))
+        self._runner.submit(Job(title, work, done, is_minor=True))
 
     def _choose_later(self, choice: CalibrationChoice) -> None:
         is_news = choice != self._next and choice.key != self.state.calibration.value.key
@@ -266,9 +262,6 @@ class ScanPlanController:
         """Use the calibration although settings differ from it."""
         self.state.override.set(on)
         self.refresh()
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
 
     def close(self) -> None:
         """Disconnect from the rig's state."""

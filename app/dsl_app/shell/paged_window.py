@@ -78,6 +78,7 @@ class PagedWindow(QMainWindow):
         self.statusBar().addPermanentWidget(self.strip)
         self._dropped = OpenQueue(self.open_path, self._is_reading, self)
         parts.runner.changed.connect(self._dropped.open_next)
+        parts.runner.failed.connect(lambda text: self.toasts.tell("error", text))
         self._lay_out()
 
     def _lay_out(self) -> None:

@@ -88,7 +88,8 @@ def make_bench(
     choice: RigChoice = SMALL,
 ) -> CalibrateBench:
     """A bench whose rig is not yet connected; its calibrations are ``kinds``, two small ones by default."""
-    runner, notifier = runner or InlineRunner(), RecordingNotifier()
+    notifier = RecordingNotifier()
+    runner = runner or InlineRunner(notifier)
     rig = RigController(RigState(choice), runner, notifier)
     bench = CalibrateBench(folder, rig, CalibrateState(), notifier, CalibrationLibrary(folder / "library"))
     made = (kinds or _small)(bench)

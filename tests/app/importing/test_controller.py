@@ -57,7 +57,7 @@ class Bench:
         self.home.mkdir()
         self.library = CalibrationLibrary(folder / "library")
         self.state, self.notifier = ImportState(), RecordingNotifier()
-        self.control = ImportController(self.state, InlineRunner(), self.notifier, self.library)
+        self.control = ImportController(self.state, InlineRunner(self.notifier), self.notifier, self.library)
         self.done: list[Path] = []
         self.state.done.connect(self.done.append)
 

@@ -123,6 +123,11 @@ def test_an_uncaught_error_of_a_thread_is_told_in_the_window(qtbot: QtBot) -> No
     assert "ValueError: odd" in notifier.told[0][1]
 
 
+def test_an_error_that_a_job_does_not_handle_is_told_in_the_window(window: MainWindow) -> None:
+    window.parts.runner.failed.emit("The disk is full.")
+    assert [(toast.level, toast.text) for toast in window.toasts.shown] == [("error", "The disk is full.")]
+
+
 def test_themes_reach_the_whole_window(window: MainWindow) -> None:
     window.do("theme_light")
     assert window.theme.name == "light"

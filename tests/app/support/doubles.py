@@ -6,14 +6,21 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dsl_app.shared.jobs.base import Job
-from dsl_app.shared.notify import Level
+from dsl_app.shared.notify import Level, Notifier, sentence_of
+
+
+def tell_unhandled(job: Job[Any], notifier: Notifier | None) -> None:
+    """Tell the error of a job that does not handle it, as the window does for its runner."""
+    if job.error is not None and job.on_failed is None and notifier is not None:
+        notifier.tell("error", sentence_of(job.error))
 
 
 class InlineRunner:
-    """Runs every job at once in the caller's thread."""
+    """Runs every job at once in the caller's thread; errors that no job handles go to ``notifier``."""
 
-    def __init__(self) -> None:
+    def __init__(self, notifier: Notifier | None = None) -> None:
         self.finished: list[Job[Any]] = []
+        self.notifier = notifier
 
     @property
     def active(self) -> tuple[Job[Any], ...]:
@@ -24,6 +31,7 @@ class InlineRunner:
         """Run the job to its end."""
         job.accept()
         job.run()()
+        tell_unhandled(job, self.notifier)
         self.finished.append(job)
         return job
 
@@ -31,8 +39,8 @@ class InlineRunner:
 class WaitingRunner(InlineRunner):
     """Runs jobs at once, but keeps those with a title that begins as one of ``held``."""
 
-    def __init__(self, *held: str) -> None:
-        super().__init__()
+    def __init__(self, *held: str, notifier: Notifier | None = None) -> None:
+        super().__init__(notifier)
         self._held = held
         self.waiting: list[Job[Any]] = []
 
@@ -45,7 +53,9 @@ class WaitingRunner(InlineRunner):
 
     def run(self, place: int = 0) -> None:
         """Run one of the jobs that wait."""
-        self.waiting.pop(place).run()()
+        job = self.waiting.pop(place)
+        job.run()()
+        tell_unhandled(job, self.notifier)
 
 
 class ManualRunner:

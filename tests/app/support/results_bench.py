@@ -49,7 +49,7 @@ class Bench:
         open_first_page(self.window)
 
     def _make(self) -> PageWidget:
-        runner, window = InlineRunner(), self.window
+        window, runner = self.window, InlineRunner(self.window.toasts)
         self.control = ResultsController(self.state, runner, window.toasts, window.parts.undo)
         welcome = Welcome(window.parts.recent, window.open_path, lambda: self.asked.append("demo"))
         self.page = ResultsPage(self.state, self.control, runner, welcome)

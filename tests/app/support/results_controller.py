@@ -21,7 +21,7 @@ class Bench:
 
     def __init__(self, path: Path) -> None:
         self.state, self.undo, self.notifier = ResultsState(), UndoStack(), RecordingNotifier()
-        self.control = ResultsController(self.state, InlineRunner(), self.notifier, self.undo)
+        self.control = ResultsController(self.state, InlineRunner(self.notifier), self.notifier, self.undo)
         assert self.control.open(path)
 
     @property

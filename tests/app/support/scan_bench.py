@@ -61,7 +61,8 @@ class ScanBench:
 
 def make_bench(folder: Path, runner: JobRunner | None = None) -> ScanBench:
     """A bench whose rig is not yet connected."""
-    runner, notifier, undo = runner or InlineRunner(), RecordingNotifier(), UndoStack()
+    notifier, undo = RecordingNotifier(), UndoStack()
+    runner = runner or InlineRunner(notifier)
     state = ScanState(CapturePlan(), folder / "first.dsl")
     rig = RigController(RigState(TWIN), runner, notifier)
     library = CalibrationLibrary(folder / "library")
@@ -91,7 +92,7 @@ def make_forecast(
         bench.state,
         bench.rig.state,
         bench.scans.plans,
-        runner or InlineRunner(),
+        runner or InlineRunner(bench.notifier),
         bench.notifier,
         folder,
         automatic,

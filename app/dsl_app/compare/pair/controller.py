@@ -113,19 +113,14 @@ class PairController:
             return
         self.state.busy.set(title)
 
-        def ended(result: T) -> None:
-            self.state.busy.set("")
+        def finished(result: T) -> None:
             done(result)
             self._open_next()
 
-        self._runner.submit(Job(title, work, ended, self._failed, self._cancelled))
-
-    def _cancelled(self) -> None:
-        self._waiting.clear()
-        self.state.busy.set("")
+        idle = lambda: self.state.busy.set("")  # noqa: E731
+        self._runner.submit(Job(title, work, finished, self._failed, self._waiting.clear, on_ended=idle))
 
     def _failed(self, error: Exception) -> None:
-        self.state.busy.set("")
         self.state.trouble.set(sentence_of(error))
         self._notifier.tell("error", sentence_of(error))
         self._open_next()

@@ -164,18 +164,17 @@ class SeriesController:
             return self._compare(row, progress)
 
         def done(read: SeriesRow) -> None:
-            state.busy.set("")
             if asked == (state.region.value, state.against.value):
                 self._take(kind, read)
             else:
                 self._read()
 
         def failed(error: Exception) -> None:
-            state.busy.set("")
             self._take(kind, _without(row, kind, f"{type(error).__name__}: {error}"))
 
         state.busy.set(f"Read {row.name}")
-        self._runner.submit(Job(f"Read {row.name}", work, done, failed, lambda: self._cancelled(kind)))
+        cancelled, idle = lambda: self._cancelled(kind), lambda: state.busy.set("")
+        self._runner.submit(Job(state.busy.value, work, done, failed, cancelled, on_ended=idle))
 
     def _take(self, kind: SeriesKind, read: SeriesRow) -> None:
         """Keep what was read, but prefer a position typed in the meantime."""
@@ -202,7 +201,6 @@ class SeriesController:
 
     def _cancelled(self, kind: SeriesKind) -> None:
         why = "Not read because the job was cancelled. Remove it and add it again."
-        self.state.busy.set("")
         self._set_rows(
             tuple(row if row.is_read(kind) else _without(row, kind, why) for row in self.state.rows.value)
         )
@@ -264,13 +262,10 @@ class SeriesController:
                 return write_text(target, lambda: stage_page(names, targets, test), overwrite=True)
             return write_text(target, lambda: sweep_page(points, reference), overwrite=True)
 
-        def failed(error: Exception) -> None:
-            self._notifier.tell("error", str(error))
-
         def done(path: Path) -> None:
             self._notifier.tell("info", f"Saved the report as {path}.")
 
-        self._runner.submit(Job("Write the report", work, done, failed))
+        self._runner.submit(Job("Write the report", work, done))
 
     def command_line(self) -> str:
         """The command that does the same; empty while there is no answer."""

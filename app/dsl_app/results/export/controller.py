@@ -100,14 +100,7 @@ class ExportController:
                 written += exporters[form](data, path, overwrite=overwrite, check=check)
             return written
 
-        self._runner.submit(
-            Job(
-                f"Export {result.path.stem}",
-                work,
-                self._exported,
-                lambda error: self._notifier.tell("error", str(error)),
-            )
-        )
+        self._runner.submit(Job(f"Export {result.path.stem}", work, self._exported))
 
     def _exported(self, written: Sequence[Path]) -> None:
         megabytes = sum(path.stat().st_size for path in written if path.is_file()) / 1e6

@@ -72,9 +72,8 @@ class MarksController:
             else:
                 self.state.library.set(Library(path, content))
 
-        self._runner.submit(
-            Job(f"Read {path.name}", lambda progress: read_references(path), done, self._tell, is_minor=True)
-        )
+        work = lambda progress: read_references(path)  # noqa: E731
+        self._runner.submit(Job(f"Read {path.name}", work, done, is_minor=True))
 
     def add_references(self, path: Path, chosen: Iterable[Reference]) -> None:
         """Add reference spectra of a file; ends the choice from a library."""
@@ -102,15 +101,8 @@ class MarksController:
                 lambda: self._add(replace(region, name=self._name("region"), colour=self._colour()))
             )
 
-        self._runner.submit(
-            Job(
-                "Mean of a region",
-                lambda progress: fill_region(draft, result, progress),
-                done,
-                self._tell,
-                is_minor=True,
-            )
-        )
+        work = lambda progress: fill_region(draft, result, progress)  # noqa: E731
+        self._runner.submit(Job("Mean of a region", work, done, is_minor=True))
 
     def _add(self, mark: Mark) -> None:
         self._change(f"adding {mark.name}", (*self.state.marks.value, mark))
@@ -196,7 +188,7 @@ class MarksController:
         def done(written: Path) -> None:
             self._notifier.tell("info", f"Wrote {_counted(len(spectra))} to {written}.")
 
-        self._runner.submit(Job("Export spectra", work, done, self._tell))
+        self._runner.submit(Job("Export spectra", work, done))
 
     # Read ------------------------------------------------------------------------------------------
 
@@ -209,9 +201,6 @@ class MarksController:
     def is_reading(self) -> bool:
         """Whether saved marks are still being read."""
         return self._storage.is_reading
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", str(error))
 
 
 def _counted(spectra: int) -> str:

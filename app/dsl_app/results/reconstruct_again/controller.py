@@ -24,7 +24,7 @@ from dsl_app.results.reconstruct_again.state import (
 )
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.known_files import Kind, kind_of
-from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.notify import Notifier
 from dsl_core.errors import StoreError
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.progress import Progress
@@ -56,7 +56,7 @@ class ReconstructionController:
             self._judge()
             self.state.ready.emit(source)
 
-        self._runner.submit(Job(f"Read {path.name}", work, done, self._tell, is_minor=True))
+        self._runner.submit(Job(f"Read {path.name}", work, done, is_minor=True))
 
     def change(self, **what: Any) -> None:
         """Change fields of the request."""
@@ -90,11 +90,8 @@ class ReconstructionController:
 
         title = f"Reconstruct {target.stem}"
         work = lambda progress: reconstruct(request, source, target, self._library, progress)  # noqa: E731
-        self._runner.submit(Job(title, work, done, self._tell))
+        self._runner.submit(Job(title, work, done))
         return True
-
-    def _tell(self, error: Exception) -> None:
-        self._notifier.tell("error", sentence_of(error))
 
 
 def reconstruct(

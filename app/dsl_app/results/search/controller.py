@@ -40,15 +40,7 @@ class SearchController:
             if self.state.result.value is result:
                 self.state.search.set(search)
 
-        self._runner.submit(
-            Job(
-                f"Search for {name}",
-                work,
-                done,
-                lambda error: self._notifier.tell("error", str(error)),
-                is_minor=True,
-            )
-        )
+        self._runner.submit(Job(f"Search for {name}", work, done, is_minor=True))
 
     def set_limits(self, within_rad: float, within_delta_e: float) -> None:
         """Change the limits of the search; the picture follows at once."""

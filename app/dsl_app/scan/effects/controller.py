@@ -9,7 +9,7 @@ from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.effects.state import EffectChoice, EffectsState, EffectsView
 from dsl_app.scan.state import ScanState
 from dsl_app.shared.jobs.base import Job, JobRunner
-from dsl_app.shared.notify import Notifier, sentence_of
+from dsl_app.shared.notify import Notifier
 from dsl_core.devices.base import DeviceRig
 from dsl_core.model.plan import CapturePlan
 from dsl_core.progress import Progress
@@ -70,16 +70,14 @@ class EffectsController:
         def done(view: EffectsView) -> None:
             # After several quick clicks the last choice wins.
             if turn == self._turn:
-                self.state.busy.set(False)
                 self.state.view.set(view)
 
-        def failed(error: Exception) -> None:
-            self.state.busy.set(False)
-            self._notifier.tell("error", sentence_of(error))
+        def ended() -> None:
+            if turn == self._turn:
+                self.state.busy.set(False)
 
         self.state.busy.set(True)
-        ended = lambda: self.state.busy.set(False)  # noqa: E731
-        self._runner.submit(Job("Weigh the effects", work, done, failed, ended, is_minor=True))
+        self._runner.submit(Job("Weigh the effects", work, done, is_minor=True, on_ended=ended))
 
     def look_again(self) -> None:
         """Show the last choice again, for the current plan."""

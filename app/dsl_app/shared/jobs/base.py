@@ -50,7 +50,7 @@ class Job(Generic[T]):
     window's thread. ``exclusive`` names something that only one job may use at a time, such as the rig.
     ``is_minor`` jobs are stopped without a question when the window closes. ``on_accepted`` is called when
     the runner has accepted the job, before the work begins; ``on_ended`` before the other callbacks, however
-    the job ends.
+    the job ends. Without ``on_failed`` the runner tells the person what went wrong.
     """
 
     title: str
@@ -129,7 +129,7 @@ class Job(Generic[T]):
 
 
 class JobRunner(Protocol):
-    """Runs jobs and keeps those that have not ended."""
+    """Runs jobs, keeps those that have not ended, and tells the errors that no job handles itself."""
 
     @property
     def active(self) -> tuple[Job[Any], ...]:

@@ -10,6 +10,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 
 from dsl_app.shared.jobs.base import Job, JobState
 from dsl_app.shared.jobs.memory import trim_memory
+from dsl_app.shared.notify import sentence_of
 from dsl_core.errors import DeviceError
 
 #: Interval between progress updates, ms: short enough to look smooth, long enough to cost little.
@@ -20,10 +21,12 @@ WORKERS = 3
 class QtRunner(QObject):
     """A `JobRunner` whose callbacks run in the thread of the window.
 
-    ``changed`` fires when a job starts or ends, and every `TICK_MS` while one runs.
+    ``changed`` fires when a job starts or ends, and every `TICK_MS` while one runs; ``failed`` with what went
+    wrong in a job that does not handle its failure.
     """
 
     changed = Signal()
+    failed = Signal(str)
     _ended = Signal(object, object)
 
     def __init__(self, parent: QObject | None = None) -> None:
@@ -84,4 +87,6 @@ class QtRunner(QObject):
         if not self._active:
             self._ticker.stop()
         finish()
+        if job.error is not None and job.on_failed is None:
+            self.failed.emit(sentence_of(job.error))
         self.changed.emit()

@@ -31,7 +31,8 @@ def undo() -> UndoStack:
 
 @pytest.fixture
 def series(undo: UndoStack) -> SeriesController:
-    return SeriesController(SeriesState(), InlineRunner(), RecordingNotifier(), undo)
+    notifier = RecordingNotifier()
+    return SeriesController(SeriesState(), InlineRunner(notifier), notifier, undo)
 
 
 def told(series: SeriesController) -> str:

@@ -41,7 +41,8 @@ class Bench:
         shutil.copytree(finished, self.folder)
         self.library = CalibrationLibrary(folder / "library")
         self.state, self.notifier = ReconstructionState(), RecordingNotifier()
-        self.control = ReconstructionController(self.state, InlineRunner(), self.notifier, self.library)
+        runner = InlineRunner(self.notifier)
+        self.control = ReconstructionController(self.state, runner, self.notifier, self.library)
         self.done: list[Reconstructed] = []
         self.state.done.connect(self.done.append)
 

@@ -33,7 +33,9 @@ def bench(tmp_path: Path) -> ScanBench:
 
 @pytest.fixture
 def control(bench: ScanBench) -> EffectsController:
-    return EffectsController(EffectsState(), bench.state, bench.rig, InlineRunner(), bench.notifier)
+    return EffectsController(
+        EffectsState(), bench.state, bench.rig, InlineRunner(bench.notifier), bench.notifier
+    )
 
 
 @pytest.fixture

@@ -71,6 +71,23 @@ def test_callbacks_run_in_the_thread_of_the_window(qtbot: QtBot) -> None:
     runner.shut_down()
 
 
+@pytest.mark.parametrize("is_handled", [False, True])
+def test_an_error_that_a_job_does_not_handle_is_told_once(qtbot: QtBot, is_handled: bool) -> None:
+    runner = QtRunner()
+    told: list[str] = []
+    handled: list[str] = []
+    runner.failed.connect(told.append)
+
+    def work(progress: Progress) -> None:
+        raise DecodeError("no light")
+
+    handle = (lambda error: handled.append(str(error))) if is_handled else None
+    runner.submit(Job("Decode", work, on_failed=handle))
+    qtbot.waitUntil(lambda: runner.active == ())
+    assert (handled, told) == ((["no light"], []) if is_handled else ([], ["no light"]))
+    runner.shut_down()
+
+
 def test_two_jobs_cannot_use_one_rig(qtbot: QtBot) -> None:
     runner, gate = QtRunner(), threading.Event()
     runner.submit(Job("First scan", lambda progress: gate.wait(5), exclusive="the rig"))
