@@ -7,9 +7,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
 
 from dsl_app.calibrate.campaign_box import CampaignBox
 from dsl_app.calibrate.library_panel import LibraryPanel
@@ -17,9 +17,10 @@ from dsl_app.calibrate.presentation import row_display
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.widgets.forms import Banner, label, set_role, show_button
+from dsl_app.shared.widgets.forms import Banner, label, push_button, set_role, show_button
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, scrolled, splitter
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.ticker import Ticker
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.controller import CalibrateController
@@ -39,14 +40,15 @@ class CalibratePage(PageWidget):
     ) -> None:
         super().__init__()
         self._state, self._commands = state, commands
-        self.banner = Banner("Connect the campaign's rig")
-        self.banner.action.setToolTip("Open the rig that the campaign was begun with")
+        self.banner = Banner(
+            "Connect the campaign's rig",
+            "Open the rig that the campaign was begun with",
+            commands.connect_rig,
+        )
         self.head = CampaignBox(state, rig, commands, home)
         self.rows = {row.name: CalibrationRow(row, number) for number, row in enumerate(state.rows.value, 1)}
         self.library = LibraryPanel(state, commands.library)
-        self._timer = QTimer(self)
-        self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(commands.take_news)
+        self._timer = Ticker(self, FETCH_MS, commands.take_news)
         self._lay_out()
         self._connect()
 
@@ -58,14 +60,13 @@ class CalibratePage(PageWidget):
 
     def _connect(self) -> None:
         state = self._state
-        self.banner.action.clicked.connect(self._commands.connect_rig)
         for row in self.rows.values():
             row.run_requested.connect(self.run)
         self.stops: list[Callable[[], None]] = [
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
             *follow_any(self._show_rows, state.rows, state.opening, state.everything),
-            state.everything.follow(self._follow_progress),
+            state.everything.follow(lambda progress: self._timer.run_while(bool(progress))),
         ]
 
     def run(self, name: str) -> None:
@@ -78,12 +79,6 @@ class CalibratePage(PageWidget):
         for row in self._state.rows.value:
             if row.name in self.rows:
                 self.rows[row.name].show_row(row, self._state.is_busy)
-
-    def _follow_progress(self, progress: str) -> None:
-        if progress:
-            self._timer.start()
-        else:
-            self._timer.stop()
 
     def showEvent(self, event: QShowEvent) -> None:
         """Read campaign and library again: other programs may have changed them."""
@@ -133,8 +128,7 @@ class CalibrationRow(QFrame):
         self._state, self._figure, self._date = label(""), label("", wraps=True), label("", "muted")
         self._date.setToolTip("When it was accepted")
         self._reason = label("", "muted", wraps=True)
-        self.run = QPushButton()
-        self.run.clicked.connect(lambda: self.run_requested.emit(row.name))
+        self.run = push_button("", "", lambda: self.run_requested.emit(row.name))
         self._lay_out()
         self.show_row(row)
 

@@ -19,7 +19,7 @@ from dsl_app.importing.state import PUBLISHED, FileRow, Found, ImportRequest, Im
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
 from dsl_app.shared.widgets.dialogs import JobDialog
-from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, push_button
+from dsl_app.shared.widgets.forms import ChoiceBox, WholeBox, label, named, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 from dsl_app.shared.widgets.read_table import ReadTable, cell
@@ -74,6 +74,7 @@ class ImportDialog(JobDialog):
             "The folder does not contain the film's pose, the sensor's response and the scale of white.\n"
             "A scan needs the calibration of the rig that captured it.",
             [("The published rig", PUBLISHED), *((name, name) for name in self._state.library.value)],
+            lambda base: self._commands.change(base=base),
         )
         self.file = push_button("&File…", "Choose a calibration file (.json)", self._choose_file)
         self._size = QWidget()
@@ -86,12 +87,10 @@ class ImportDialog(JobDialog):
             box.setSpecialValueText("as in the file")
 
     def _make_target(self, request: ImportRequest) -> None:
-        self.name = QLineEdit(request.target.stem)
-        self.name.setAccessibleName("Name")
-        self.name.setToolTip("Name of the imported scan or calibration; the ending is added")
-        self.home = QLineEdit(str(request.target.parent))
-        self.home.setAccessibleName("Folder to save in")
-        self.home.setToolTip("Folder of the imported scan or calibration; the source folder is not changed")
+        tip = "Name of the imported scan or calibration; the ending is added"
+        self.name = named(QLineEdit(request.target.stem), "Name", tip)
+        tip = "Folder of the imported scan or calibration; the source folder is not changed"
+        self.home = named(QLineEdit(str(request.target.parent)), "Folder to save in", tip)
         self.browse = push_button("&Choose…", "Choose the folder to save in", self._choose_home)
         self.name_buttons(
             "Import", "Import the folder, completely or not at all", "Close without importing (Escape)"
@@ -113,7 +112,6 @@ class ImportDialog(JobDialog):
 
     def _connect(self) -> None:
         commands = self._commands
-        self.base.activated.connect(lambda index: commands.change(base=self.base.itemData(index)))
         for field in (self.name, self.home):
             field.textEdited.connect(lambda _: self._rename())
         for box in (self.width_px, self.height_px):

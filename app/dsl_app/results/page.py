@@ -67,7 +67,7 @@ class ResultsPage(PageWidget):
         self.search = SearchPanel(state, control.search)
         set_help(self.search, "numbers#search")
         self._graph: IntensityWindow | None = None
-        self.title, self.about = label("Results", "title"), label("", "muted")
+        self.title, self.about = label("Results", "title"), label("", "muted", can_be_copied=True)
         self.warning = label("", "warn", wraps=True)
         self.reconstruct_again = push_button(
             "Reconstruct again…",
@@ -112,7 +112,6 @@ class ResultsPage(PageWidget):
     # Lay out ---------------------------------------------------------------------------------------
 
     def _lay_out(self) -> None:
-        self.about.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.about.setSizePolicy(
             self.about.sizePolicy().Policy.Ignored, self.about.sizePolicy().verticalPolicy()
         )

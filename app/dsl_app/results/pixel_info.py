@@ -50,15 +50,12 @@ class PixelInfo(QFrame):
     def __init__(self, state: ResultsState) -> None:
         super().__init__()
         self._state = state
-        self.values = label(HINT)
-        self.values.setAccessibleName("Pixel under the cursor")
-        self.reasons = label("", "muted", wraps=True)
-        self.reasons.setAccessibleName("Why this pixel is limited")
+        self.values = label(HINT, name="Pixel under the cursor", can_be_copied=True)
+        self.reasons = label("", "muted", wraps=True, name="Why this pixel is limited", can_be_copied=True)
         self.reasons.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.reasons.setMinimumHeight(2 * self.reasons.fontMetrics().lineSpacing() + 2)
         for each in (self.values, self.reasons):
             each.setTextFormat(Qt.TextFormat.PlainText)
-            each.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             each.setSizePolicy(each.sizePolicy().Policy.Ignored, each.sizePolicy().verticalPolicy())
         column_of(self.values, self.reasons, on=self, margins=(0, 2, 0, 0), spacing=2)
         follow_any(self._show, state.cursor, state.band)

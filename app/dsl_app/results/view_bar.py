@@ -44,7 +44,7 @@ TOOLS = (
     (Tool.LASSO, "Lasso", "Draw around pixels in the picture or the cloud"),
 )
 #: Views that can colour the cloud.
-CLOUD_COLOURS = tuple((view, text) for view, text, _ in VIEWS if view is not ResultView.CLOUD)
+CLOUD_COLOURS = tuple((text, view) for view, text, _ in VIEWS if view is not ResultView.CLOUD)
 #: Size of the tools' icons, and the smallest width of a choice, px.
 ICON_PX, CHOICE_PX = 18, 110
 _NEEDS_BAND = (QualityMap.ORDERS, QualityMap.SHARE, QualityMap.SPREAD)
@@ -64,27 +64,23 @@ class ViewBar(QWidget):
         for view, text, _ in VIEWS:
             self.views[view].setText(text)
         self._groups = [self._group(list(each.values())) for each in (self.views, self.tools)]
-        self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.setAccessibleName("Band")
-        self.slider.setToolTip("Wavelength of the band (comma and full stop change it)")
+        tip = "Wavelength of the band (comma and full stop change it)"
+        self.slider = named(QSlider(Qt.Orientation.Horizontal), "Band", tip)
         self.slider.setMinimumWidth(64)
         self.slider.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.nm = label("")
         self.nm.setMinimumWidth(self.nm.fontMetrics().horizontalAdvance("000.0 nm"))
-        self.light = ChoiceBox("Light", "The light source that colours are computed for")
-        for key, text in LIGHTS.items():
-            self.light.addItem(text, key)
+        lights = [(text, key) for key, text in LIGHTS.items()]
+        self.light = ChoiceBox("Light", "The light source that colours are computed for", lights)
         self.adapted = check_box(
             "Adapted eyes",
             "White stays white under any light; if not ticked, colours look as they do to eyes adapted to"
             " daylight",
         )
-        self.quality = ChoiceBox("Quality", "What the quality view shows")
-        for each in QualityMap:
-            self.quality.addItem(each.value[0].upper() + each.value[1:], each)
-        self.cloud_by = ChoiceBox("Colour of the cloud", "What the points are coloured by")
-        for view, text in CLOUD_COLOURS:
-            self.cloud_by.addItem(text, view)
+        maps = [(each.value[0].upper() + each.value[1:], each) for each in QualityMap]
+        self.quality = ChoiceBox("Quality", "What the quality view shows", maps, state.quality.set)
+        tip = "What the points are coloured by"
+        self.cloud_by = ChoiceBox("Colour of the cloud", tip, CLOUD_COLOURS, state.cloud_by.set)
         hides = "points {} are hidden in the depth image and in the cloud"
         self.near, self.far = (
             NumberBox(f"{name} depth", 0.0, 1e5, 0.0, "mm", 1, f"{name} depth shown; {hides.format(beyond)}")
@@ -158,8 +154,6 @@ class ViewBar(QWidget):
         self.slider.valueChanged.connect(state.band.set)
         self.light.activated.connect(lambda _: self._relight())
         self.adapted.clicked.connect(lambda _: self._relight())
-        self.quality.activated.connect(lambda _: state.quality.set(QualityMap(self.quality.currentData())))
-        self.cloud_by.activated.connect(lambda _: state.cloud_by.set(ResultView(self.cloud_by.currentData())))
         for box in (self.near, self.far):
             box.valueChanged.connect(lambda _: self._limit_depth())
         self.automatic.clicked.connect(self._limit_automatically)

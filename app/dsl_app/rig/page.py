@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import QTimer, Signal
-from PySide6.QtWidgets import QFormLayout, QGroupBox, QLineEdit, QPushButton
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QLineEdit
 
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.rig.controller import LiveController
@@ -14,10 +14,11 @@ from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.rig.state import rig_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, quiet, set_role
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, named, push_button, quiet, set_role
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.ticker import Ticker
 from dsl_core.devices.base import DeviceRig
 
 #: How often the newest live frame is fetched, ms.
@@ -42,20 +43,25 @@ class RigPage(PageWidget):
         self.projector = ProjectorPanel()
         set_help(self.projector, "rig#projector")
         self._rig = ChoiceBox("Rig", "The rig to connect", [(name, name) for name in rigs])
-        self._options = QLineEdit()
-        self._options.setAccessibleName("Options of the rig")
+        tip = "Options as key=value, separated by spaces; see the help on this page (F1)"
+        self._options = named(QLineEdit(), "Options of the rig", tip)
         self._options.setPlaceholderText("scene=color-checker size=445x290")
-        self._options.setToolTip("Options as key=value, separated by spaces; see the help on this page (F1)")
-        self._connect_button = push_button("Connect", "Open or close the devices of this rig", role="primary")
+        self._connect_button = push_button(
+            "Connect", "Open or close the devices of this rig", self._toggle_link, "primary"
+        )
         self._light = label("")
-        self._trouble = label("", wraps=True)
-        self._trouble.setProperty("role", "bad")
+        self._trouble = label("", "bad", wraps=True)
         self._camera_text, self._projector_text = label("–"), label("–")
-        self._live_button = QPushButton("Start live view")
-        self._live_button.setToolTip("Show the camera's picture until something else needs the camera")
-        self.selftest = QPushButton("Self-&test…")
-        self.selftest.setToolTip("Test camera, projector, timing, focus and room, with advice (F4)")
-        self.selftest.clicked.connect(self.selftest_requested)
+        self._live_button = push_button(
+            "Start live view",
+            "Show the camera's picture until something else needs the camera",
+            self._toggle_live,
+        )
+        self.selftest = push_button(
+            "Self-&test…",
+            "Test camera, projector, timing, focus and room, with advice (F4)",
+            self.selftest_requested,
+        )
         low, high = 0.01, 30_000.0
         self._exposure = NumberBox(
             "Exposure", low, high, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
@@ -67,9 +73,7 @@ class RigPage(PageWidget):
             self._expose,
         )
         self._cycles = label("", "muted", wraps=True)
-        self._timer = QTimer(self)
-        self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(live.fetch_frame)
+        self._timer = Ticker(self, FETCH_MS, live.fetch_frame)
         self._lay_out()
         self._connect()
 
@@ -110,8 +114,6 @@ class RigPage(PageWidget):
 
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands
-        self._connect_button.clicked.connect(self._toggle_link)
-        self._live_button.clicked.connect(self._toggle_live)
         self._exposure.valueChanged.connect(commands.set_exposure)
         self.projector.requested.connect(commands.show)
         self.stops += [
@@ -178,10 +180,7 @@ class RigPage(PageWidget):
         self._show()
 
     def _switch_timer(self, is_live: bool) -> None:
-        if is_live:
-            self._timer.start()
-        else:
-            self._timer.stop()
+        self._timer.run_while(is_live)
         self._show()
 
     def page_actions(self) -> dict[str, Callable[[], object]]:

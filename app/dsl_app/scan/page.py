@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QTimer, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFileDialog, QScrollArea, QWidget
 
@@ -27,6 +27,7 @@ from dsl_app.shared.widgets.forms import Banner
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.ticker import Ticker
 
 #: Interval at which the state of the scan is fetched, ms: ten pictures a second look live.
 FETCH_MS = 100
@@ -53,9 +54,9 @@ class ScanPage(PageWidget):
     ) -> None:
         super().__init__()
         self._state, self._controller, self._open_result = state, controller, open_result
-        self.banner = Banner("Resume")
-        self.stop = self.banner.add_button("Stop reconnecting")
-        self.stop.setToolTip("Stop reconnecting the rig automatically; saved frames are kept")
+        self.banner = Banner("Resume", "", controller.resume)
+        tip = "Stop reconnecting the rig automatically; saved frames are kept"
+        self.stop = self.banner.add_button("Stop reconnecting", tip, controller.stop_reconnecting)
         self.plan = PlanEditor()
         self.plan.setObjectName("scan-plan")
         for box in (self.plan.preset, self.plan.code, self.plan.patterns):
@@ -74,9 +75,7 @@ class ScanPage(PageWidget):
         self.run.setObjectName("scan-run")
         set_help(self.target, "scanning#before-it-starts")
         set_help(self.run, "scanning#while-it-runs")
-        self._timer = QTimer(self)
-        self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(controller.take_news)
+        self._timer = Ticker(self, FETCH_MS, controller.take_news)
         self._lay_out()
         self._connect()
 
@@ -101,8 +100,6 @@ class ScanPage(PageWidget):
 
     def _connect(self) -> None:
         state, controller = self._state, self._controller
-        self.banner.action.clicked.connect(controller.resume)
-        self.stop.clicked.connect(controller.stop_reconnecting)
         self.run.again.clicked.connect(self.reconstruct_requested)
         self.plan.preset_chosen.connect(controller.plans.choose_preset)
         self.plan.plan_changed.connect(self._change_plan)
@@ -159,10 +156,8 @@ class ScanPage(PageWidget):
 
     def _keep_time(self) -> None:
         """Fetch the state of the scan while it may change."""
-        if self._state.phase.value.is_busy or self._state.reconnection.value.is_trying:
-            self._timer.start()
-        else:
-            self._timer.stop()
+        state = self._state
+        self._timer.run_while(state.phase.value.is_busy or state.reconnection.value.is_trying)
 
     def _offer_effects(self, on: bool) -> None:
         """Show the Effects tab for simulated rigs only."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QPushButton, QWidget
+from PySide6.QtWidgets import QFormLayout, QGridLayout, QGroupBox, QWidget
 
 from dsl_app.scan.state import preset_of
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, push_button, quiet
@@ -35,58 +35,42 @@ class PlanEditor(QGroupBox):
     def __init__(self) -> None:
         super().__init__("Plan")
         self._plan = CapturePlan()
-        self.preset = ChoiceBox("Preset", "Named plans, from a quick preview to the published one")
-        for each in PRESETS:
-            self.preset.addItem(each.title, each.key)
-        self.preset.addItem(OWN, "")
+        presets = [*((each.title, each.key) for each in PRESETS), (OWN, "")]
+        tip = "Named plans, from a quick preview to the published one"
+        self.preset = ChoiceBox("Preset", tip, presets, self._choose)
         self._purpose = label("", "muted", wraps=True)
-        self.code = ChoiceBox("Binary code", "Finds the projector column and row that light each pixel")
-        for choice in CODE_CHOICES:
-            self.code.addItem(choice.title, choice.name)
-        self.code.addItem("None", "")
-        self.patterns = ChoiceBox("Patterns", "One line per frame, or several at once")
-        self.patterns.addItem("Single lines", LINES)
-        self.patterns.addItem("Comb of lines", COMB)
-        self.patterns.addItem("Combs, one per colour", COLOURS)
+        codes = [*((choice.title, choice.name) for choice in CODE_CHOICES), ("None", "")]
+        tip = "Finds the projector column and row that light each pixel"
+        self.code = ChoiceBox("Binary code", tip, codes, lambda _: self._edited())
+        kinds = [("Single lines", LINES), ("Comb of lines", COMB), ("Combs, one per colour", COLOURS)]
+        tip = "One line per frame, or several at once"
+        self.patterns = ChoiceBox("Patterns", tip, kinds, lambda _: self._edited())
         set_help(self.patterns, "designed-patterns")
         self.line_width = WholeBox("Line width", 1, WIDEST_PX, 5, "px", "Projector columns per line")
         self.step = WholeBox("Step", 1, WIDEST_PX, 2, "px", "Shift of the lines from frame to frame")
         self.period = WholeBox("Period", 2, WIDEST_PX, 106, "px", "Distance between the lines of a comb")
         self.settings = SettingRows()
-        self.open = QPushButton("&Open plan…")
-        self.open.setToolTip("Open a plan or pattern set, saved here or by dsl-scan plan, tradeoff or design")
-        self.save = QPushButton("Sa&ve plan…")
-        self.save.setToolTip("Save this plan to a file, for this page or for 'dsl-scan scan --plan'")
+        tip = "Open a plan or pattern set, saved here or by dsl-scan plan, tradeoff or design"
+        self.open = push_button("&Open plan…", tip, self.open_requested)
+        tip = "Save this plan to a file, for this page or for 'dsl-scan scan --plan'"
+        self.save = push_button("Sa&ve plan…", tip, self.save_requested)
         self._lay_out()
         self._connect()
 
     def _lay_out(self) -> None:
         form = QFormLayout(self)
-        rows: list[tuple[str, QWidget]] = [
-            ("Preset", self.preset),
-            ("", self._purpose),
-            ("Code", self.code),
-            ("Patterns", self.patterns),
-            ("Line width", self.line_width),
-            ("Step", self.step),
-            ("Period", self.period),
-        ]
-        for name, widget in rows:
-            if name:
-                form.addRow(name, widget)
-            else:
-                form.addRow(widget)
+        form.addRow("Preset", self.preset)
+        form.addRow(self._purpose)
+        form.addRow("Code", self.code)
+        form.addRow("Patterns", self.patterns)
+        form.addRow("Line width", self.line_width)
+        form.addRow("Step", self.step)
+        form.addRow("Period", self.period)
         form.addRow(label("Settings", "heading"))
         form.addRow(self.settings)
-        files = row_of(self.open, self.save)
-        form.addRow(files)
+        form.addRow(row_of(self.open, self.save))
 
     def _connect(self) -> None:
-        self.preset.activated.connect(self._choose)
-        self.open.clicked.connect(self.open_requested)
-        self.save.clicked.connect(self.save_requested)
-        for box in (self.code, self.patterns):
-            box.activated.connect(lambda _: self._edited())
         for number in (self.line_width, self.step, self.period):
             number.setKeyboardTracking(False)
             number.valueChanged.connect(lambda _: self._edited())
@@ -94,8 +78,7 @@ class PlanEditor(QGroupBox):
             lambda settings: self._tell(settings=settings, code_settings=tuple(range(len(settings))))
         )
 
-    def _choose(self) -> None:
-        key = self.preset.currentData()
+    def _choose(self, key: str) -> None:
         if key:
             self.preset_chosen.emit(key)
 
@@ -203,10 +186,9 @@ class SettingRows(QWidget):
         self._grid.addWidget(label("Level", "muted"), 0, 1)
         for i in range(len(self._settings)):
             self._add_row(i)
-        add = QPushButton("Add setting")
-        add.setToolTip("Capture all patterns at another exposure and level too, for brighter or darker parts")
+        tip = "Capture all patterns at another exposure and level too, for brighter or darker parts"
+        add = push_button("Add setting", tip, self._add)
         add.setEnabled(len(self._settings) < MOST_SETTINGS)
-        add.clicked.connect(self._add)
         self._grid.addWidget(add, len(self._settings) + 1, 0, 1, 3)
 
     def _add_row(self, i: int) -> None:
@@ -215,11 +197,10 @@ class SettingRows(QWidget):
             f"Level of setting {i + 1}", 0.01, 1, 1, decimals=2, tip="Drive level of lit columns, 0 to 1"
         )
         level.setSingleStep(0.05)
-        remove = push_button("×", "Remove this setting from the plan")
+        remove = push_button("×", "Remove this setting from the plan", lambda: self._remove(i))
         remove.setFixedWidth(28)
         remove.setAccessibleName(f"Remove setting {i + 1}")
         remove.setEnabled(len(self._settings) > 1)
-        remove.clicked.connect(lambda: self._remove(i))
         exposure.valueChanged.connect(lambda _: self._edited(i))
         level.valueChanged.connect(lambda _: self._edited(i))
         for column, widget in enumerate((exposure, level, remove)):

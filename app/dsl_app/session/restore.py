@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, QTimer
+from PySide6.QtCore import QObject
 
 from dsl_app.session.records import Session
 from dsl_app.session.store import SessionStore
+from dsl_app.shared.widgets.ticker import Ticker
 from dsl_app.shell.main_window import MainWindow
 
 if TYPE_CHECKING:
@@ -31,9 +32,7 @@ class SessionRestore(QObject):
         self.pair: PairController | None = None
         self.series: SeriesController | None = None
         self.store = SessionStore(window.parts.settings_path.parent / "sessions", self.collect)
-        self._timer = QTimer(self)
-        self._timer.setInterval(SAVE_MS)
-        self._timer.timeout.connect(self.save)
+        self._timer = Ticker(self, SAVE_MS, self.save)
 
     # Save ------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QObject, Qt, QTimer, Signal
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QIcon, QPalette
 from PySide6.QtWidgets import QApplication
 
@@ -24,6 +24,7 @@ from dsl_app.shared.theme import DARK, LIGHT, Theme, style_sheet
 from dsl_app.shared.undo import UndoStack
 from dsl_app.shared.widgets.icons import icon
 from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.ticker import Ticker
 from dsl_app.shell.log import LogRecords
 from dsl_app.shell.main_window import MainWindow
 from dsl_app.shell.paged_window import Parts
@@ -59,10 +60,7 @@ def collect_garbage(window: MainWindow) -> GarbageCollector:
     """Collect garbage in the window's thread only, from now on."""
     collector = GarbageCollector(lambda: bool(window.parts.runner.active))
     collector.start()
-    timer = QTimer(window)
-    timer.setInterval(CHECK_MS)
-    timer.timeout.connect(collector.check)
-    timer.start()
+    Ticker(window, CHECK_MS, collector.check).start()
     return collector
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import QButtonGroup, QFrame, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QButtonGroup, QFrame, QToolButton, QWidget
 
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.icons import icon
+from dsl_app.shared.widgets.layouts import STRETCH, column_of
 from dsl_app.shell.actions import Page
 
 
@@ -23,16 +25,10 @@ class Rail(QFrame):
         self._pages = tuple(pages)
         self._group = QButtonGroup(self)
         self._group.setExclusive(True)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(0, 6, 0, 6)
-        column.setSpacing(2)
-        self._buttons: dict[str, QToolButton] = {}
-        for number, page in enumerate(pages, 1):
-            button = self._button(page, number)
-            self._buttons[page.key] = button
+        self._buttons = {page.key: self._button(page, number) for number, page in enumerate(pages, 1)}
+        for button in self._buttons.values():
             self._group.addButton(button)
-            column.addWidget(button)
-        column.addStretch(1)
+        column_of(*self._buttons.values(), STRETCH, on=self, margins=(0, 6, 0, 6), spacing=2)
 
     def _button(self, page: Page, number: int) -> QToolButton:
         button = QToolButton(self)
@@ -41,8 +37,7 @@ class Rail(QFrame):
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
         button.setIconSize(QSize(26, 26))
         button.setFixedWidth(84)
-        button.setToolTip(f"{page.tip} (Ctrl+{number})")
-        button.setAccessibleName(page.title)
+        named(button, page.title, f"{page.tip} (Ctrl+{number})")
         button.clicked.connect(lambda _checked, key=page.key: self.chosen.emit(key))
         return button
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
-from PySide6.QtWidgets import QFrame, QLabel, QMessageBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QMessageBox, QVBoxLayout, QWidget
 
 from dsl_app.shared.notify import Level
-from dsl_app.shared.widgets.forms import push_button
+from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import row_of
 
 #: How long a message is shown, ms; an error stays until it is closed.
@@ -35,15 +35,12 @@ class Toast(QFrame):
         self.setProperty("level", level)
         self.setAccessibleName(f"{level}: {text}")
         self.level, self.text = level, text
-        label = QLabel(text)
-        label.setWordWrap(True)
-        label.setTextFormat(Qt.TextFormat.PlainText)
-        label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        words = label(text, wraps=True, can_be_copied=True)
+        words.setTextFormat(Qt.TextFormat.PlainText)
         buttons = QVBoxLayout()
-        row_of((label, 1), buttons, on=self, margins=(12, 8, 8, 8))
+        row_of((words, 1), buttons, on=self, margins=(12, 8, 8, 8))
         for name, do in (offers or {}).items():
-            offer = push_button(name, text)
-            offer.clicked.connect(self.dismiss)
+            offer = push_button(name, text, self.dismiss)
             offer.clicked.connect(lambda _checked=False, do=do: do())
             buttons.addWidget(offer)
         self._add_flat(buttons, "Close", "Close this message", self.dismiss)
@@ -53,9 +50,8 @@ class Toast(QFrame):
 
     @staticmethod
     def _add_flat(column: QVBoxLayout, text: str, tip: str, do: Callable[[], object]) -> None:
-        button = push_button(text, tip)
+        button = push_button(text, tip, lambda: do())
         button.setFlat(True)
-        button.clicked.connect(lambda _checked=False: do())
         column.addWidget(button)
 
     def dismiss(self) -> None:

@@ -98,8 +98,8 @@ class Tour(QWidget):
         self._steps, self._theme, self._at = tuple(steps), theme, 0
         self._target: QWidget | None = None
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self._count, self._title, self._text = label("", "muted"), label("", "heading"), label("")
-        self._text.setWordWrap(True)
+        self._count, self._title = label("", "muted"), label("", "heading")
+        self._text = label("", wraps=True)
         self.skip = push_button("&Skip", "End the tour (Escape)", self.leave)
         self.back = push_button("&Back", "Previous step (left arrow)", lambda: self.go(self._at - 1))
         self.next = push_button(

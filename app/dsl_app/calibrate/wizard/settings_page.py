@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QCheckBox, QFormLayout, QHBoxLayout, QLineEdit, QW
 
 from dsl_app.calibrate.wizard.settings import setting_title
 from dsl_app.calibrate.wizard.state import SettingRow
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, label, named, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, scrolled
 from dsl_core.model.board import Board, Charuco, Checkerboard
 
@@ -35,8 +35,7 @@ class SettingsPage(QWidget):
         self._shown: tuple[SettingRow, ...] = ()
         self.fields: dict[str, QLineEdit | QCheckBox | BoardEdit] = {}
         self._intro = label(INTRODUCTION, "muted", wraps=True)
-        self._trouble = label("", "bad", wraps=True)
-        self._trouble.setAccessibleName("What is wrong with the settings")
+        self._trouble = label("", "bad", wraps=True, name="What is wrong with the settings")
         content = QWidget()
         self._form = QFormLayout(content)
         self._form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
@@ -105,10 +104,8 @@ class SettingsPage(QWidget):
 
 
 def _named(field: F, name: str, tip: str) -> F:
-    field.setAccessibleName(name)
-    field.setToolTip(tip)
     field.setMaximumWidth(FIELD_PX)
-    return field
+    return named(field, name, tip)
 
 
 class BoardEdit(QWidget):
@@ -123,10 +120,11 @@ class BoardEdit(QWidget):
         super().__init__()
         self._board: Board = Checkerboard(columns=11, rows=7, square_mm=20.0)
         self.kind = ChoiceBox(
-            f"Kind of {name}", "A checkerboard, or a ChArUco board with a marker in each white square"
+            f"Kind of {name}",
+            "A checkerboard, or a ChArUco board with a marker in each white square",
+            [("Checkerboard, inner corners", "checkerboard"), ("ChArUco, squares", "charuco")],
+            lambda _: self._tell(),
         )
-        self.kind.addItem("Checkerboard, inner corners", "checkerboard")
-        self.kind.addItem("ChArUco, squares", "charuco")
         self.columns = WholeBox("Columns", 3, 99, 11, tip="Inner corners, or squares of a ChArUco, across")
         self.rows = WholeBox("Rows", 3, 99, 7, tip="Inner corners, or squares of a ChArUco, down")
         self.square = NumberBox("Side of a square", 1, 999, 20, "mm", 3, "Measured over many printed squares")
@@ -139,7 +137,6 @@ class BoardEdit(QWidget):
             on=self,
             margins=0,
         )
-        self.kind.activated.connect(lambda _: self._tell())
         for box in (self.columns, self.rows, self.square, self.marker):
             box.setKeyboardTracking(False)
             box.valueChanged.connect(lambda _: self._tell())

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import (
     QDialog,
@@ -30,6 +30,7 @@ from dsl_app.shared.widgets.forms import Banner, label, named, push_button, quie
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.inside import apply_theme_inside, stop_following
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.ticker import Ticker
 
 if TYPE_CHECKING:
     from dsl_app.calibrate.wizard.controller import WizardController
@@ -52,15 +53,14 @@ class CalibrationWizard(QDialog):
         self.setWindowFlag(Qt.WindowType.WindowMaximizeButtonHint, True)
         self.setMinimumSize(SMALLEST)
         self.resize(_fitting(parent.window().size()))
-        self.banner = Banner("Connect the rig again")
-        self.banner.action.setToolTip("Open all devices of the rig again and continue here")
+        self.banner = Banner(
+            "Connect the rig again", "Open all devices of the rig again and continue here", commands.reconnect
+        )
         self.steps = PageList()
         self.settings, self.step, self.fit = SettingsPage(), StepPage(state), FitPage(state)
         self.stack = QStackedWidget()
         self.buttons = WizardButtons(state, commands)
-        self._timer = QTimer(self)
-        self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(commands.take_news)
+        self._timer = Ticker(self, FETCH_MS, commands.take_news)
         self._lay_out()
         self._connect()
         self.apply_theme(theme)
@@ -74,7 +74,6 @@ class CalibrationWizard(QDialog):
 
     def _connect(self) -> None:
         state, commands = self._state, self._commands
-        self.banner.action.clicked.connect(commands.reconnect)
         self.steps.chosen.connect(self._choose)
         self.settings.edited.connect(lambda key, text: commands.change_settings({key: text}))
         self.fit.settings_requested.connect(lambda values: commands.change_settings(values, then_fit=True))
@@ -147,8 +146,7 @@ class PageList(QListWidget):
     def __init__(self) -> None:
         super().__init__()
         self._theme, self._lines = DARK, tuple[PageLine, ...]()
-        self.setAccessibleName("Steps")
-        self.setToolTip("Steps of this calibration: ○ to capture, ✓ captured, ✗ refused")
+        named(self, "Steps", "Steps of this calibration: ○ to capture, ✓ captured, ✗ refused")
         self.setFixedWidth(LIST_PX)
         self.setSpacing(2)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -201,8 +199,7 @@ class WizardButtons(QWidget):
         self.discard = _button("&Discard fit", "Discard this fit; captures and what was accepted are kept")
         self.fit = _button("&Fit", "Calibrate from the captures of all steps")
         self.accept = _button("&Accept", "Make this fit the campaign's calibration and write the rig")
-        self._text = label("", "muted")
-        self._text.setAccessibleName("Current activity")
+        self._text = label("", "muted", name="Current activity")
         self._bar = named(QProgressBar(), "Progress")
         self._bar.setFixedWidth(BAR_PX)
         # The page above must not jump when work begins.

@@ -17,7 +17,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, label, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, label, named, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.pictures import (
     DEPTH,
@@ -193,17 +193,17 @@ class PairControls(QWidget):
     def __init__(self, state: PairState, control: PairController) -> None:
         super().__init__()
         self._state, self._control = state, control
-        self.shown = ChoiceBox("Quantity", "What the pictures show: depth, or reflectance in one band")
-        for each in PairQuantity:
-            self.shown.addItem(each.value, each)
-        self.band = QSlider(Qt.Orientation.Horizontal)
-        self.band.setAccessibleName("Band")
-        self.band.setToolTip("The band shown, of those that both results have")
+        self.shown = ChoiceBox(
+            "Quantity",
+            "What the pictures show: depth, or reflectance in one band",
+            [(each.value, each) for each in PairQuantity],
+            self._choose_shown,
+        )
+        tip = "The band shown, of those that both results have"
+        self.band = named(QSlider(Qt.Orientation.Horizontal), "Band", tip)
         self.band.setFixedWidth(BAND_PX)
-        self.nm, self.readout = label("", "muted"), label("", "muted")
-        self.readout.setAccessibleName("Values under the cursor")
+        self.nm, self.readout = label("", "muted"), label("", "muted", name="Values under the cursor")
         row_of(self.shown, self.band, self.nm, STRETCH, self.readout, on=self, margins=0)
-        self.shown.activated.connect(lambda _: self._choose_shown())
         self.band.valueChanged.connect(control.set_band)
         self.stops: list[Callable[[], None]] = [
             state.pair.follow(self._show_pair),
@@ -211,8 +211,8 @@ class PairControls(QWidget):
             state.cursor.follow(lambda _: self._show_readout()),
         ]
 
-    def _choose_shown(self) -> None:
-        self._control.show(self.shown.currentData())
+    def _choose_shown(self, shown: PairQuantity) -> None:
+        self._control.show(shown)
         # The controller may have refused it.
         self._show()
 

@@ -29,18 +29,20 @@ class SeriesPanel(QWidget):
     def __init__(self, state: SeriesState, control: SeriesController) -> None:
         super().__init__()
         self._state, self._control = state, control
-        self.kind = ChoiceBox("Series", "What to measure with the results")
-        for kind in SeriesKind:
-            self.kind.addItem(kind.value, kind)
-        self.add = push_button("&Add results…", "Choose a result, or a folder that contains several")
+        kinds = [(kind.value, kind) for kind in SeriesKind]
+        self.kind = ChoiceBox("Series", "What to measure with the results", kinds, control.ask)
+        self.add = push_button(
+            "&Add results…", "Choose a result, or a folder that contains several", self.choose
+        )
         self.remove = push_button(
             "Re&move", "Remove the selected result from the series (Delete); can be undone", self._remove
         )
-        self.against = ChoiceBox("Compare with", "What the scans are compared with")
-        self.figure = ChoiceBox("Error", "The error that the plot shows")
-        for figure in FIGURES:
-            self.figure.addItem(figure.words, figure)
-        self.report = push_button("Write &report…", "Save table, figures, plot and pictures as an HTML page")
+        tip = "What the scans are compared with"
+        self.against = ChoiceBox("Compare with", tip, do=control.compare_with)
+        figures = [(figure.words, figure) for figure in FIGURES]
+        self.figure = ChoiceBox("Error", "The error that the plot shows", figures, control.show_figure)
+        tip = "Save table, figures, plot and pictures as an HTML page"
+        self.report = push_button("Write &report…", tip, self._choose_report)
         self.hint = remark_line()
         self.hint.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.table = SeriesTable(state, control)
@@ -72,15 +74,9 @@ class SeriesPanel(QWidget):
         column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:
-        state, control = self._state, self._control
-        self.kind.activated.connect(lambda _: control.ask(self.kind.currentData()))
-        self.add.clicked.connect(self.choose)
-        delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.table)
+        state = self._state
+        delete = QShortcut(QKeySequence(Qt.Key.Key_Delete), self.table, self._remove)
         delete.setContext(Qt.ShortcutContext.WidgetShortcut)
-        delete.activated.connect(self._remove)
-        self.against.activated.connect(lambda _: control.compare_with(self.against.currentData()))
-        self.figure.activated.connect(lambda _: control.show_figure(self.figure.currentData()))
-        self.report.clicked.connect(self._choose_report)
         shown = (state.kind, state.rows, state.advice, state.busy, state.against, state.selected)
         self.stops = [
             *follow_any(self._show, *shown),

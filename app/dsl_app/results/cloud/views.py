@@ -18,11 +18,12 @@ from PySide6.QtGui import (
     QResizeEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.cloud.points import Points
 from dsl_app.results.cloud.render_window import Colours, MouseButton, Rendering, graphics_work
 from dsl_app.results.cloud.renderer import CloudRenderer
+from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import arrow_step
 
@@ -235,12 +236,9 @@ class StaticCloud(CloudView):
 
     def __init__(self) -> None:
         super().__init__()
-        self._picture, self._text = QLabel(), QLabel(NO_OPENGL)
-        self._text.setWordWrap(True)
-        self._text.setProperty("role", "muted")
+        self._picture = label("", name="Picture of the point cloud")
         self._picture.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self._picture.setAccessibleName("Picture of the point cloud")
-        column_of((self._picture, 1), self._text, on=self, margins=0)
+        column_of((self._picture, 1), label(NO_OPENGL, "muted", wraps=True), on=self, margins=0)
         self._background = "#000000"
 
     def show_cloud(self, points: Points, colours: Colours, reset_view: bool = True) -> None:

@@ -10,14 +10,13 @@ from PySide6.QtWidgets import (
     QDialogButtonBox,
     QFileDialog,
     QFormLayout,
-    QLabel,
     QLineEdit,
     QPushButton,
     QWidget,
 )
 
 from dsl_app.results.export.controller import FORMATS, ExportController
-from dsl_app.shared.widgets.forms import check_box, named, push_button, set_role
+from dsl_app.shared.widgets.forms import check_box, label, named, push_button, set_role
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -33,11 +32,9 @@ class ExportDialog(QDialog):
         self.resize(560, 360)
         add_help_key(self, "exporting")
         self.folder = named(QLineEdit(str(result.path.parent)), "Folder", "Where to write the files")
-        self.name = QLineEdit(result.path.stem)
-        self.name.setAccessibleName("Name without suffix")
-        self.name.setToolTip("Each format adds its own suffix")
-        browse = push_button("Choose…", "Choose the folder to write to")
-        browse.clicked.connect(self._browse)
+        tip = "Each format adds its own suffix"
+        self.name = named(QLineEdit(result.path.stem), "Name without suffix", tip)
+        browse = push_button("Choose…", "Choose the folder to write to", self._browse)
         self.formats: dict[str, QCheckBox] = {}
         for form in FORMATS:
             box = self.formats[form.key] = QCheckBox(form.about)
@@ -47,8 +44,7 @@ class ExportDialog(QDialog):
             box.toggled.connect(lambda _: self._check())
         self.replace = check_box("Replace existing files", "If not ticked, existing files are never replaced")
         self.replace.toggled.connect(lambda _: self._check())
-        self.text = QLabel()
-        self.text.setWordWrap(True)
+        self.text = label("", wraps=True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.write = self.buttons.addButton("Export", QDialogButtonBox.ButtonRole.AcceptRole)
         self.write.setToolTip("Write the selected formats")

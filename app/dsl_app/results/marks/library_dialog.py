@@ -32,10 +32,9 @@ class LibraryDialog(QDialog):
         self.setWindowTitle(f"Spectra of {library.path.name}")
         self.resize(460, 420)
         add_help_key(self, "numbers#pins-regions-references")
-        self.filter = QLineEdit()
-        self.filter.setAccessibleName("Filter")
+        tip = "Lists only spectra whose names contain all of these words"
+        self.filter = named(QLineEdit(), "Filter", tip)
         self.filter.setPlaceholderText("Filter by words in the name")
-        self.filter.setToolTip("Lists only spectra whose names contain all of these words")
         self.filter.setClearButtonEnabled(True)
         self.list = named(QListWidget(), "Spectra", "Select one or more; double-click adds one at once")
         self.list.setUniformItemSizes(True)

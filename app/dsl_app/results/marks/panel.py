@@ -11,11 +11,9 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QHeaderView,
-    QLabel,
     QScrollArea,
     QTreeWidget,
     QTreeWidgetItem,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -24,7 +22,7 @@ from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button
-from dsl_app.shared.widgets.layouts import STRETCH, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
@@ -41,7 +39,11 @@ class MarksPanel(QWidget):
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
         self._filling = False
-        self.tree = QTreeWidget()
+        self.tree = named(
+            QTreeWidget(),
+            "Pins, regions and references",
+            "Tick to show; F2 or double-click to rename; Delete to remove; the selected one is compared",
+        )
         self.tree.setColumnCount(3)
         self.tree.setHeaderLabels(["Spectrum", "Where", "Pixels"])
         self.tree.setRootIsDecorated(False)
@@ -51,19 +53,14 @@ class MarksPanel(QWidget):
         self.tree.setEditTriggers(
             QAbstractItemView.EditTrigger.EditKeyPressed | QAbstractItemView.EditTrigger.DoubleClicked
         )
-        self.tree.setAccessibleName("Pins, regions and references")
-        self.tree.setToolTip(
-            "Tick to show; F2 or double-click to rename; Delete to remove; the selected one is compared"
-        )
         header = self.tree.header()
         header.setStretchLastSection(False)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         for column in (1, 2):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         self.hint = label(EMPTY, "muted", wraps=True)
-        self.figures = named(QLabel(), "Comparison with references")
+        self.figures = label("", name="Comparison with references", can_be_copied=True)
         self.figures.setTextFormat(Qt.TextFormat.RichText)
-        self.figures.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.figures.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.below = QScrollArea()
         self.below.setWidget(self.figures)
@@ -82,15 +79,9 @@ class MarksPanel(QWidget):
         self.export = push_button(
             "Export spectra…", "Write the same table as CSV, with the origin of the result"
         )
-        column_box = QVBoxLayout(self)
-        column_box.setContentsMargins(0, 0, 0, 0)
-        column_box.addWidget(self.hint)
-        column_box.addWidget(self.tree, 1)
         # Two rows, as the smallest window is too narrow for one.
-        for buttons in ((self.reference, self.remove), (self.copy, self.export)):
-            row = row_of(*buttons, STRETCH)
-            column_box.addLayout(row)
-        column_box.addWidget(self.below, 1)
+        add, put = row_of(self.reference, self.remove, STRETCH), row_of(self.copy, self.export, STRETCH)
+        column_of(self.hint, (self.tree, 1), add, put, (self.below, 1), on=self, margins=0)
         self._connect()
 
     def _connect(self) -> None:

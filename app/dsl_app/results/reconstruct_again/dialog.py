@@ -19,13 +19,13 @@ from dsl_app.results.reconstruct_again.controller import ReconstructionControlle
 from dsl_app.results.reconstruct_again.state import OWN, ReconstructionRequest, ReconstructionState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.dialogs import JobDialog
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, push_button
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, push_button
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import row_of
 from dsl_core.model.options import MODELS, SOLVERS, SpectralChoice
 
 LOW_NM, HIGH_NM = 380.0, 780.0
-DEVICES = (("cpu", "Processor (CPU)"), ("cuda", "Graphics card (CUDA)"))
+DEVICES = (("Processor (CPU)", "cpu"), ("Graphics card (CUDA)", "cuda"))
 
 
 class ReconstructionDialog(JobDialog):
@@ -75,26 +75,22 @@ class ReconstructionDialog(JobDialog):
             "Subpixel columns",
             "Refine depth with the lines; if not ticked, depth is quicker, but in whole columns",
         )
-        self.calibration = ChoiceBox("Calibration", "The scan's own, one from the library, or a file")
         own = self._source.calibration
-        self.calibration.addItem(f"The scan's own: {own}" if own else "The scan has none", OWN)
-        for name in self._source.library:
-            self.calibration.addItem(name, name)
+        known = [(f"The scan's own: {own}" if own else "The scan has none", OWN)]
+        known += [(name, name) for name in self._source.library]
+        self.calibration = ChoiceBox("Calibration", "The scan's own, one from the library, or a file", known)
         self.file = push_button("&File…", "Choose a calibration file (.json)", self._choose_file)
         self.override = check_box(
             "Ignore different settings",
             "Use the calibration even if its camera or projector settings differ from those of the scan",
         )
-        self.device = ChoiceBox("Compute on", "A graphics card is faster; it is offered if torch finds one")
-        for key, text in DEVICES:
-            if key == "cpu" or self._source.has_cuda:
-                self.device.addItem(text, key)
+        tip = "A graphics card is faster; it is offered if torch finds one"
+        self.device = ChoiceBox("Compute on", tip, DEVICES if self._source.has_cuda else DEVICES[:1])
         self.device.setEnabled(self._source.has_cuda)
 
     def _make_target(self, request: ReconstructionRequest) -> None:
-        self.name = QLineEdit(request.name)
-        self.name.setAccessibleName("Name of the result")
-        self.name.setToolTip("The result is saved as NAME.zarr next to the scan, whose frames it refers to")
+        tip = "The result is saved as NAME.zarr next to the scan, whose frames it refers to"
+        self.name = named(QLineEdit(request.name), "Name of the result", tip)
         self.replace = QCheckBox("Replace an existing result")
         self.replace.setToolTip("If not ticked, existing results are never replaced")
         self.name_buttons(
@@ -168,10 +164,8 @@ def _nanometres(name: str, value: float, tip: str) -> NumberBox:
 
 def _choices(name: str, tip: str, choices: tuple[SpectralChoice, ...]) -> ChoiceBox:
     """A choice whose tooltip says what each entry does and costs."""
-    box = ChoiceBox(name, "\n".join([f"{tip}:", *(f"{each.title}: {each.about}" for each in choices)]))
-    for each in choices:
-        box.addItem(each.title, each.name)
-    return box
+    tips = [f"{tip}:", *(f"{each.title}: {each.about}" for each in choices)]
+    return ChoiceBox(name, "\n".join(tips), [(each.title, each.name) for each in choices])
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QFormLayout, QLabel, QWidget
+from PySide6.QtWidgets import QFormLayout, QWidget
 
 from dsl_app.results.search.controller import SearchController
 from dsl_app.results.state import ResultsState, Search, SearchMode
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, push_button
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, row_of
 
 HINT = "Select a pin, region or reference, or point at a pixel; then search the whole picture for it."
@@ -19,19 +19,17 @@ class SearchPanel(QWidget):
         super().__init__()
         self._control = control
         self.mode = ChoiceBox(
-            "Search for", "The same spectrum, or pixels of the same colour under D65 but another spectrum"
+            "Search for",
+            "The same spectrum, or pixels of the same colour under D65 but another spectrum",
+            [(mode.value[0].upper() + mode.value[1:], mode) for mode in SearchMode],
         )
-        for mode in SearchMode:
-            self.mode.addItem(mode.value[0].upper() + mode.value[1:], mode)
         self.angle = NumberBox("Limit of the spectral angle", 0.001, 1.0, 0.05, "rad", 3)
         self.angle.setSingleStep(0.005)
         self.delta_e = NumberBox("Limit of the colour difference CIEDE2000", 0.1, 20.0, 2.0, "", 1)
         self.delta_e.setSingleStep(0.5)
         self.start = push_button("Search", "Compare every pixel with the selected spectrum")
         self.clear = push_button("Clear", "Show the picture without the search", control.clear)
-        self.text = QLabel(HINT)
-        self.text.setProperty("role", "muted")
-        self.text.setWordWrap(True)
+        self.text = label(HINT, "muted", wraps=True)
         buttons = row_of(self.start, self.clear, STRETCH)
         form = QFormLayout(self)
         form.setContentsMargins(0, 0, 0, 0)

@@ -54,16 +54,13 @@ class EffectsPanel(QWidget):
             decimals=3,
             tip="Effects left out change no pixel of any picture by more than this",
         )
-        self.unit = ChoiceBox("Unit of the tolerance", "Counts, or standard deviations of a dark pixel")
-        for sign, name in _UNITS:
-            self.unit.addItem(sign, name)
+        tip = "Counts, or standard deviations of a dark pixel"
+        self.unit = ChoiceBox("Unit of the tolerance", tip, _UNITS)
         self._within = label("within", "muted")
         self.apply = QPushButton("Apply")
         self.apply.setToolTip("Reconnect the simulated rig with these effects; its scans record them")
         self.table = _table()
-        self._summary, self._saved = label(""), label("", "muted")
-        for text in (self._summary, self._saved):
-            text.setWordWrap(True)
+        self._summary, self._saved = label("", wraps=True), label("", "muted", wraps=True)
         self._lay_out()
         self._connect()
 

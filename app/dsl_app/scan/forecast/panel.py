@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QPushButton, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QWidget
 
 from dsl_app.scan.forecast.controller import ForecastController
 from dsl_app.scan.forecast.figures import FIGURES
@@ -13,9 +13,10 @@ from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
+from dsl_app.shared.widgets.ticker import Ticker
 
 #: Interval at which new predictions are fetched, ms.
 FETCH_MS = 200
@@ -43,22 +44,16 @@ class ForecastPanel(QWidget):
         self.scene.setEnabled(False)
         self.scene.be_narrow(100)
         self.table = _table()
-        self.wish = ChoiceBox("Limit", "The limit to plan for: capture time, or error")
-        self.wish.addItem("Time at most", BUDGET)
-        self.wish.addItem("Error at most", ERROR)
+        wishes = (("Time at most", BUDGET), ("Error at most", ERROR))
+        self.wish = ChoiceBox("Limit", "The limit to plan for: capture time, or error", wishes)
         self.budget = NumberBox("Maximum time", 1, 36000, 60, "s", 0, "Time for the capture")
         self.error = NumberBox(
             "Maximum error", 0.001, 1, 0.02, "", 4, "Reflectance error (RMSE) of a single pixel"
         )
-        self.ask = QPushButton("Find plan")
-        self.ask.setToolTip("Find the most accurate plan within that time, or the quickest within that error")
-        self._answer = label("")
-        self._note = label("", "muted")
-        for text in (self._answer, self._note):
-            text.setWordWrap(True)
-        self._timer = QTimer(self)
-        self._timer.setInterval(FETCH_MS)
-        self._timer.timeout.connect(controller.take_news)
+        tip = "Find the most accurate plan within that time, or the quickest within that error"
+        self.ask = push_button("Find plan", tip, self._ask)
+        self._answer, self._note = label("", wraps=True), label("", "muted", wraps=True)
+        self._timer = Ticker(self, FETCH_MS, controller.take_news)
         self._lay_out()
         self._connect()
 
@@ -79,7 +74,6 @@ class ForecastPanel(QWidget):
         state = self._state
         self.scene.activated.connect(self._look)
         self.wish.currentIndexChanged.connect(lambda _: self._show_wish())
-        self.ask.clicked.connect(self._ask)
         for box in (self.budget, self.error):
             box.lineEdit().returnPressed.connect(self._ask)
         self._show_wish()
@@ -174,10 +168,7 @@ class ForecastPanel(QWidget):
     def _show_note(self) -> None:
         state = self._state
         done, total = state.progress.value
-        if total:
-            self._timer.start()
-        else:
-            self._timer.stop()
+        self._timer.run_while(bool(total))
         if state.trouble.value:
             text = state.trouble.value
         elif state.refusal.value:

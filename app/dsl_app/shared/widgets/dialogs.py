@@ -33,8 +33,7 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     text.setReadOnly(True)
     text.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
     window = text_window("Command line", text, parent, 640, 220)
-    copy = push_button("Copy", "Copy the command")
-    copy.clicked.connect(lambda: QApplication.clipboard().setText(command))
+    copy = push_button("Copy", "Copy the command", lambda: QApplication.clipboard().setText(command))
     box = window.findChild(QDialogButtonBox)
     assert isinstance(box, QDialogButtonBox)
     box.addButton(copy, QDialogButtonBox.ButtonRole.ActionRole)
@@ -63,8 +62,7 @@ class JobDialog(QDialog):
         #: Functions that disconnect the dialog from its state when it closes.
         self.stops: list[Callable[[], None]] = []
         self.column = column_of(on=self)
-        self.text: QLabel = label("", "muted")
-        self.text.setWordWrap(True)
+        self.text: QLabel = label("", "muted", wraps=True)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Cancel)
         self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)

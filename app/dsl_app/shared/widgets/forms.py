@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QKeyEvent, QWheelEvent
@@ -86,12 +86,21 @@ class WholeBox(CalmWheel, QSpinBox):
 class ChoiceBox(CalmWheel, QComboBox):
     """A choice of a list of texts, each with the data that it stands for."""
 
-    def __init__(self, name: str, tip: str = "", choices: Iterable[tuple[str, object]] = ()) -> None:
+    def __init__(
+        self,
+        name: str,
+        tip: str = "",
+        choices: Iterable[tuple[str, object]] = (),
+        do: Callable[[Any], object] | None = None,
+    ) -> None:
+        """``do`` gets the data of an entry that a person chooses."""
         super().__init__()
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         named(self, name, tip or name)
         for text, data in choices:
             self.addItem(text, data)
+        if do is not None:
+            self.activated.connect(lambda index: do(self.itemData(index)))
 
     def choose(self, data: object) -> None:
         """Show the entry of some data as the chosen one."""
@@ -110,10 +119,18 @@ class ChoiceBox(CalmWheel, QComboBox):
             self.activated.emit(self.currentIndex())
 
 
-def label(text: str, role: str = "", parent: QWidget | None = None, wraps: bool = False) -> QLabel:
-    """A label in a role of the style sheet (muted, title, heading, good, warn, bad); may break its lines."""
-    made = QLabel(text, parent)
+def label(
+    text: str, role: str = "", wraps: bool = False, name: str = "", can_be_copied: bool = False
+) -> QLabel:
+    """A label in a role of the style sheet (muted, title, heading, good, warn, bad); may break its lines.
+
+    Screen readers tell the ``name`` before the text.
+    """
+    made = QLabel(text)
     made.setWordWrap(wraps)
+    made.setAccessibleName(name)
+    if can_be_copied:
+        made.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
     if role:
         made.setProperty("role", role)
     return made
@@ -193,20 +210,18 @@ def set_role(widget: QWidget, role: str) -> None:
 class Banner(QFrame):
     """A message across the page that stays until it is resolved; ``action`` is the button that does that."""
 
-    def __init__(self, action: str) -> None:
+    def __init__(self, action: str, tip: str, do: Clicked) -> None:
         super().__init__()
         self.setProperty("role", "banner")
-        self._text = QLabel()
-        self._text.setWordWrap(True)
+        self._text = label("", wraps=True, can_be_copied=True)
         self._text.setTextFormat(Qt.TextFormat.PlainText)
-        self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self.action = QPushButton(action)
+        self.action = push_button(action, tip, do)
         self._row = row_of((self._text, 1), self.action, on=self, margins=(12, 8, 8, 8))
         self.say("")
 
-    def add_button(self, text: str) -> QPushButton:
+    def add_button(self, text: str, tip: str, do: Clicked) -> QPushButton:
         """Another button, after ``action``."""
-        button = QPushButton(text)
+        button = push_button(text, tip, do)
         self._row.addWidget(button)
         return button
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import QSize, Qt, QUrl
 from PySide6.QtGui import QKeySequence, QShortcut, QTextBlock, QTextCursor
 from PySide6.QtWidgets import QDialog, QListWidget, QListWidgetItem, QPushButton, QTextBrowser, QWidget
 
-from dsl_app.shared.widgets.forms import named, push_button, quiet
+from dsl_app.shared.widgets.forms import Clicked, named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_core.errors import StoreError
 from dsl_core.resources import resource_path
@@ -80,18 +80,15 @@ class HelpWindow(QDialog):
         self.text = named(QTextBrowser(), "Help", "Links open other pages (Alt+Left goes back)")
         self.text.setOpenExternalLinks(True)
         self.text.document().setDocumentMargin(14)
-        self.back = _button("&Back", "Previous page (Alt+Left)", "Alt+Left")
-        self.forward = _button("&Forward", "Next page (Alt+Right)", "Alt+Right")
-        self.close_button = _button("&Close", "Close the help (Escape)", "")
+        self.back = _button("&Back", "Previous page (Alt+Left)", self.text.backward, "Alt+Left")
+        self.forward = _button("&Forward", "Next page (Alt+Right)", self.text.forward, "Alt+Right")
+        self.close_button = _button("&Close", "Close the help (Escape)", self.accept)
         self._lay_out()
         for page in help_pages():
             item = QListWidgetItem(title_of(page))
             item.setData(Qt.ItemDataRole.UserRole, page.stem)
             self.pages.addItem(item)
         self.pages.currentItemChanged.connect(self._choose)
-        self.back.clicked.connect(self.text.backward)
-        self.forward.clicked.connect(self.text.forward)
-        self.close_button.clicked.connect(self.accept)
         self.text.backwardAvailable.connect(self.back.setEnabled)
         self.text.forwardAvailable.connect(self.forward.setEnabled)
         self.text.sourceChanged.connect(self._arrived)
@@ -167,9 +164,8 @@ def slug(heading: str) -> str:
     return re.sub(r"[^\w]+", "-", heading.lower()).strip("-")
 
 
-def _button(text: str, tip: str, keys: str) -> QPushButton:
-    button = push_button(text, tip)
+def _button(text: str, tip: str, do: Clicked, keys: str = "") -> QPushButton:
+    button = push_button(text, tip, do)
     button.setAutoDefault(False)
-    if keys:
-        button.setShortcut(QKeySequence(keys))
+    button.setShortcut(QKeySequence(keys))
     return button
