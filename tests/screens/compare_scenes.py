@@ -70,7 +70,11 @@ def series(stage: Stage) -> None:
     for i, position in enumerate(POSITIONS_MM):
         write_stage(stage.folder, round(position, 1), seed=i, bend_mm=0.02 * (-1) ** i)
     page._series_control.add([stage.folder])
-    stage.wait(lambda: page.series._state.test.value is not None and not page.series._state.busy.value)
+    stage.wait(
+        lambda: (
+            page.series.content._state.test.value is not None and not page.series.content._state.busy.value
+        )
+    )
     stage.shoot()
     stage.press("Region")
     stage.idle()
@@ -84,7 +88,9 @@ def sweep(stage: Stage) -> None:
     page._series_control.ask(SeriesKind.SWEEP)
     page._series_control.compare_with(reference)
     page._series_control.add([stage.folder])
-    stage.wait(lambda: len(page.series._state.points) == 3 and not page.series._state.busy.value)
+    stage.wait(
+        lambda: len(page.series.content._state.points) == 3 and not page.series.content._state.busy.value
+    )
     stage.shoot()
 
 

@@ -113,7 +113,7 @@ def forecast(stage: Stage) -> None:
     stage.idle()
     control.answer(budget_s=60)
     stage.shoot()
-    scan.page.curve.figure.setCurrentIndex(4)
+    scan.page.forecast.curve.content.figure.setCurrentIndex(4)
     stage.shoot("width")
     scan.controller.plans.choose_preset("quick")
     scan.state.then_reconstruct.set(False)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, QUrl, Signal
+from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -176,26 +176,16 @@ class LibraryPanel(QGroupBox):
             self._commands.import_file(Path(name))
 
     def _show_drift(self, verdict: DriftVerdict | None) -> None:
-        if verdict is None:
-            return
-        window = DriftWindow(verdict, self.table.theme, self)
-        window.again_requested.connect(
-            lambda: self._commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))
-        )
-        window.use_requested.connect(lambda: self._commands.use(verdict.name))
-        window.open()
+        if verdict is not None:
+            DriftWindow(verdict, self._commands, self.table.theme, self).open()
 
 
 class DriftWindow(QDialog):
-    """What a quick shot of a flat target showed about a calibration, and what to do about it.
+    """What a quick shot of a flat target showed about a calibration, and what to do about it."""
 
-    ``again_requested`` asks for another check, ``use_requested`` for scans with this calibration anyway.
-    """
-
-    again_requested = Signal()
-    use_requested = Signal()
-
-    def __init__(self, verdict: DriftVerdict, theme: Theme, parent: QWidget) -> None:
+    def __init__(
+        self, verdict: DriftVerdict, commands: LibraryController, theme: Theme, parent: QWidget
+    ) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setWindowTitle(f"Drift check of {verdict.name}")
@@ -211,20 +201,20 @@ class DriftWindow(QDialog):
         column.addWidget(self.table, 1)
         if not verdict.passed:
             column.addWidget(label(WHAT_TO_DO, "muted", wraps=True))
-        column.addWidget(self._buttons(not verdict.passed))
+        column.addWidget(self._buttons(verdict, commands))
 
-    def _buttons(self, has_drifted: bool) -> QDialogButtonBox:
+    def _buttons(self, verdict: DriftVerdict, commands: LibraryController) -> QDialogButtonBox:
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         buttons.rejected.connect(self.reject)
-        self.again = push_button(
-            "Check &again", "Repeat the quick capture; the target must still be in place"
-        )
-        self.use = push_button("&Use anyway", "Scan with this calibration from now on, despite the drift")
-        for button, requested in ((self.again, self.again_requested), (self.use, self.use_requested)):
+        tip = "Repeat the quick capture; the target must still be in place"
+        check = lambda: commands.check(verdict.name, verdict.spectralon, bool(verdict.overridden))  # noqa: E731
+        self.again = push_button("Check &again", tip, check)
+        tip = "Scan with this calibration from now on, despite the drift"
+        self.use = push_button("&Use anyway", tip, lambda: commands.use(verdict.name))
+        for button in (self.again, self.use):
             buttons.addButton(button, QDialogButtonBox.ButtonRole.ActionRole)
-            button.clicked.connect(requested)
             button.clicked.connect(self.accept)
-            button.setVisible(has_drifted)
+            button.setVisible(not verdict.passed)
         return buttons
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QWidget
 
@@ -46,7 +46,9 @@ class CalibratePage(PageWidget):
             commands.connect_rig,
         )
         self.head = CampaignBox(state, rig, commands, home)
-        self.rows = {row.name: CalibrationRow(row, number) for number, row in enumerate(state.rows.value, 1)}
+        self.rows = {
+            row.name: CalibrationRow(row, number, self.run) for number, row in enumerate(state.rows.value, 1)
+        }
         self.library = LibraryPanel(state, commands.library)
         self._timer = Ticker(self, FETCH_MS, commands.take_news)
         self._lay_out()
@@ -60,8 +62,6 @@ class CalibratePage(PageWidget):
 
     def _connect(self) -> None:
         state = self._state
-        for row in self.rows.values():
-            row.run_requested.connect(self.run)
         self.stops: list[Callable[[], None]] = [
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
@@ -113,14 +113,9 @@ class CalibratePage(PageWidget):
 
 
 class CalibrationRow(QFrame):
-    """One calibration: state, key figure, date, and the button that opens its wizard.
+    """One calibration: state, key figure, date, and the button that opens its wizard by ``run``."""
 
-    ``run_requested`` tells the name of the calibration to run.
-    """
-
-    run_requested = Signal(str)
-
-    def __init__(self, row: Row, number: int) -> None:
+    def __init__(self, row: Row, number: int, run: Callable[[str], object]) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._title = label(f"{number}   {row.about.title}", "heading")
@@ -128,7 +123,7 @@ class CalibrationRow(QFrame):
         self._state, self._figure, self._date = label(""), label("", wraps=True), label("", "muted")
         self._date.setToolTip("When it was accepted")
         self._reason = label("", "muted", wraps=True)
-        self.run = push_button("", "", lambda: self.run_requested.emit(row.name))
+        self.run = push_button("", "", lambda: run(row.name))
         self._lay_out()
         self.show_row(row)
 

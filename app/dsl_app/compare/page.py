@@ -32,26 +32,21 @@ class ComparePage(PageWidget):
         self._control, self._series_control = control, series_control
         self.setAcceptDrops(True)
         self.pair = PairPanel(state, control)
-        self._series = Deferred(lambda: SeriesPanel(series_state, series_control))
+        self.series = Deferred(lambda: SeriesPanel(series_state, series_control))
         self.tabs = tabs_of(
             "Two results or a series",
             (self.pair, "T&wo results", "Compare two results, or one with its ground truth, pixel by pixel"),
-            (self._series, "S&eries", "Depth over stage positions, or accuracy over time"),
+            (self.series, "S&eries", "Depth over stage positions, or accuracy over time"),
         )
         column_of(self.tabs, on=self)
 
-    @property
-    def series(self) -> SeriesPanel:
-        """The series panel, made on first use."""
-        return self._series.content
-
     def show_series(self) -> None:
         """Show the Series tab."""
-        self.tabs.setCurrentWidget(self._series)
+        self.tabs.setCurrentWidget(self.series)
 
     @property
     def _shows_series(self) -> bool:
-        return self.tabs.currentWidget() is self._series
+        return self.tabs.currentWidget() is self.series
 
     def page_actions(self) -> dict[str, Callable[[], object]]:
         """Actions that this page handles."""
@@ -59,7 +54,7 @@ class ComparePage(PageWidget):
 
     def _add_to_series(self) -> None:
         self.show_series()
-        self.series.choose()
+        self.series.content.choose()
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         """Accept folders."""

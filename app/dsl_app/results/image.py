@@ -10,6 +10,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QLabel, QWidget
 
+from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layer, Layers
 from dsl_app.results.outline_box import OutlineBox
 from dsl_app.results.state import Mark, ResultsState, Tool
@@ -41,17 +42,11 @@ class _Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
 
 
 class ResultImage(QWidget):
-    """Paints the result of a state; signals report what the mouse and keys ask for."""
+    """Paints the result of a state, and asks its controller for what mouse and keys do."""
 
-    pointed = Signal(object)
-    pinned = Signal(object)
-    outlined = Signal(object)
-    moved = Signal(int, int)
-    deleted = Signal()
-
-    def __init__(self, state: ResultsState) -> None:
+    def __init__(self, state: ResultsState, control: ResultsController) -> None:
         super().__init__()
-        self._state = state
+        self._state, self._control = state, control
         self._layers: Layers | None = None
         self._theme = DARK
         self._mark_items: list[Any] = []
@@ -83,7 +78,7 @@ class ResultImage(QWidget):
             self.canvas.scene().sigMouseMoved, rateLimit=CURSOR_HZ, slot=self._mouse_moved
         )
         self.box.clicked.connect(self._clicked)
-        self.box.drawn.connect(self.outlined)
+        self.box.drawn.connect(control.marks.add_outline)
         self.canvas.key.connect(self._key)
         self._follow()
 
@@ -109,13 +104,13 @@ class ResultImage(QWidget):
             at = self.box.mapSceneToView(event[0])
             pixel = self._pixel(at.x(), at.y())
             if pixel is not None:
-                self.pointed.emit(pixel)
+                self._control.point_at(pixel)
 
     def _clicked(self, x: float, y: float) -> None:
         pixel = self._pixel(x, y)
         if pixel is not None:
-            self.pointed.emit(pixel)
-            self.pinned.emit(pixel)
+            self._control.point_at(pixel)
+            self._control.marks.pin(pixel)
 
     def _take_tool(self, tool: Tool) -> None:
         self.box.set_tool("" if tool is Tool.PIN else tool.value)
@@ -125,16 +120,16 @@ class ResultImage(QWidget):
         key = Qt.Key(event.key())
         step = arrow_step(event)
         if step is not None:
-            self.moved.emit(*step)
+            self._control.move_cursor(*step)
         elif key in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_P):
             if self.box.is_drawing:
                 self.box.close_outline()
             elif self._state.cursor.value is not None:
-                self.pinned.emit(self._state.cursor.value)
+                self._control.marks.pin(self._state.cursor.value)
         elif key == Qt.Key.Key_Escape and self.box.is_drawing:
             self.box.cancel_outline()
         elif key == Qt.Key.Key_Delete:
-            self.deleted.emit()
+            self._control.marks.remove(self._state.selected.value)
         elif key == Qt.Key.Key_F:
             self.fit()
         else:

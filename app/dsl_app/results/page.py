@@ -54,14 +54,15 @@ class ResultsPage(PageWidget):
         self.welcome, self.offer = welcome, Offer()
         self.bar = ViewBar(state, control)
         set_help(self.bar, "numbers#views")
-        self._image = Deferred(self._make_image)
-        set_help(self._image, "numbers#below-the-picture")
-        self.cloud = CloudPanel(state, runner)
+        # Slow to make: made when they are first seen.
+        self.image = Deferred(lambda: ResultImage(state, control))
+        set_help(self.image, "numbers#below-the-picture")
+        self.cloud = CloudPanel(state, control, runner)
         self.pixel_info = PixelInfo(state)
         set_help(self.pixel_info, "hard-cases")
-        self._spectra = Deferred(lambda: SpectrumPanel(state))
-        self._spectra.setObjectName("spectra")
-        set_help(self._spectra, "numbers#spectra")
+        self.spectra = Deferred(lambda: SpectrumPanel(state))
+        self.spectra.setObjectName("spectra")
+        set_help(self.spectra, "numbers#spectra")
         self.marks = MarksPanel(state, control.marks)
         set_help(self.marks, "numbers#pins-regions-references")
         self.search = SearchPanel(state, control.search)
@@ -83,31 +84,12 @@ class ResultsPage(PageWidget):
         self._connect()
 
     @property
-    def image(self) -> ResultImage:
-        """The picture, made on first use."""
-        return self._image.content
-
-    @property
-    def spectra(self) -> SpectrumPanel:
-        """The spectra, made on first use."""
-        return self._spectra.content
-
-    @property
     def graph(self) -> IntensityWindow:
         """The window of intensity graphs, made on first use."""
         if self._graph is None:
             self._graph = IntensityWindow(self._state, self)
             self._graph.apply_theme(self._theme)
         return self._graph
-
-    def _make_image(self) -> ResultImage:
-        control, made = self._control, ResultImage(self._state)
-        made.pointed.connect(control.point_at)
-        made.pinned.connect(control.marks.pin)
-        made.outlined.connect(control.marks.add_outline)
-        made.moved.connect(control.move_cursor)
-        made.deleted.connect(self.marks.remove_selected)
-        return made
 
     # Lay out ---------------------------------------------------------------------------------------
 
@@ -126,11 +108,11 @@ class ResultsPage(PageWidget):
         column_of(head, self.warning, (self.stack, 1), on=self, margins=(16, 10, 12, 8))
 
     def _content(self) -> QWidget:
-        self.pictures = splitter(Qt.Orientation.Horizontal, (self._image, 1), (self.cloud, 2))
+        self.pictures = splitter(Qt.Orientation.Horizontal, (self.image, 1), (self.cloud, 2))
         self.pictures.setObjectName("result-pictures")
         left = boxed(column_of(self.bar, (self.pictures, 1), self.pixel_info, margins=0))
         tabs = tabs_of("", (self.marks, "Pins, regions, references", ""), (self.search, "Search", ""))
-        right = splitter(Qt.Orientation.Vertical, (self._spectra, 3), (tabs, 2), sizes=(400, 340))
+        right = splitter(Qt.Orientation.Vertical, (self.spectra, 3), (tabs, 2), sizes=(400, 340))
         return splitter(Qt.Orientation.Horizontal, (left, 3), (right, 2), sizes=(720, 440))
 
     def _connect(self) -> None:
@@ -142,9 +124,6 @@ class ResultsPage(PageWidget):
         self.offer.reconstruct.clicked.connect(control.reconstruct)
         for button in (self.reconstruct_again, self.offer.otherwise):
             button.clicked.connect(self.reconstruct_again_requested)
-        self.cloud.pointed.connect(control.point_at)
-        self.cloud.pinned.connect(control.marks.pin)
-        self.cloud.outlined.connect(control.marks.add_pixels)
         follow_any(self._show_summary, state.result, state.offer, state.busy)
         state.graph.changed.connect(self._show_graph)
         state.library.changed.connect(self._ask_library)
@@ -236,7 +215,7 @@ class ResultsPage(PageWidget):
 
     def figure(self) -> PlotFigure | None:
         """The spectra, if there are any."""
-        result, spectra = self._state.result.value, self._spectra.made
+        result, spectra = self._state.result.value, self.spectra.made
         if result is None or not result.has_spectra or spectra is None:
             return None
         name = f"{result.path.stem}_spectra"

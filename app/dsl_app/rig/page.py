@@ -37,9 +37,9 @@ class RigPage(PageWidget):
         self._rig_commands, self._commands = live.rig, live
         self._state, self._live_state = live.rig.state, live.state
         self.stops: list[Callable[[], None]] = []
-        self._live = Deferred(self._make_live)
-        self._live.setObjectName("live-view")
-        set_help(self._live, "rig#live-picture")
+        self.live = Deferred(self._make_live)
+        self.live.setObjectName("live-view")
+        set_help(self.live, "rig#live-picture")
         self.projector = ProjectorPanel()
         set_help(self.projector, "rig#projector")
         self._rig = ChoiceBox("Rig", "The rig to connect", [(name, name) for name in rigs])
@@ -77,11 +77,6 @@ class RigPage(PageWidget):
         self._lay_out()
         self._connect()
 
-    @property
-    def live(self) -> LiveView:
-        """What the camera sees."""
-        return self._live.content
-
     def _make_live(self) -> LiveView:
         state, made = self._live_state, LiveView()
         made.set_camera(self._state.camera)
@@ -110,7 +105,7 @@ class RigPage(PageWidget):
         )
         for side in (left, right):
             side.setFixedWidth(SIDE_PX)
-        row_of(left, (self._live, 1), right, on=self)
+        row_of(left, (self.live, 1), right, on=self)
 
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands
@@ -139,7 +134,7 @@ class RigPage(PageWidget):
             self._commands.start()
 
     def _expose(self) -> None:
-        self._commands.expose_automatically(self.live.region)
+        self._commands.expose_automatically(self.live.content.region)
 
     def _show(self) -> None:
         view = rig_view(self._state, self._live_state)
@@ -165,8 +160,8 @@ class RigPage(PageWidget):
 
     def _show_devices(self, devices: DeviceRig | None) -> None:
         camera = self._state.camera
-        if self._live.made is not None:
-            self._live.made.set_camera(camera)
+        if self.live.made is not None:
+            self.live.made.set_camera(camera)
         self.projector.set_projector(self._state.projector)
         self._show_exposure(self._live_state.exposure_ms.value)
         if camera is not None:

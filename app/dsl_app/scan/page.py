@@ -14,7 +14,6 @@ from dsl_app.scan.controls import banner_controls
 from dsl_app.scan.effects.controller import EffectsController
 from dsl_app.scan.effects.panel import EffectsPanel
 from dsl_app.scan.effects.state import EffectsState
-from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.panel import ForecastPanel
 from dsl_app.scan.plan_editor import PlanEditor
 from dsl_app.scan.run import CalibrationBox, RunBox, TargetBox
@@ -78,11 +77,6 @@ class ScanPage(PageWidget):
         self._timer = Ticker(self, FETCH_MS, controller.take_news)
         self._lay_out()
         self._connect()
-
-    @property
-    def curve(self) -> OperatingCurve:
-        """Accuracy against time."""
-        return self.forecast.curve.content
 
     def _lay_out(self) -> None:
         self.middle = tabs_of(

@@ -260,7 +260,7 @@ class Session:
             type_letter(self.window, digit)
             wait(lambda view=view: state.view.value is view, f"the view {view.value}")  # type: ignore[misc]
             self.idle()
-        canvas = page.image.canvas.viewport()
+        canvas = page.image.content.canvas.viewport()
         click(canvas, _at(page, (30, 30)))
         wait(lambda: len(state.marks.value) == 1, "a pin")
         click(page.bar.tools[next(tool for tool in page.bar.tools if tool.value == "rectangle")])
@@ -300,7 +300,7 @@ def _set(field: QWidget, text: str) -> None:
 
 def _at(page: ResultsPage, pixel: tuple[int, int]) -> QPoint:
     """Where a pixel of the result lies on the canvas."""
-    image = page.image
+    image = page.image.content
     at = image.canvas.mapFromScene(image.box.mapViewToScene(QPointF(*pixel)))
     return QPoint(at.x(), at.y())
 

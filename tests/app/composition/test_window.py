@@ -80,7 +80,7 @@ def test_accuracy_is_predicted_in_the_background_and_closing_ends_it(
     assert isinstance(page, ScanPage)
     composition.start()
     qtbot.waitUntil(lambda: len(page.forecast._state.points.value) > 3, timeout=60_000)
-    assert page.curve.marker.isVisible()
+    assert page.forecast.curve.content.marker.isVisible()
     window.close()
     assert list((tmp_path / "forecasts").glob("*.json"))
 

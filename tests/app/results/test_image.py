@@ -20,7 +20,7 @@ def test_a_click_pins_and_keys_move_pin_and_remove(bench: Bench, qtbot: QtBot) -
     QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at((10, 10)))
     qtbot.waitUntil(lambda: len(bench.marks) == 1)
     assert bench.marks[0].pixel == (10, 10)
-    canvas = bench.page.image.canvas
+    canvas = bench.page.image.content.canvas
     canvas.setFocus()
     QTest.keyClick(canvas, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
     QTest.keyClick(canvas, Qt.Key.Key_Up)
@@ -44,13 +44,13 @@ def test_regions_are_drawn_with_every_tool(bench: Bench, qtbot: QtBot) -> None:
     for corner in ((2, 12), (12, 12), (12, 20)):
         QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
         QTest.qWait(1)
-    begun = bench.page.image.box.is_drawing
-    QTest.keyClick(bench.page.image.canvas, Qt.Key.Key_Escape)
-    assert (begun, bench.page.image.box.is_drawing) == (True, False)
+    begun = bench.page.image.content.box.is_drawing
+    QTest.keyClick(bench.page.image.content.canvas, Qt.Key.Key_Escape)
+    assert (begun, bench.page.image.content.box.is_drawing) == (True, False)
     for corner in ((2, 12), (12, 12), (12, 20)):
         QTest.mouseClick(bench.view, Qt.MouseButton.LeftButton, pos=bench.at(corner))
         QTest.qWait(1)
-    QTest.keyClick(bench.page.image.canvas, Qt.Key.Key_Return)
+    QTest.keyClick(bench.page.image.content.canvas, Qt.Key.Key_Return)
     assert bench.marks[2].used == pytest.approx(40, abs=12)
 
 
@@ -67,7 +67,7 @@ def test_an_ellipse_holds_pi_quarters_of_its_box(bench: Bench) -> None:
 def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
     result = bench.state.result.value
     assert result is not None
-    image = bench.page.image
+    image = bench.page.image.content
     for view, quality in itertools.product(ResultView, QualityMap):
         bench.state.quality.set(quality)
         bench.state.view.set(view)
@@ -79,7 +79,7 @@ def test_every_view_paints_the_shape_of_the_result(bench: Bench) -> None:
 
 
 def test_depth_outside_the_limits_is_transparent_and_the_bar_says_them(bench: Bench, qtbot: QtBot) -> None:
-    bar, image = bench.page.bar, bench.page.image
+    bar, image = bench.page.bar, bench.page.image.content
     bench.control.show(ResultView.COLOUR)
     assert not bar.near.isVisible()
     bench.control.show(ResultView.DEPTH)

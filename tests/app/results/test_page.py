@@ -51,7 +51,7 @@ def test_recent_files_are_offered_and_vanished_ones_marked(qtbot: QtBot, tmp_pat
 
 
 def test_the_keys_1_to_5_choose_the_view(bench: Bench, qtbot: QtBot) -> None:
-    bench.page.image.canvas.setFocus()
+    bench.page.image.content.canvas.setFocus()
     keys = (Qt.Key.Key_1, Qt.Key.Key_2, Qt.Key.Key_3, Qt.Key.Key_4, Qt.Key.Key_5)
     for key, view in zip(keys, ResultView, strict=True):
         QTest.keyClick(bench.window, key)
@@ -66,4 +66,4 @@ def test_themes_reach_every_panel(bench: Bench) -> None:
     bench.control.marks.pin((10, 10))
     for theme in (LIGHT, DARK_THEME):
         bench.page.apply_theme(theme)
-        assert bench.page.image.canvas.backgroundBrush().color().name() == theme.base
+        assert bench.page.image.content.canvas.backgroundBrush().color().name() == theme.base

@@ -18,7 +18,7 @@ def test_pointing_shows_the_pixel_and_its_spectrum(bench: Bench, qtbot: QtBot) -
     assert "pixel 20, 8" in text
     assert "z 710.00 ± 0.25 mm" in text
     assert "545 nm  0.400 ± 0.010" in text
-    x, y = bench.page.spectra.live.solid.getData()
+    x, y = bench.page.spectra.content.live.solid.getData()
     assert x.tolist() == NM.tolist()
     np.testing.assert_allclose(y, RED, atol=1e-4)
 
@@ -26,10 +26,10 @@ def test_pointing_shows_the_pixel_and_its_spectrum(bench: Bench, qtbot: QtBot) -
 def test_a_bad_pixel_says_why(bench: Bench) -> None:
     bench.control.point_at(DARK)
     assert "too little projector light" in bench.page.pixel_info.reasons.text()
-    assert not bench.page.spectra.live.solid.isVisible()
+    assert not bench.page.spectra.content.live.solid.isVisible()
     bench.control.point_at(UNREACHED)
     assert "430–445 nm" in bench.page.pixel_info.reasons.text()
-    _, dashed = bench.page.spectra.live.dashed.getData()
+    _, dashed = bench.page.spectra.content.live.dashed.getData()
     assert np.isfinite(dashed).sum() == 5
     bench.control.point_at((9, 9))
     assert "has no flags" in bench.page.pixel_info.reasons.text()

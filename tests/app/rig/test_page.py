@@ -48,7 +48,7 @@ def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
     connect(qtbot, page, state)
     assert "64 × 48" in page._camera_text.text()
     click(page._live_button)
-    qtbot.waitUntil(lambda: page.live.frames_per_second > 0, timeout=20_000)
+    qtbot.waitUntil(lambda: page.live.content.frames_per_second > 0, timeout=20_000)
     assert page._live_button.text() == "Stop live view"
     click(page._live_button)
     qtbot.waitUntil(lambda: not state.live.value)
@@ -117,21 +117,21 @@ def test_options_as_people_type_them() -> None:
 def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, notifier = bench
     connect(qtbot, page, state)
-    assert not page.live.rectangle.isVisible()
+    assert not page.live.content.rectangle.isVisible()
     click(page._live_button)
     qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
-    page.live.region_box.click()
-    region = page.live.region
+    page.live.content.region_box.click()
+    region = page.live.content.region
     assert region is not None
     x, y, width, height = region
     assert (x % 2, y % 2, width % 2, height % 2) == (0, 0, 0, 0)
     assert 0 < width < 64
     assert 0 < height < 48
-    page.live.rectangle.setPos(-20, -20)
-    moved = page.live.region
+    page.live.content.rectangle.setPos(-20, -20)
+    moved = page.live.content.region
     assert moved is not None
     assert moved[:2] == (0, 0)
-    page.live.rectangle.setPos(0, 0)
+    page.live.content.rectangle.setPos(0, 0)
     click(page.auto)
     qtbot.waitUntil(lambda: bool(notifier.told), timeout=30_000)
     assert "LED cycle" in page._cycles.text()
@@ -146,12 +146,12 @@ def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
     qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
     click(page._live_button)
     qtbot.waitUntil(lambda: not state.live.value)
-    QTest.keyClick(page.live, Qt.Key.Key_Right)
-    QTest.keyClick(page.live, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(page.live.content, Qt.Key.Key_Right)
+    QTest.keyClick(page.live.content, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)
     frame = page._live_state.frame.value
     assert frame is not None
-    assert page.live._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN"
-    QTest.keyClick(page.live, Qt.Key.Key_F)
+    assert page.live.content._pixel.text() == f"column 33 px, row 14 px: {frame.pixels[14, 33]} DN"
+    QTest.keyClick(page.live.content, Qt.Key.Key_F)
 
 
 def test_the_form_shows_a_rig_that_another_page_asked_for(bench: Bench) -> None:

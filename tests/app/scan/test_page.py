@@ -274,7 +274,7 @@ def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
 ) -> None:
     page, bench, _ = ready
     state = begin(qtbot, page)
-    curve = page.curve
+    curve = page.forecast.curve.content
     assert figures(page, 1)["Frames"] == str(FRAMES)
     assert figures(page, 2)["Frames"] == "716"
     assert figures(page, 2)["Capture"] == "3.6 min"
@@ -297,13 +297,13 @@ def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
 def test_arrow_keys_walk_along_the_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
     page, bench, _ = ready
     state = begin(qtbot, page)
-    page.curve.plot.setFocus()
-    QTest.keyClick(page.curve.plot, Qt.Key.Key_Right)
+    page.forecast.curve.content.plot.setFocus()
+    QTest.keyClick(page.forecast.curve.content.plot, Qt.Key.Key_Right)
     current = state.current.value
     assert current is not None
-    assert current in page.curve.front()
+    assert current in page.forecast.curve.content.front()
     assert current.expected.seconds > SHORT.duration_s(50.0)
-    QTest.keyClick(page.curve.plot, Qt.Key.Key_Left)
+    QTest.keyClick(page.forecast.curve.content.plot, Qt.Key.Key_Left)
     assert bench.state.preset is PRESETS[0]
 
 
@@ -338,10 +338,10 @@ def test_nothing_is_asked_for_while_a_scan_runs(qtbot: QtBot, ready: Bench, pred
 def test_every_figure_has_its_curve(qtbot: QtBot, ready: Bench, predicted: None) -> None:
     page, _, _ = ready
     begin(qtbot, page)
-    for index in range(page.curve.figure.count()):
-        page.curve.figure.setCurrentIndex(index)
-        assert len(page.curve.front()) >= 1
-        assert page.curve.marker.isVisible()
+    for index in range(page.forecast.curve.content.figure.count()):
+        page.forecast.curve.content.figure.setCurrentIndex(index)
+        assert len(page.forecast.curve.content.front()) >= 1
+        assert page.forecast.curve.content.marker.isVisible()
 
 
 def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> None:
@@ -395,7 +395,7 @@ def test_arrow_keys_come_back_into_a_smaller_picture(qtbot: QtBot) -> None:
 
 def test_the_curve_is_saved_as_a_figure(qtbot: QtBot, ready: Bench, predicted: None, tmp_path: Path) -> None:
     page, _, _ = ready
-    plot = page.curve.plot
+    plot = page.forecast.curve.content.plot
     assert page.figure() is None
     begin(qtbot, page)
     figure = page.figure()

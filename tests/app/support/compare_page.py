@@ -36,7 +36,7 @@ class Bench:
 
     @property
     def panel(self) -> SeriesPanel:
-        return self.page.series
+        return self.page.series.content
 
     def see(self) -> SeriesPanel:
         self.page.tabs.setCurrentIndex(1)

@@ -58,12 +58,12 @@ class Bench:
 
     @property
     def view(self) -> QWidget:
-        viewport: QWidget = self.page.image.canvas.viewport()
+        viewport: QWidget = self.page.image.content.canvas.viewport()
         return viewport
 
     def at(self, pixel: Pixel) -> QPoint:
         """Where a pixel of the image lies on the canvas."""
-        image = self.page.image
+        image = self.page.image.content
         at = image.canvas.mapFromScene(image.box.mapViewToScene(QPointF(*pixel)))
         return QPoint(at.x(), at.y())
 

@@ -40,26 +40,12 @@ class PairPanel(QWidget):
             "Write &report…", "Save figures and pictures of A against the ground truth as an HTML page"
         )
         self.hint = remark_line()
-        self._pictures = Deferred(self._make_pictures)
+        # Slow to make: made when they are first seen.
+        self.pictures = Deferred(lambda: PairPictures(state, control))
         self.bar = PairControls(state, control)
-        self._figures = Deferred(lambda: PairFigures(state))
+        self.figures = Deferred(lambda: PairFigures(state))
         self._lay_out()
         self._connect()
-
-    @property
-    def pictures(self) -> PairPictures:
-        """The three pictures, made on first use."""
-        return self._pictures.content
-
-    @property
-    def figures(self) -> PairFigures:
-        """Spectra and figures, made on first use."""
-        return self._figures.content
-
-    def _make_pictures(self) -> PairPictures:
-        made = PairPictures(self._state)
-        made.pointed.connect(self._control.point_at)
-        return made
 
     def _lay_out(self) -> None:
         head = row_of(
@@ -73,8 +59,8 @@ class PairPanel(QWidget):
             self.swap,
             self.report,
         )
-        above = boxed(column_of((self._pictures, 1), self.bar, margins=0))
-        self.parts = splitter(Qt.Orientation.Vertical, (above, 5), (self._figures, 4))
+        above = boxed(column_of((self.pictures, 1), self.bar, margins=0))
+        self.parts = splitter(Qt.Orientation.Vertical, (above, 5), (self.figures, 4))
         column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
 
     def _connect(self) -> None:

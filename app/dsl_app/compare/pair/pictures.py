@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QSlider, QWidget
 
@@ -34,13 +34,11 @@ BAND_PX = 260
 
 
 class PairPictures(QWidget):
-    """Paints the pair of a state; ``pointed`` carries the pixel under the mouse or chosen by arrow keys."""
+    """Paints the pair of a state, whose cursor follows the mouse and the arrow keys."""
 
-    pointed = Signal(object)
-
-    def __init__(self, state: PairState) -> None:
+    def __init__(self, state: PairState, control: PairController) -> None:
         super().__init__()
-        self._state, self._theme = state, DARK
+        self._state, self._control, self._theme = state, control, DARK
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.canvas = pg.GraphicsLayoutWidget()
         self.canvas.setAccessibleName("A, B and their difference")
@@ -79,7 +77,7 @@ class PairPictures(QWidget):
         for box in self.boxes:
             if box.sceneBoundingRect().contains(event[0]):
                 at = box.mapSceneToView(event[0])
-                self.pointed.emit((round(at.x()), round(at.y())))
+                self._control.point_at((round(at.x()), round(at.y())))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Arrow keys move the cursor, with Shift by ten."""
@@ -89,7 +87,7 @@ class PairPictures(QWidget):
             return
         height, width = pair.first.arrays.shape
         at = self._state.cursor.value or (width // 2, height // 2)
-        self.pointed.emit(moved_within(at, step, (width, height)))
+        self._control.point_at(moved_within(at, step, (width, height)))
 
     # Paint -----------------------------------------------------------------------------------------
 

@@ -49,27 +49,18 @@ class SeriesPanel(QWidget):
         self.figures = VerdictTable("Figures of the series", "The figures of all positions together")
         self.figures.verticalHeader().setDefaultSectionSize(24)
         self.figures.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        self._plot = Deferred(lambda: SeriesPlot(state))
-        self._picture = Deferred(lambda: SeriesPicture(state, control))
+        # Slow to make: made when they are first seen.
+        self.plot = Deferred(lambda: SeriesPlot(state))
+        self.picture = Deferred(lambda: SeriesPicture(state, control))
         set_help(self, "comparing#a-series")
         set_help(self.figures, "comparing#depth-over-stage-positions")
         self._lay_out()
         self._connect()
 
-    @property
-    def plot(self) -> SeriesPlot:
-        """The plot, made on first use."""
-        return self._plot.content
-
-    @property
-    def picture(self) -> SeriesPicture:
-        """The plane of the selected row, made on first use."""
-        return self._picture.content
-
     def _lay_out(self) -> None:
         head = row_of(self.kind, self.add, self.remove, self.against, self.figure, STRETCH, self.report)
         above = splitter(Qt.Orientation.Horizontal, (self.table, 3), (self.figures, 2))
-        below = splitter(Qt.Orientation.Horizontal, (self._plot, 3), (self._picture, 2))
+        below = splitter(Qt.Orientation.Horizontal, (self.plot, 3), (self.picture, 2))
         self.parts = splitter(Qt.Orientation.Vertical, (above, 2), (below, 3))
         column_of(head, self.hint, (self.parts, 1), on=self, margins=(0, 8, 0, 0))
 
@@ -116,7 +107,7 @@ class SeriesPanel(QWidget):
             (self.against, not display.is_stage),
             (self.figure, not display.is_stage),
             (self.figures, display.is_stage),
-            (self._picture, display.is_stage),
+            (self.picture, display.is_stage),
         ):
             widget.setVisible(is_seen)
         box = self.against

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QMouseEvent, QShowEvent
 from PySide6.QtWidgets import QWidget
 
 from dsl_app.results.cloud.views import CloudView, make_cloud_view, normalised, prepare_cloud_view
+from dsl_app.results.controller import ResultsController
 from dsl_app.results.layers import Layers, rgb_of, within
 from dsl_app.results.state import ResultsState, ResultView, Tool
 from dsl_app.shared.jobs.base import Job, JobRunner
@@ -28,13 +29,9 @@ STEP_MS = 20
 class CloudPanel(QWidget):
     """Follows a state while it is visible; the view is made when it is first shown."""
 
-    pointed = Signal(object)
-    pinned = Signal(object)
-    outlined = Signal(object)
-
-    def __init__(self, state: ResultsState, runner: JobRunner) -> None:
+    def __init__(self, state: ResultsState, control: ResultsController, runner: JobRunner) -> None:
         super().__init__()
-        self._state, self._runner, self._theme = state, runner, DARK
+        self._state, self._control, self._runner, self._theme = state, control, runner, DARK
         self._is_preparing = False
         self.view: CloudView | None = None
         self._layers: Layers | None = None
@@ -209,7 +206,7 @@ class CloudPanel(QWidget):
         if press is not None and np.hypot(at[0] - press[0], at[1] - press[1]) < 0.01:
             pixel = self._point(at, len(self._points))
             if pixel is not None:
-                self.pinned.emit(pixel)
+                self._control.marks.pin(pixel)
         return False
 
     def _point(self, at: tuple[float, float], most: int) -> Pixel | None:
@@ -228,7 +225,7 @@ class CloudPanel(QWidget):
         if found is None:
             return None
         pixel = self._pixel(found * step)
-        self.pointed.emit(pixel)
+        self._control.point_at(pixel)
         return pixel
 
     def _pixel(self, index: int) -> Pixel:
@@ -247,7 +244,7 @@ class CloudPanel(QWidget):
         mask = np.zeros(result.shape, bool)
         mask.ravel()[self._flat[inside]] = True
         if mask.any():
-            self.outlined.emit(mask)
+            self._control.marks.add_pixels(mask)
 
     # Theme and end ---------------------------------------------------------------------------------
 

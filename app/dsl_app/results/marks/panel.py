@@ -106,8 +106,7 @@ class MarksPanel(QWidget):
 
     def remove_selected(self) -> None:
         """Remove the selected mark."""
-        if self._state.selected.value:
-            self._control.remove(self._state.selected.value)
+        self._control.remove(self._state.selected.value)
 
     def copy_spectra(self) -> None:
         """Copy the spectra shown, as a table."""

@@ -63,21 +63,23 @@ def test_figures_pictures_and_spectra_of_a_pair(qtbot: QtBot, bench: Bench, char
     assert not page.hint.isVisible()
     assert page.report.isEnabled()
     assert not page.swap.isEnabled()
-    first = page.figures.table.item(0, 0)
+    first = page.figures.content.table.item(0, 0)
     assert first is not None
     assert first.text() == "Depth, RMSE per pixel"
-    assert " ± " in page.figures.table.item(0, 1).text()  # type: ignore[union-attr]
-    shapes = [item.image.shape for item in page.pictures.images]
+    assert " ± " in page.figures.content.table.item(0, 1).text()  # type: ignore[union-attr]
+    shapes = [item.image.shape for item in page.pictures.content.images]
     assert shapes == [(48, 64)] * 3
-    assert tuple(page.pictures.images[0].levels) == tuple(page.pictures.images[1].levels)
-    qtbot.waitUntil(lambda: len(page.pictures.bars) == 2)
-    assert page.pictures.bars[0].levels() == pytest.approx(page.pictures.images[0].levels, rel=1e-3)
-    low, high = page.pictures.images[2].levels
+    assert tuple(page.pictures.content.images[0].levels) == tuple(page.pictures.content.images[1].levels)
+    qtbot.waitUntil(lambda: len(page.pictures.content.bars) == 2)
+    assert page.pictures.content.bars[0].levels() == pytest.approx(
+        page.pictures.content.images[0].levels, rel=1e-3
+    )
+    low, high = page.pictures.content.images[2].levels
     assert low == -high
-    QTest.keyClick(page.pictures, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(page.pictures.content, Qt.Key.Key_Left, Qt.KeyboardModifier.ShiftModifier)
     assert state.cursor.value == (22, 24)
     assert "column 22, row 24" in page.bar.readout.text()
-    assert all(curve.solid.isVisible() for curve in page.figures.curves)
+    assert all(curve.solid.isVisible() for curve in page.figures.content.curves)
     apply_theme_to(page, DARK)
 
 
@@ -91,7 +93,7 @@ def test_the_slider_steps_through_common_bands(qtbot: QtBot, bench: Bench, chart
     page.bar.band.setFocus()
     QTest.keyClick(page.bar.band, Qt.Key.Key_Right)
     assert page.bar.nm.text() == "550 nm"
-    assert page.pictures.images[0].levels[0] == 0.0
+    assert page.pictures.content.images[0].levels[0] == 0.0
 
 
 def test_pictures_stay_where_they_are_while_work_is_told(qtbot: QtBot, bench: Bench, chart: Path) -> None:

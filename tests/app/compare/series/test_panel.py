@@ -45,15 +45,15 @@ def test_results_dropped_together_become_a_depth_test(qtbot: QtBot, bench: Bench
     assert [panel.table.item(i, 1).text() for i in range(4)] == ["700", "725", "750", "775"]  # type: ignore[union-attr]
     assert panel.figures.item(0, 0).text() == "Straightness, slope free (RMS)"  # type: ignore[union-attr]
     assert " ± " in panel.figures.item(2, 1).text()  # type: ignore[union-attr]
-    assert "worst" in panel.plot.legend.text()
-    (low, high), _ = panel.plot.plot.getViewBox().viewRange()
+    assert "worst" in panel.plot.content.legend.text()
+    (low, high), _ = panel.plot.content.plot.getViewBox().viewRange()
     assert low < POSITIONS[0] < POSITIONS[-1] < high
-    shown = panel.picture.image.image
+    shown = panel.picture.content.image.image
     assert shown.shape == (36, 48)
     assert np.isfinite(shown).any()
-    assert panel.picture.title.text() == "stage 700 mm: off its plane (mm)"
+    assert panel.picture.content.title.text() == "stage 700 mm: off its plane (mm)"
     panel.table.selectRow(2)
-    assert panel.picture.title.text() == "stage 750 mm: off its plane (mm)"
+    assert panel.picture.content.title.text() == "stage 750 mm: off its plane (mm)"
     assert bench.page.command_line().startswith("dsl-scan depth-test ")
     bench.page.apply_theme(DARK)
 
@@ -85,17 +85,17 @@ def test_the_rectangle_on_the_picture_is_all_that_counts(
     qtbot: QtBot, bench: Bench, stage: list[Path]
 ) -> None:
     panel = filled(qtbot, bench, stage)
-    QTest.mouseClick(panel.picture.part, Qt.MouseButton.LeftButton)
+    QTest.mouseClick(panel.picture.content.part, Qt.MouseButton.LeftButton)
     assert bench.state.region.value == (14, 11, 20, 14)
     qtbot.waitUntil(lambda: len(bench.state.counted) == len(stage), timeout=30_000)
     target = bench.state.rows.value[0].target
     assert target is not None
     assert target.plane.pixels <= 20 * 14
-    panel.picture.rectangle.setSize((24, 20))
-    panel.picture.rectangle.sigRegionChangeFinished.emit(panel.picture.rectangle)
+    panel.picture.content.rectangle.setSize((24, 20))
+    panel.picture.content.rectangle.sigRegionChangeFinished.emit(panel.picture.content.rectangle)
     assert bench.state.region.value == (14, 11, 24, 20)
-    QTest.mouseClick(panel.picture.part, Qt.MouseButton.LeftButton)
-    assert not panel.picture.part.isChecked()
+    QTest.mouseClick(panel.picture.content.part, Qt.MouseButton.LeftButton)
+    assert not panel.picture.content.part.isChecked()
     qtbot.waitUntil(lambda: not bench.state.busy.value, timeout=30_000)
 
 
@@ -125,7 +125,7 @@ def test_accuracy_over_time_and_its_report(
     assert panel.against.currentText() == "reference"
     panel.figure.setCurrentIndex(1)
     panel.figure.activated.emit(1)
-    assert "Reflectance" in panel.plot.plot.getPlotItem().getAxis("left").labelText
+    assert "Reflectance" in panel.plot.content.plot.getPlotItem().getAxis("left").labelText
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "s.html"), ""))
     QTest.mouseClick(panel.report, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: (tmp_path / "s.html").exists(), timeout=30_000)

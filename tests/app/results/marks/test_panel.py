@@ -38,7 +38,7 @@ def test_the_list_names_hides_and_selects(bench: Bench) -> None:
     assert again is not None
     again.setCheckState(0, Qt.CheckState.Unchecked)
     assert not bench.marks[0].shown
-    assert bench.marks[0].key not in bench.page.spectra._curves
+    assert bench.marks[0].key not in bench.page.spectra.content._curves
     now = tree.topLevelItem(0)
     assert now is not None
     tree.setCurrentItem(now)
@@ -62,8 +62,8 @@ def test_a_mark_that_lost_its_spectrum_says_why_and_is_drawn_nowhere(
     rows = [tree.topLevelItem(row) for row in range(4)]
     assert [row.text(1) for row in rows if row is not None] == ["10, 10", *["no spectrum"] * 3]
     assert [row.toolTip(0) for row in rows[2:] if row is not None] == ["No pixel.", "tile.csv is gone."]
-    assert list(bench.page.spectra._curves) == [bench.marks[0].key]
-    assert len(bench.page.image.pins.data) == 1
+    assert list(bench.page.spectra.content._curves) == [bench.marks[0].key]
+    assert len(bench.page.image.content.pins.data) == 1
     panel, result, drawn = bench.page.cloud, bench.state.result.value, Mock()
     assert result is not None
     with monkeypatch.context() as patch:

@@ -13,7 +13,7 @@ def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
     panel = bench.page.search
     panel.start.click()
     assert "50.06% of the pixels with a spectrum" in panel.text.text()
-    assert bench.page.image.overlay.isVisible()
+    assert bench.page.image.content.overlay.isVisible()
     panel.mode.setCurrentIndex(panel.mode.findData(SearchMode.METAMERS))
     assert "look like pixel 30, 5" in panel.text.text()
     panel.angle.setValue(0.2)
@@ -21,4 +21,4 @@ def test_the_search_is_shown_with_its_share(bench: Bench) -> None:
     assert search is not None
     assert search.within_rad == 0.2
     panel.clear.click()
-    assert not bench.page.image.overlay.isVisible()
+    assert not bench.page.image.content.overlay.isVisible()
