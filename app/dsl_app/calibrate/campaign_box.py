@@ -14,7 +14,7 @@ from dsl_app.calibrate.state import CalibrateState
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import first_free
-from dsl_app.shared.widgets.forms import label, push_button, set_role, show_button
+from dsl_app.shared.widgets.forms import label, push_button, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 if TYPE_CHECKING:
@@ -82,8 +82,7 @@ class CampaignBox(QFrame):
     ) -> None:
         super().__init__()
         self._state, self._rig, self._commands, self._home = state, rig, commands, home
-        self._name, self._where = label("", "title"), label("", "muted", wraps=True)
-        self._where.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.title, self.place = label("", "title"), label("", "muted", wraps=True, can_be_copied=True)
         self.new = push_button("&New campaign…", "Start a campaign for the chosen rig in a new folder")
         self.open = push_button("&Open campaign…", "Continue an existing campaign", self._ask_open)
         self.everything = push_button(
@@ -94,13 +93,12 @@ class CampaignBox(QFrame):
         self.keep = push_button(
             "&Keep in library", "Assemble the rig as far as it is calibrated and save it in the library"
         )
-        self._progress = label("", "muted")
-        self._progress.setAccessibleName("Progress of calibrating everything")
+        self.progress = label("", name="Progress of calibrating everything")
         self._lay_out()
         self._connect()
 
     def _lay_out(self) -> None:
-        words = column_of(self._name, self._where, self._progress, spacing=2)
+        words = column_of(self.title, self.place, self.progress, spacing=2)
         row_of(
             (words, 1),
             *(
@@ -140,11 +138,4 @@ class CampaignBox(QFrame):
             self._commands.open_campaign(Path(name))
 
     def _show(self) -> None:
-        head = campaign_head(self._state, self._rig.devices.value)
-        self._name.setText(head.title)
-        self._where.setText(head.place)
-        self._progress.setText(head.progress)
-        self._progress.setVisible(bool(head.progress))
-        set_role(self._progress, head.progress_role)
-        for name in ("new", "open", "keep", "cancel", "everything"):
-            show_button(getattr(self, name), getattr(head, name))
+        show_parts(self, campaign_head(self._state, self._rig.devices.value))

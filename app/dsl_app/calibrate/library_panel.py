@@ -25,7 +25,8 @@ from dsl_app.calibrate.figures_table import FiguresTable
 from dsl_app.calibrate.presentation import library_selection, version_texts
 from dsl_app.calibrate.state import CalibrateState, DriftVerdict
 from dsl_app.shared.theme import Theme
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widget_state import LabelState
+from dsl_app.shared.widgets.forms import label, push_button, show_label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_app.shared.widgets.read_table import ReadTable, cell
@@ -82,7 +83,7 @@ class LibraryPanel(QGroupBox):
         self.stops: list[Callable[[], None]] = [
             state.library.follow(self._list),
             state.in_use.changed.connect(lambda _: self._list(state.library.value)),
-            state.note.follow(self._show_note),
+            state.note.follow(lambda text: show_label(self._note, LabelState(text, "muted"))),
             state.drift.changed.connect(self._show_drift),
             state.opened.connect(lambda path: QDesktopServices.openUrl(QUrl.fromLocalFile(str(path)))),
         ]
@@ -92,10 +93,6 @@ class LibraryPanel(QGroupBox):
         row = row_of(self.use, self.report, self.restore, self.check, self.export, STRETCH, self.import_)
         self.table.setMinimumHeight(110)
         column_of((split, 1), row, self._note, on=self, margins=(0, 4, 0, 0))
-
-    def _show_note(self, text: str) -> None:
-        self._note.setText(text)
-        self._note.setVisible(bool(text))
 
     # The list --------------------------------------------------------------------------------------
 

@@ -17,7 +17,7 @@ from dsl_app.calibrate.presentation import row_display
 from dsl_app.calibrate.state import CalibrateState, Row
 from dsl_app.connection.state import RigState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.widgets.forms import Banner, label, push_button, set_role, show_button
+from dsl_app.shared.widgets.forms import Banner, label, push_button, show_parts
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, scrolled, splitter
 from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.ticker import Ticker
@@ -120,9 +120,9 @@ class CalibrationRow(QFrame):
         self.setProperty("role", "card")
         self._title = label(f"{number}   {row.about.title}", "heading")
         self._purpose = label(row.about.purpose, "muted", wraps=True)
-        self._state, self._figure, self._date = label(""), label("", wraps=True), label("", "muted")
-        self._date.setToolTip("When it was accepted")
-        self._reason = label("", "muted", wraps=True)
+        self.state, self.figure, self.date = label(""), label("", wraps=True), label("", "muted")
+        self.date.setToolTip("When it was accepted")
+        self.reason = label("", "muted", wraps=True)
         self.run = push_button("", "", lambda: run(row.name))
         self._lay_out()
         self.show_row(row)
@@ -134,30 +134,21 @@ class CalibrationRow(QFrame):
         grid.setVerticalSpacing(1)
         top: tuple[tuple[QWidget, int], ...] = (
             (self._title, _NAME_PX),
-            (self._state, _STATE_PX),
-            (self._figure, 0),
-            (self._date, _DATE_PX),
+            (self.state, _STATE_PX),
+            (self.figure, 0),
+            (self.date, _DATE_PX),
         )
         for column, (widget, width) in enumerate(top):
             widget.setMinimumWidth(width)
             grid.addWidget(widget, 0, column, Qt.AlignmentFlag.AlignTop)
         grid.setColumnStretch(2, 1)
         grid.addWidget(self._purpose, 1, 0, Qt.AlignmentFlag.AlignTop)
-        grid.addWidget(self._reason, 1, 1, 1, 3, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(self.reason, 1, 1, 1, 3, Qt.AlignmentFlag.AlignTop)
         self.run.setFixedWidth(_BUTTON_PX)
         grid.addWidget(self.run, 0, 4, 2, 1, Qt.AlignmentFlag.AlignVCenter)
         self._purpose.setFixedWidth(_NAME_PX)
 
     def show_row(self, row: Row, is_busy: bool = False) -> None:
         """Show the state of the calibration; while ``is_busy`` its wizard cannot be opened."""
-        shown = row_display(row, is_busy)
-        self._state.setText(shown.state)
-        set_role(self._state, shown.state_role)
-        self._figure.setText(shown.figure)
-        set_role(self._figure, shown.figure_role)
-        self._date.setText(shown.date)
-        self._reason.setText(shown.reason)
-        self._reason.setToolTip(shown.reason)
-        show_button(self.run, shown.run)
-        self.run.setAccessibleName(shown.run_name)
-        self.setAccessibleName(shown.accessible_name)
+        show_parts(self, row_display(row, is_busy))
+        self.setAccessibleName(f"{row.about.title}: {row.state.value}. {row.reason}".strip())

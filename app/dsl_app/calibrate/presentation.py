@@ -7,8 +7,8 @@ from datetime import datetime
 from html import escape
 
 from dsl_app.calibrate.state import CalibrateState, Row, RowState
-from dsl_app.shared.button_state import ButtonState
 from dsl_app.shared.known_files import breakable
+from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_core.devices.base import DeviceRig
 from dsl_core.io.calibration_library import LibraryLine
 from dsl_core.model.calibration.accepted import AcceptedCalibration, CalibrationNote
@@ -40,8 +40,7 @@ class CampaignHead:
 
     title: str
     place: str
-    progress: str
-    progress_role: str
+    progress: LabelState
     new: ButtonState
     open: ButtonState
     keep: ButtonState
@@ -62,8 +61,7 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
     return CampaignHead(
         title,
         place,
-        progress,
-        "warn" if progress == "stopping" else "muted",
+        LabelState(progress, "warn" if progress == "stopping" else "muted"),
         new=ButtonState(is_enabled=not is_running),
         open=ButtonState(is_enabled=not is_running),
         keep=ButtonState(facts is not None and not is_running, usable and has_accepted),
@@ -79,33 +77,26 @@ def campaign_head(state: CalibrateState, devices: DeviceRig | None) -> CampaignH
 class RowDisplay:
     """A calibration of the campaign in words; roles are those of the style sheet."""
 
-    state: str
-    state_role: str
-    figure: str
-    figure_role: str
+    state: LabelState
+    figure: LabelState
     date: str
-    reason: str
-    accessible_name: str
+    reason: LabelState
     run: ButtonState
-    run_name: str
 
 
 def row_display(row: Row, is_busy: bool = False) -> RowDisplay:
     """A row of the page; while ``is_busy`` no wizard can be opened."""
     title, figure = row.about.title, row.figure
+    role = "" if figure is None or figure.passed else "bad"
     begun = row.state is RowState.BEGUN or row.has_candidate
     word = "Continue…" if begun else ("Open…" if row.accepted else "Run…")
     tip = f"Open the wizard of {title}, which continues where it was left"
     return RowDisplay(
-        state=f"● {row.state.value}",
-        state_role=_ROLES.get(row.state, "warn"),
-        figure="" if figure is None else figure_words(figure),
-        figure_role="" if figure is None or figure.passed else "bad",
+        state=LabelState(f"● {row.state.value}", _ROLES.get(row.state, "warn")),
+        figure=LabelState() if figure is None else LabelState(figure_words(figure), role),
         date=short_date(row.accepted),
-        reason=row.reason,
-        accessible_name=f"{title}: {row.state.value}. {row.reason}".strip(),
-        run=ButtonState(is_enabled=not is_busy, text=word, tip=tip),
-        run_name=f"{word.rstrip('…')} {title}",
+        reason=LabelState(row.reason, "muted", row.reason),
+        run=ButtonState(is_enabled=not is_busy, text=word, tip=tip, name=f"{word.rstrip('…')} {title}"),
     )
 
 

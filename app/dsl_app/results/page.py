@@ -25,9 +25,10 @@ from dsl_app.results.welcome import Offer, Welcome
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.theme import DARK, Theme
+from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
-from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.forms import label, push_button, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import boxed, column_of, row_of, splitter, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
@@ -141,9 +142,7 @@ class ResultsPage(PageWidget):
         self.title.setText(summary.title)
         self.about.setText(summary.about)
         self.about.setToolTip(summary.details)
-        self.warning.setText(summary.warning)
-        self.warning.setToolTip(summary.advice)
-        self.warning.setVisible(bool(summary.warning))
+        show_label(self.warning, LabelState(summary.warning, "warn", summary.advice))
 
     def _show_graph(self, graph: IntensityGraph | None) -> None:
         if graph is None:

@@ -14,7 +14,7 @@ from dsl_app.rig.projector_panel import ProjectorPanel
 from dsl_app.rig.state import rig_view
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, named, push_button, quiet, set_role
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, named, push_button, quiet, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.page import PageWidget
@@ -46,13 +46,13 @@ class RigPage(PageWidget):
         tip = "Options as key=value, separated by spaces; see the help on this page (F1)"
         self._options = named(QLineEdit(), "Options of the rig", tip)
         self._options.setPlaceholderText("scene=color-checker size=445x290")
-        self._connect_button = push_button(
+        self.connect_button = push_button(
             "Connect", "Open or close the devices of this rig", self._toggle_link, "primary"
         )
-        self._light = label("")
-        self._trouble = label("", "bad", wraps=True)
-        self._camera_text, self._projector_text = label("–"), label("–")
-        self._live_button = push_button(
+        self.link = label("")
+        self.trouble = label("", wraps=True)
+        self.camera_text, self.projector_text = label("–"), label("–")
+        self.live_button = push_button(
             "Start live view",
             "Show the camera's picture until something else needs the camera",
             self._toggle_live,
@@ -63,7 +63,7 @@ class RigPage(PageWidget):
             self.selftest_requested,
         )
         low, high = 0.01, 30_000.0
-        self._exposure = NumberBox(
+        self.exposure = NumberBox(
             "Exposure", low, high, live.state.exposure_ms.value, "ms", 2, "Exposure of live frames"
         )
         self.auto = push_button(
@@ -72,7 +72,7 @@ class RigPage(PageWidget):
             " shown, only that counts",
             self._expose,
         )
-        self._cycles = label("", "muted", wraps=True)
+        self.cycles = label("", wraps=True)
         self._timer = Ticker(self, FETCH_MS, live.fetch_frame)
         self._lay_out()
         self._connect()
@@ -88,18 +88,18 @@ class RigPage(PageWidget):
         form = QFormLayout(devices)
         form.addRow("Rig", self._rig)
         form.addRow("Options", self._options)
-        form.addRow("", self._connect_button)
-        form.addRow("State", self._light)
-        form.addRow(self._trouble)
-        form.addRow("Camera", self._camera_text)
-        form.addRow("Projector", self._projector_text)
+        form.addRow("", self.connect_button)
+        form.addRow("State", self.link)
+        form.addRow(self.trouble)
+        form.addRow("Camera", self.camera_text)
+        form.addRow("Projector", self.projector_text)
         form.addRow("", self.selftest)
         camera = QGroupBox("Camera")
         camera_form = QFormLayout(camera)
-        camera_form.addRow("Exposure", self._exposure)
-        camera_form.addRow("", self._cycles)
+        camera_form.addRow("Exposure", self.exposure)
+        camera_form.addRow("", self.cycles)
         camera_form.addRow("", self.auto)
-        camera_form.addRow("", self._live_button)
+        camera_form.addRow("", self.live_button)
         left, right = (
             boxed(column_of(*boxes, STRETCH, margins=0)) for boxes in ((devices, camera), (self.projector,))
         )
@@ -109,7 +109,7 @@ class RigPage(PageWidget):
 
     def _connect(self) -> None:
         state, live, commands = self._state, self._live_state, self._commands
-        self._exposure.valueChanged.connect(commands.set_exposure)
+        self.exposure.valueChanged.connect(commands.set_exposure)
         self.projector.requested.connect(commands.show)
         self.stops += [
             state.choice.follow(self._show_choice),
@@ -137,21 +137,7 @@ class RigPage(PageWidget):
         self._commands.expose_automatically(self.live.content.region)
 
     def _show(self) -> None:
-        view = rig_view(self._state, self._live_state)
-        self._light.setText(view.link)
-        set_role(self._light, view.link_role)
-        self._trouble.setText(view.trouble)
-        self._trouble.setVisible(bool(view.trouble))
-        self._camera_text.setText(view.camera)
-        self._projector_text.setText(view.projector)
-        self._connect_button.setText(view.connect)
-        self._connect_button.setEnabled(view.can_connect)
-        for widget in (self._live_button, self.selftest, self._exposure):
-            widget.setEnabled(view.has_devices)
-        self._live_button.setText(view.live)
-        self.auto.setEnabled(view.can_expose)
-        self._cycles.setText(view.cycles)
-        self._cycles.setVisible(bool(view.cycles))
+        show_parts(self, rig_view(self._state, self._live_state))
 
     def _show_choice(self, choice: RigChoice) -> None:
         """Show what is connected, whichever page requested it."""
@@ -165,13 +151,13 @@ class RigPage(PageWidget):
         self.projector.set_projector(self._state.projector)
         self._show_exposure(self._live_state.exposure_ms.value)
         if camera is not None:
-            self._exposure.setRange(*camera.exposure_range_ms)
+            self.exposure.setRange(*camera.exposure_range_ms)
 
     def _show_exposure(self, exposure_ms: float) -> None:
         # The box shows two decimals; the state keeps the exact value.
-        with quiet(self._exposure):
-            self._exposure.setValue(exposure_ms)
-            self._exposure.setSingleStep(self._state.cycle_ms or 1.0)
+        with quiet(self.exposure):
+            self.exposure.setValue(exposure_ms)
+            self.exposure.setSingleStep(self._state.cycle_ms or 1.0)
         self._show()
 
     def _switch_timer(self, is_live: bool) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from dsl_app.connection.state import Link, RigState
 from dsl_app.shared.evented import Value
+from dsl_app.shared.widget_state import ButtonState, LabelState
 
 if TYPE_CHECKING:
     # The window comes up before numpy.
@@ -39,35 +40,38 @@ class LiveState:
 class RigView:
     """What the Rig page shows of devices and live view, besides the picture."""
 
-    link: str
-    link_role: str
-    trouble: str
-    camera: str
-    projector: str
-    connect: str
-    can_connect: bool
-    #: Whether buttons that need devices work.
-    has_devices: bool
-    live: str
-    can_expose: bool
-    cycles: str
+    link: LabelState
+    trouble: LabelState
+    camera_text: str
+    projector_text: str
+    connect_button: ButtonState
+    live_button: ButtonState
+    selftest: bool
+    exposure: bool
+    auto: bool
+    cycles: LabelState
 
 
 def rig_view(rig: RigState, live: LiveState) -> RigView:
     """Texts and buttons of the Rig page for what is known now."""
     link, has_devices = rig.link.value, rig.devices.value is not None
     return RigView(
-        link=f"● {link.value}",
-        link_role=_LINK_ROLES[link],
-        trouble=rig.trouble.value,
-        camera=_describe(rig.camera),
-        projector=_describe(rig.projector),
-        connect="Disconnect" if link is Link.OPEN else "Connect",
-        can_connect=link is not Link.OPENING,
-        has_devices=has_devices,
-        live="Stop live view" if rig.live.value else "Start live view",
-        can_expose=has_devices and not live.is_exposing.value,
-        cycles=cycles_text(live.exposure_ms.value, rig.cycle_ms),
+        link=LabelState(f"● {link.value}", _LINK_ROLES[link]),
+        trouble=LabelState(rig.trouble.value, "bad"),
+        camera_text=_describe(rig.camera),
+        projector_text=_describe(rig.projector),
+        connect_button=ButtonState(
+            is_enabled=link is not Link.OPENING,
+            is_primary=True,
+            text="Disconnect" if link is Link.OPEN else "Connect",
+        ),
+        live_button=ButtonState(
+            is_enabled=has_devices, text="Stop live view" if rig.live.value else "Start live view"
+        ),
+        selftest=has_devices,
+        exposure=has_devices,
+        auto=has_devices and not live.is_exposing.value,
+        cycles=LabelState(cycles_text(live.exposure_ms.value, rig.cycle_ms), "muted"),
     )
 
 

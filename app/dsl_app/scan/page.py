@@ -22,7 +22,7 @@ from dsl_app.scan.view import ScanView
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.figure_file import PlotFigure
-from dsl_app.shared.widgets.forms import Banner
+from dsl_app.shared.widgets.forms import Banner, show_button
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled, tabs_of
 from dsl_app.shared.widgets.page import PageWidget
@@ -142,10 +142,8 @@ class ScanPage(PageWidget):
 
     def _show_reconnection(self, reconnection: Reconnection) -> None:
         shown = banner_controls(reconnection)
-        self.banner.action.setText(shown.action)
-        self.banner.action.setToolTip(shown.tip)
-        self.banner.action.setEnabled(shown.is_enabled)
-        self.stop.setVisible(shown.can_stop)
+        show_button(self.banner.action, shown.action)
+        show_button(self.stop, shown.stop)
         self._keep_time()
 
     def _keep_time(self) -> None:

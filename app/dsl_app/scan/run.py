@@ -20,7 +20,7 @@ from dsl_app.scan.forecast.figures import minutes, volume
 from dsl_app.scan.state import CalibrationChoice, Facts, Phase, ScanState
 from dsl_app.shared.evented import follow_any
 from dsl_app.shared.known_files import breakable
-from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named, push_button, set_role
+from dsl_app.shared.widgets.forms import ChoiceBox, check_box, label, named, push_button, set_role, show_parts
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.capture.runner import Status
 from dsl_core.model.plan import Columns
@@ -135,9 +135,9 @@ class RunBox(QGroupBox):
         )
         self.then = QCheckBox("Reconstruct at the end")
         self.then.setToolTip("Reconstruct and open the result as soon as all frames are saved")
-        self._phase, self._what, self._time = label(""), label("", "muted"), label("", "muted")
+        self.phase, self.frames, self.time = label(""), label(""), label("")
         self._bar = named(QProgressBar(), "Progress of the scan")
-        self._text = label("", "muted", wraps=True)
+        self.remarks = label("", wraps=True)
         self._lay_out()
         self.start.clicked.connect(controller.start)
         self.cancel.clicked.connect(controller.cancel)
@@ -160,11 +160,11 @@ class RunBox(QGroupBox):
             buttons,
             self.renew,
             self.again,
-            self._phase,
+            self.phase,
             self._bar,
-            self._what,
-            self._time,
-            self._text,
+            self.frames,
+            self.time,
+            self.remarks,
             on=self,
         )
 
@@ -181,25 +181,10 @@ class RunBox(QGroupBox):
             state.note.value,
             state.finished.value is not None,
         )
-        self.start.setText(shown.start)
-        self.start.setEnabled(shown.can_start)
-        self.pause.setText(shown.pause)
-        self.pause.setEnabled(shown.can_pause)
-        self.cancel.setEnabled(shown.can_cancel)
-        for widget in (self.renew, self.drift):
-            widget.setVisible(shown.is_resumable)
-        self.again.setVisible(shown.can_reconstruct_again)
-        self._phase.setText(shown.phase)
-        set_role(self._phase, shown.phase_role)
-        self._text.setText(shown.remarks)
-        self._text.setVisible(bool(shown.remarks))
-        set_role(self._text, shown.remarks_role)
+        show_parts(self, shown)
 
     def _show_status(self, status: Status) -> None:
         self._bar.setRange(0, max(status.total, 1))
         self._bar.setValue(status.done)
         self._bar.setVisible(status.total > 0)
-        told = progress_text(status)
-        for line, text in ((self._what, told.frames), (self._time, told.time)):
-            line.setText(text)
-            line.setVisible(bool(text))
+        show_parts(self, progress_text(status))

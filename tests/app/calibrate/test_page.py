@@ -27,7 +27,7 @@ def test_a_campaign_is_begun_and_opened_from_the_page(
     qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stage = Stage(qtbot, tmp_path)
-    assert "No campaign is open" in stage.page.head._where.text()
+    assert "No campaign is open" in stage.page.head.place.text()
     (tmp_path / "taken").mkdir()
 
     def fill(dialog: NewCampaignDialog) -> int:

@@ -86,7 +86,7 @@ def test_what_can_be_done_with_the_whole_campaign(
 def test_while_everything_runs_it_can_only_be_stopped() -> None:
     for progress, role in (("Geometry: fit, 2 of 8", "muted"), ("stopping", "warn")):
         head = campaign_head(page(everything=progress), BY_ITSELF)
-        assert (head.progress, head.progress_role) == (progress, role)
+        assert (head.progress.text, head.progress.role) == (progress, role)
         assert head.cancel.is_visible
         assert not head.keep.is_visible
         assert not head.everything.is_visible
@@ -112,19 +112,19 @@ def test_while_everything_runs_it_can_only_be_stopped() -> None:
 )
 def test_the_button_of_a_row_says_what_the_wizard_does(row: Row, word: str, role: str) -> None:
     shown = row_display(row)
-    assert (shown.run.text, shown.state_role) == (word, role)
-    assert shown.run_name == f"{word[:-1]} Geometry"
+    assert (shown.run.text, shown.state.role) == (word, role)
+    assert shown.run.name == f"{word[:-1]} Geometry"
     assert shown.run.is_enabled
     assert not row_display(row, is_busy=True).run.is_enabled
 
 
 def test_a_row_shows_its_figure_and_reason() -> None:
     good = row_display(replace(ROW, figure=GOOD, reason="2 captured"))
-    assert (good.figure, good.figure_role) == ("shift −0.200 ± 0.010 px  (−0.5 to 0.5)", "")
-    assert good.accessible_name == "Geometry: missing. 2 captured"
+    assert (good.figure.text, good.figure.role) == ("shift −0.200 ± 0.010 px  (−0.5 to 0.5)", "")
+    assert good.reason.text == "2 captured"
     bad = row_display(replace(ROW, figure=BAD))
-    assert bad.figure_role == "bad"
-    assert row_display(ROW).figure == row_display(ROW).date == ""
+    assert bad.figure.role == "bad"
+    assert row_display(ROW).figure.text == row_display(ROW).date == ""
 
 
 def test_times_are_shown_to_the_minute() -> None:

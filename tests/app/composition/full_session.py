@@ -100,7 +100,7 @@ class Session:
         page = self.window.page_of("rig")
         assert isinstance(page, RigPage)
         write(page._options, RIG)
-        click(page._connect_button)
+        click(page.connect_button)
         rig = self.composition.rig
         wait(lambda: rig.state.link.value is Link.OPEN, "the rig to answer")
 
@@ -178,10 +178,10 @@ class Session:
         page = self.window.page_of("rig")
         assert isinstance(page, RigPage)
         rig = self.composition.rig.state
-        click(page._connect_button)
+        click(page.connect_button)
         wait(lambda: rig.link.value is Link.CLOSED, "the rig to be let go")
         self.idle()
-        click(page._connect_button)
+        click(page.connect_button)
         wait(lambda: rig.link.value is Link.OPEN, "the rig to answer")
         choose(page.projector._screen, PROJECTOR[:2])
         wait(lambda: self.composition.screens.projector_window.is_armed, "the projector window")

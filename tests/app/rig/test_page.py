@@ -38,33 +38,33 @@ def click(button: QPushButton) -> None:
 
 
 def connect(qtbot: QtBot, page: RigPage, state: RigState) -> None:
-    click(page._connect_button)
+    click(page.connect_button)
     qtbot.waitUntil(lambda: state.link.value is Link.OPEN, timeout=20_000)
 
 
 def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
     page, state, runner, _ = bench
-    assert not page._live_button.isEnabled()
+    assert not page.live_button.isEnabled()
     connect(qtbot, page, state)
-    assert "64 × 48" in page._camera_text.text()
-    click(page._live_button)
+    assert "64 × 48" in page.camera_text.text()
+    click(page.live_button)
     qtbot.waitUntil(lambda: page.live.content.frames_per_second > 0, timeout=20_000)
-    assert page._live_button.text() == "Stop live view"
-    click(page._live_button)
+    assert page.live_button.text() == "Stop live view"
+    click(page.live_button)
     qtbot.waitUntil(lambda: not state.live.value)
-    click(page._connect_button)
+    click(page.connect_button)
     qtbot.waitUntil(lambda: runner.active == ())
-    assert page._camera_text.text() == "–"
+    assert page.camera_text.text() == "–"
 
 
 def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
     page, _, _, notifier = bench
     page._options.setText("scene=moon")
-    click(page._connect_button)
+    click(page.connect_button)
     qtbot.waitUntil(lambda: bool(notifier.told))
-    assert "moon" in page._trouble.text()
-    assert page._trouble.isVisible()
-    assert page._connect_button.text() == "Connect"
+    assert "moon" in page.trouble.text()
+    assert page.trouble.isVisible()
+    assert page.connect_button.text() == "Connect"
 
 
 def test_pictures_reach_the_projector(qtbot: QtBot, bench: Bench) -> None:
@@ -90,15 +90,15 @@ def test_the_line_wanders_and_stops(qtbot: QtBot, bench: Bench) -> None:
 def test_the_wheel_changes_nothing_without_focus(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, _ = bench
     connect(qtbot, page, state)
-    before = page._exposure.value()
+    before = page.exposure.value()
     page._options.setFocus()
     spot = QPointF(5, 5)
     wheel = QWheelEvent(
-        spot, page._exposure.mapToGlobal(spot), QPoint(0, 0), QPoint(0, 120), Qt.MouseButton.NoButton,
+        spot, page.exposure.mapToGlobal(spot), QPoint(0, 0), QPoint(0, 120), Qt.MouseButton.NoButton,
         Qt.KeyboardModifier.NoModifier, Qt.ScrollPhase.NoScrollPhase, False,
     )  # fmt: skip
-    QApplication.sendEvent(page._exposure, wheel)
-    assert page._exposure.value() == before
+    QApplication.sendEvent(page.exposure, wheel)
+    assert page.exposure.value() == before
 
 
 def test_the_page_names_its_command(bench: Bench) -> None:
@@ -118,7 +118,7 @@ def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> Non
     page, state, _, notifier = bench
     connect(qtbot, page, state)
     assert not page.live.content.rectangle.isVisible()
-    click(page._live_button)
+    click(page.live_button)
     qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
     page.live.content.region_box.click()
     region = page.live.content.region
@@ -134,17 +134,17 @@ def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> Non
     page.live.content.rectangle.setPos(0, 0)
     click(page.auto)
     qtbot.waitUntil(lambda: bool(notifier.told), timeout=30_000)
-    assert "LED cycle" in page._cycles.text()
-    assert "vary" not in page._cycles.text()
+    assert "LED cycle" in page.cycles.text()
+    assert "vary" not in page.cycles.text()
     assert page.auto.isEnabled()
 
 
 def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, _ = bench
     connect(qtbot, page, state)
-    click(page._live_button)
+    click(page.live_button)
     qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
-    click(page._live_button)
+    click(page.live_button)
     qtbot.waitUntil(lambda: not state.live.value)
     QTest.keyClick(page.live.content, Qt.Key.Key_Right)
     QTest.keyClick(page.live.content, Qt.Key.Key_Up, Qt.KeyboardModifier.ShiftModifier)

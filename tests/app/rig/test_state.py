@@ -13,14 +13,12 @@ TWIN = RigChoice("twin", (("scene", "plane"), ("size", "64x48")))
 def test_a_page_without_a_rig_offers_to_connect_one() -> None:
     rig, live = RigState(TWIN), LiveState()
     view = rig_view(rig, live)
-    assert (view.link, view.link_role, view.connect, view.can_connect) == (
-        "● not connected", "muted", "Connect", True,
-    )  # fmt: skip
-    assert (view.camera, view.projector, view.cycles) == ("–", "–", "")
-    assert not view.has_devices
-    assert not view.can_expose
+    assert (view.link.text, view.link.role) == ("● not connected", "muted")
+    assert (view.connect_button.text, view.connect_button.is_enabled) == ("Connect", True)
+    assert (view.camera_text, view.projector_text, view.cycles.text) == ("–", "–", "")
+    assert [view.live_button.is_enabled, view.selftest, view.exposure, view.auto] == 4 * [False]
     rig.link.set(Link.OPENING)
-    assert not rig_view(rig, live).can_connect
+    assert not rig_view(rig, live).connect_button.is_enabled
 
 
 def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
@@ -29,16 +27,18 @@ def test_a_page_with_a_rig_names_its_devices_and_offers_to_expose() -> None:
     controller.connect(TWIN)
     rig = controller.state
     view = rig_view(rig, live)
-    assert (view.connect, view.link_role, view.live) == ("Disconnect", "good", "Start live view")
-    assert view.camera.endswith("64 × 48 px")
-    assert view.has_devices
-    assert view.can_expose
-    assert "LED cycle" in view.cycles
+    assert (view.connect_button.text, view.link.role) == ("Disconnect", "good")
+    assert (view.live_button.text, view.live_button.is_enabled) == ("Start live view", True)
+    assert view.camera_text.endswith("64 × 48 px")
+    assert view.selftest
+    assert view.exposure
+    assert view.auto
+    assert "LED cycle" in view.cycles.text
     rig.live.set(True)
     live.is_exposing.set(True)
     view = rig_view(rig, live)
-    assert view.live == "Stop live view"
-    assert not view.can_expose
+    assert view.live_button.text == "Stop live view"
+    assert not view.auto
 
 
 def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:
@@ -46,7 +46,8 @@ def test_a_lost_rig_can_be_connected_again_and_says_why_it_is_lost() -> None:
     rig.link.set(Link.LOST)
     rig.trouble.set("The camera sent no frame.")
     view = rig_view(rig, live)
-    assert (view.trouble, view.link_role, view.connect) == ("The camera sent no frame.", "bad", "Connect")
+    assert (view.trouble.text, view.link.role) == ("The camera sent no frame.", "bad")
+    assert view.connect_button.text == "Connect"
 
 
 def test_parts_of_a_cycle_are_named() -> None:

@@ -32,25 +32,30 @@ def test_buttons_follow_the_phase(
     phase: Phase, can_start: bool, can_pause: bool, can_cancel: bool, role: str
 ) -> None:
     shown = run_controls(phase, None, FREE, "", has_finished=True)
-    assert (shown.can_start, shown.can_pause, shown.can_cancel) == (can_start, can_pause, can_cancel)
-    assert (shown.phase, shown.phase_role) == (f"● {phase.value}", role)
-    assert shown.pause == ("&Continue" if phase is Phase.PAUSED else "&Pause")
-    assert shown.can_reconstruct_again is not phase.is_busy
+    assert (shown.start.is_enabled, shown.pause.is_enabled, shown.cancel) == (
+        can_start,
+        can_pause,
+        can_cancel,
+    )
+    assert (shown.phase.text, shown.phase.role) == (f"● {phase.value}", role)
+    assert shown.pause.text == ("&Continue" if phase is Phase.PAUSED else "&Pause")
+    assert shown.again.is_visible is not phase.is_busy
 
 
 def test_obstacles_keep_a_plan_from_starting_but_not_from_being_shown() -> None:
     shown = run_controls(Phase.PLANNING, None, BLOCKED, "", has_finished=False)
-    assert (shown.can_start, shown.phase, shown.remarks_role) == (False, "● not ready", "warn")
-    assert shown.remarks == "No rig is connected.\nThe disk is full."
+    assert (shown.start.is_enabled, shown.phase.text, shown.remarks.role) == (False, "● not ready", "warn")
+    assert shown.remarks.text == "No rig is connected.\nThe disk is full."
     running = run_controls(Phase.RUNNING, None, BLOCKED, "", has_finished=False)
-    assert (running.remarks, running.remarks_role) == ("", "muted")
+    assert (running.remarks.text, running.remarks.role) == ("", "muted")
 
 
 def test_an_interrupted_scan_is_resumed_or_left() -> None:
     shown = run_controls(Phase.LOST, HALF, FREE, "A note.", has_finished=False)
-    assert (shown.start, shown.is_resumable, shown.can_reconstruct_again) == ("&Resume scan", True, False)
-    assert shown.remarks == "half.dsl contains 30 of 76 frames.\nA note."
-    assert not run_controls(Phase.RUNNING, HALF, FREE, "", has_finished=False).is_resumable
+    assert (shown.start.text, shown.renew.is_visible, shown.again.is_visible) == ("&Resume scan", True, False)
+    assert shown.drift == shown.renew
+    assert shown.remarks.text == "half.dsl contains 30 of 76 frames.\nA note."
+    assert not run_controls(Phase.RUNNING, HALF, FREE, "", has_finished=False).renew.is_visible
 
 
 @pytest.mark.parametrize(
@@ -67,15 +72,16 @@ def test_the_banner_follows_the_reconnection(
     reconnection: Reconnection, action: str, tip: str, is_enabled: bool, can_stop: bool
 ) -> None:
     shown = banner_controls(reconnection)
-    assert (shown.action, shown.tip, shown.is_enabled, shown.can_stop) == (action, tip, is_enabled, can_stop)
+    assert (shown.action.text, shown.action.tip, shown.action.is_enabled) == (action, tip, is_enabled)
+    assert shown.stop.is_visible is can_stop
 
 
 def test_progress_is_empty_until_there_is_some() -> None:
-    assert progress_text(Status(State.IDLE)).frames == ""
+    assert progress_text(Status(State.IDLE)).frames.text == ""
     half = Status(State.RUNNING, done=38, total=76, elapsed_s=20.0, remaining_s=20.0)
-    assert (progress_text(half).frames, progress_text(half).time) == (
+    assert (progress_text(half).frames.text, progress_text(half).time.text) == (
         "38 of 76 frames saved",
         "20 s so far, 20 s left",
     )
     over = Status(State.FINISHED, done=76, total=76, elapsed_s=41.0)
-    assert progress_text(over).time == "took 41 s"
+    assert progress_text(over).time.text == "took 41 s"

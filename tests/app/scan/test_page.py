@@ -104,7 +104,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert ScanReader(tmp_path / "first.dsl").missing() == []
     assert page.plan.isEnabled()
-    assert f"{FRAMES} of {FRAMES}" in page.run._what.text()
+    assert f"{FRAMES} of {FRAMES}" in page.run.frames.text()
 
 
 def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
@@ -225,7 +225,7 @@ def test_a_step_wider_than_the_line_is_said_and_not_started(ready: Bench) -> Non
     page, _, _ = ready
     page.plan.step.setValue(9)
     assert not page.run.start.isEnabled()
-    assert "leave columns between them dark" in page.run._text.text()
+    assert "leave columns between them dark" in page.run.remarks.text()
 
 
 def test_arrow_keys_follow_another_pixel(qtbot: QtBot, ready: Bench) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from dsl_app.calibrate.wizard.state import Doing, Fit, Told, WizardState
-from dsl_app.shared.button_state import ButtonState
 from dsl_app.shared.notify import describe_seconds
+from dsl_app.shared.widget_state import ButtonState
 from dsl_core.campaign.session import State
 from dsl_core.model.figure import Figure, failures
 from dsl_core.model.placement import Placement

@@ -16,7 +16,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.spectrum import spectrum_of_pixel
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import label, push_button, remark_line, set_role, show_remark
+from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
 from dsl_app.shared.widgets.plots import calm_plot, theme_plots
@@ -29,7 +29,7 @@ class PairPanel(QWidget):
     def __init__(self, state: PairState, control: PairController) -> None:
         super().__init__()
         self._state, self._control = state, control
-        self.names = [label("", "heading"), label("", "heading")]
+        self.name_a, self.name_b = label("", "heading"), label("", "heading")
         self.open_first = push_button("Open &A…", "Choose a result as A", lambda: self._choose(second=False))
         self.open_second = push_button("Open &B…", "Choose a result to compare A with")
         self.truth = push_button(
@@ -49,10 +49,10 @@ class PairPanel(QWidget):
 
     def _lay_out(self) -> None:
         head = row_of(
-            self.names[0],
+            self.name_a,
             self.open_first,
             24,
-            self.names[1],
+            self.name_b,
             self.open_second,
             self.truth,
             STRETCH,
@@ -88,19 +88,7 @@ class PairPanel(QWidget):
             self._control.write_report(Path(name))
 
     def _show(self) -> None:
-        display = pair_display(self._state)
-        for text, name in zip(self.names, display.names, strict=True):
-            text.setText(name)
-        show_remark(self.hint, display.remark)
-        set_role(self.hint, "bad" if display.is_error else "muted")
-        for button, is_enabled in (
-            (self.open_first, display.can_open),
-            (self.open_second, display.can_open),
-            (self.truth, display.can_use_truth),
-            (self.swap, display.can_swap),
-            (self.report, display.can_report),
-        ):
-            button.setEnabled(is_enabled)
+        show_parts(self, pair_display(self._state))
 
 
 class PairFigures(QSplitter):

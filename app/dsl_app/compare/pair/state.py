@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Value
 from dsl_app.shared.spectrum import Pixel, number_text
+from dsl_app.shared.widget_state import LabelState
 from dsl_core.evaluation.summary import Truth
 from dsl_core.evaluation.verdict import Verdict
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -87,15 +88,16 @@ class PairState:
 
 @dataclass(frozen=True)
 class PairDisplay:
-    """What the panel of a pair shows: a remark (an error or not) and which buttons can be used."""
+    """What the panel of a pair shows, and which of its buttons can be used."""
 
-    names: tuple[str, str]
-    remark: str
-    is_error: bool
-    can_open: bool
-    can_use_truth: bool
-    can_swap: bool
-    can_report: bool
+    name_a: str
+    name_b: str
+    hint: LabelState
+    open_first: bool
+    open_second: bool
+    truth: bool
+    swap: bool
+    report: bool
 
 
 def pair_display(state: PairState) -> PairDisplay:
@@ -104,14 +106,16 @@ def pair_display(state: PairState) -> PairDisplay:
     pair, busy = state.pair.value, state.busy.value
     name_a, name_b = ("–" if side is None else side.name for side in (first, second))
     idle, has_truth = not busy, second is not None and second.truth is not None
+    hint = LabelState(f"{busy}…" if busy else NOTHING if pair is None else "", "muted")
     return PairDisplay(
-        names=(f"A: {name_a}", f"B: {name_b}"),
-        remark=state.trouble.value or (f"{busy}…" if busy else NOTHING if pair is None else ""),
-        is_error=bool(state.trouble.value),
-        can_open=idle,
-        can_use_truth=idle and first is not None,
-        can_swap=idle and pair is not None and not has_truth,
-        can_report=idle and pair is not None and has_truth,
+        name_a=f"A: {name_a}",
+        name_b=f"B: {name_b}",
+        hint=LabelState(state.trouble.value, "bad") if state.trouble.value else hint,
+        open_first=idle,
+        open_second=idle,
+        truth=idle and first is not None,
+        swap=idle and pair is not None and not has_truth,
+        report=idle and pair is not None and has_truth,
     )
 
 

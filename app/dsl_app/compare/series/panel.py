@@ -15,8 +15,9 @@ from dsl_app.compare.series.state import SeriesKind, SeriesState, series_display
 from dsl_app.compare.series.table import SeriesTable
 from dsl_app.compare.verdict_table import VerdictTable
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_remark
+from dsl_app.shared.widgets.forms import ChoiceBox, push_button, remark_line, show_label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of, splitter
 from dsl_core.evaluation.stage_test import stage_table
@@ -98,7 +99,7 @@ class SeriesPanel(QWidget):
 
     def _show(self) -> None:
         display = series_display(self._state)
-        show_remark(self.hint, display.remark)
+        show_label(self.hint, LabelState(display.remark, "muted"))
         self.kind.choose(self._state.kind.value)
         self.parts.setVisible(display.has_rows)
         self.remove.setEnabled(display.can_remove)

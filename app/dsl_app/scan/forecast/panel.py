@@ -12,8 +12,9 @@ from dsl_app.scan.forecast.figures import FIGURES
 from dsl_app.scan.forecast.operating_curve import OperatingCurve
 from dsl_app.scan.forecast.state import ForecastPoint, ForecastState, identity
 from dsl_app.shared.evented import follow_any
+from dsl_app.shared.widget_state import LabelState
 from dsl_app.shared.widgets.deferred import Deferred
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, label, push_button, show_label
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 from dsl_app.shared.widgets.ticker import Ticker
@@ -82,7 +83,7 @@ class ForecastPanel(QWidget):
             *follow_any(self._show_figures, state.measured),
             *follow_any(self._show_note, state.progress, state.trouble, state.refusal),
             *follow_any(self._show_scene, state.look, state.last_look),
-            state.answer.follow(self._show_answer),
+            state.answer.follow(lambda text: show_label(self._answer, LabelState(text))),
         ]
 
     def _show_wish(self) -> None:
@@ -104,10 +105,6 @@ class ForecastPanel(QWidget):
         self.scene.setCurrentIndex(0 if look is None else 1)
         self.scene.setEnabled(latest is not None)
         self._show_note()
-
-    def _show_answer(self, text: str) -> None:
-        self._answer.setText(text)
-        self._answer.setVisible(bool(text))
 
     def _make_curve(self) -> OperatingCurve:
         made = OperatingCurve()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from PySide6.QtCore import QObject, Qt, SignalInstance
 from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QCheckBox,
     QComboBox,
     QDoubleSpinBox,
@@ -20,7 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from dsl_app.shared.button_state import ButtonState
+from dsl_app.shared.widget_state import ButtonState, LabelState
 from dsl_app.shared.widgets.layouts import row_of
 
 W = TypeVar("W", bound=QWidget)
@@ -30,6 +32,8 @@ _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
     _Base = QWidget
 else:
     _Base = object
@@ -145,12 +149,6 @@ def remark_line() -> QLabel:
     return made
 
 
-def show_remark(line: QLabel, text: str) -> None:
-    """Show a text, or hide the label but keep its line."""
-    line.setText(text or " ")
-    line.setVisible(bool(text))
-
-
 def push_button(text: str, tip: str, do: Clicked = None, role: str = "") -> QPushButton:
     """A button with its tooltip, what a click does, and its role of the style sheet."""
     made = QPushButton(text)
@@ -188,15 +186,44 @@ def quiet(*objects: QObject) -> Iterator[None]:
             each.blockSignals(was_blocked)
 
 
-def show_button(button: QPushButton, state: ButtonState) -> None:
+def show_button(button: QAbstractButton, state: ButtonState) -> None:
     """Draw a button as it was decided."""
     if state.text is not None:
         button.setText(state.text)
     if state.tip is not None:
         button.setToolTip(state.tip)
+    if state.name is not None:
+        button.setAccessibleName(state.name)
     button.setVisible(state.is_visible)
     button.setEnabled(state.is_enabled)
     set_role(button, "primary" if state.is_primary else "")
+
+
+def show_label(line: QLabel, state: LabelState) -> None:
+    """Draw a label as it was decided."""
+    # One that keeps its line while it is hidden needs a text to know how high that is.
+    line.setText(state.text or " " * line.sizePolicy().retainSizeWhenHidden())
+    line.setToolTip(state.tip)
+    line.setVisible(bool(state.text))
+    set_role(line, state.role)
+
+
+def show_parts(page: QWidget, view: DataclassInstance) -> None:
+    """Draw a record that was decided without Qt: each of its fields on the part of a page with its name.
+
+    A plain text is that of a label; a truth value says whether the part can be used.
+    """
+    for field in fields(view):
+        part = getattr(page, field.name)
+        match getattr(view, field.name):
+            case ButtonState() as state:
+                show_button(part, state)
+            case LabelState() as state:
+                show_label(part, state)
+            case bool(is_enabled):
+                part.setEnabled(is_enabled)
+            case text:
+                part.setText(text)
 
 
 def set_role(widget: QWidget, role: str) -> None:

@@ -45,8 +45,9 @@ def test_a_calibration_by_mouse_from_placing_to_accepting(stage: Stage) -> None:
     click(buttons.leave)
     stage.wait(lambda: stage.bench.row("selftest").state is RowState.GOOD)
     row = stage.page.rows["selftest"]
-    assert row._state.text() == "● good"
-    assert row._figure.text().startswith("brightest")
+    assert row.accessibleName() == f"{row._title.text()[4:]}: good."
+    assert row.state.text() == "● good"
+    assert row.figure.text().startswith("brightest")
     assert row.run.text() == "Open…"
 
 

@@ -16,6 +16,7 @@ from dsl_app.compare.pair.state import (
     cursor_text,
     pair_display,
 )
+from dsl_app.shared.widget_state import LabelState
 
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.result.result_arrays import ResultArrays
@@ -47,24 +48,26 @@ def state_of(sides: str, busy: str = "", trouble: str = "") -> PairState:
 
 
 @pytest.mark.parametrize(
-    ("state", "display"),
+    ("state", "names", "hint", "usable"),
     [
-        (state_of(""), PairDisplay(("A: –", "B: –"), NOTHING, False, True, False, False, False)),
-        (state_of("a"), PairDisplay(("A: chart", "B: –"), NOTHING, False, True, True, False, False)),
-        (state_of("ab"), PairDisplay(("A: chart", "B: box"), "", False, True, True, True, False)),
-        (state_of("at"), PairDisplay(("A: chart", "B: truth"), "", False, True, True, False, True)),
-        (
-            state_of("at", busy="Compare"),
-            PairDisplay(("A: chart", "B: truth"), "Compare…", False, False, False, False, False),
-        ),
-        (
-            state_of("ab", trouble="They differ."),
-            PairDisplay(("A: chart", "B: box"), "They differ.", True, True, True, False, False),
-        ),
+        (state_of(""), ("–", "–"), NOTHING, "open"),
+        (state_of("a"), ("chart", "–"), NOTHING, "open truth"),
+        (state_of("ab"), ("chart", "box"), "", "open truth swap"),
+        (state_of("at"), ("chart", "truth"), "", "open truth report"),
+        (state_of("at", busy="Compare"), ("chart", "truth"), "Compare…", ""),
     ],
 )
-def test_buttons_and_remark_follow_the_state(state: PairState, display: PairDisplay) -> None:
-    assert pair_display(state) == display
+def test_buttons_and_hint_follow_the_state(
+    state: PairState, names: tuple[str, str], hint: str, usable: str
+) -> None:
+    assert pair_display(state) == PairDisplay(
+        f"A: {names[0]}", f"B: {names[1]}", LabelState(hint, "muted"), "open" in usable, "open" in usable,
+        "truth" in usable, "swap" in usable, "report" in usable,
+    )  # fmt: skip
+
+
+def test_the_hint_is_what_went_wrong() -> None:
+    assert pair_display(state_of("ab", trouble="They differ.")).hint == LabelState("They differ.", "bad")
 
 
 def test_the_cursor_reads_both_sides_and_their_difference() -> None:
