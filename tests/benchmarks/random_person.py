@@ -212,7 +212,7 @@ class RandomPerson:
         for second in (False, True):
             page._control.open_side(result.path, second)
             self._wait(lambda: not page.pair._state.busy.value)
-        self._wait(lambda: len(page.pair.pictures.bars) == 2)
+        self._wait(lambda: len(page.pair.pictures.content.bars) == 2)
 
     def _busy_all_workers(self) -> None:
         """Let each worker calculate once: the last of them, and its own helpers, else come after hours."""

@@ -92,7 +92,7 @@ def test_a_second_result_is_made_opened_and_compared(
     QTest.mouseClick(compare, Qt.MouseButton.LeftButton)
     assert page.tabs.currentWidget() is page.pair
     qtbot.waitUntil(lambda: page.pair._state.pair.value is not None, timeout=PATIENCE_MS)
-    assert [name.text() for name in page.pair.names] == ["A: small", "B: coarse"]
+    assert (page.pair.name_a.text(), page.pair.name_b.text()) == ("A: small", "B: coarse")
 
 
 def test_the_dialog_shows_what_it_asks_for(
