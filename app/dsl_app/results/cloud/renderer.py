@@ -6,7 +6,6 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
 from queue import Empty, SimpleQueue
 
 from dsl_app.results.cloud.points import Points
@@ -59,27 +58,41 @@ class CloudRenderer:
 
     def show(self, points: Points, colours: Colours, reset_view: bool = True) -> None:
         """Show a cloud; points other than before reset the view, or keep it."""
-        self._request(partial(self._show, points, colours, reset_view))
 
-    def mark(self, name: str, points: Points, colours: Colours, size_px: int, moves: bool = False) -> None:
-        """Mark points; the cloud is coarse for a while if the mark ``moves``."""
-        self._request(partial(self._mark, name, points, colours, size_px, moves))
+        def act() -> None:
+            self._window.show(points, colours, reset_view)
+            self._is_fresh, self._is_grown = True, False
 
-    def call(self, change: Change) -> None:
-        """Change the render window in its thread, and draw."""
-        self._request(lambda: change(self._window))
+        self._request(act)
 
-    def move_camera(self, change: Change) -> None:
-        """The same for a step of the camera; the cloud is coarse for a while."""
-        self._request(partial(self._move_camera, change))
+    def call(self, change: Change, moves: bool = False) -> None:
+        """Change the render window in its thread, and draw; a cloud that ``moves`` is coarse for a while."""
+
+        def act() -> None:
+            change(self._window)
+            if moves:
+                self._be_coarse()
+
+        self._request(act)
 
     def press(self, button: MouseButton, at: Place, shift: bool, control: bool) -> None:
-        """Press a mouse button."""
-        self._request(partial(self._press, button, at, shift, control))
+        """Press a mouse button; the cloud is coarse until it is released."""
+
+        def hold(window: RenderWindow) -> None:
+            window.press(button, at, shift, control)
+            self._is_held = True
+
+        self.call(hold, moves=True)
 
     def release(self, button: MouseButton, at: Place) -> None:
         """Release a mouse button."""
-        self._request(partial(self._release, button, at))
+
+        def act() -> None:
+            self._window.release(button, at)
+            self._is_held = False
+            self._rest()
+
+        self._request(act)
 
     def close(self) -> None:
         """End the thread after the current picture, and wait for it."""
@@ -142,29 +155,6 @@ class CloudRenderer:
             # The widget may be deleted by now.
             with suppress(RuntimeError):
                 self._drawn()
-
-    def _show(self, points: Points, colours: Colours, reset_view: bool) -> None:
-        self._window.show(points, colours, reset_view)
-        self._is_fresh, self._is_grown = True, False
-
-    def _mark(self, name: str, points: Points, colours: Colours, size_px: int, moves: bool) -> None:
-        self._window.cloud.mark(name, points, colours, size_px)
-        if moves:
-            self._be_coarse()
-
-    def _move_camera(self, change: Change) -> None:
-        change(self._window)
-        self._be_coarse()
-
-    def _press(self, button: MouseButton, at: Place, shift: bool, control: bool) -> None:
-        self._window.press(button, at, shift, control)
-        self._is_held = True
-        self._be_coarse()
-
-    def _release(self, button: MouseButton, at: Place) -> None:
-        self._window.release(button, at)
-        self._is_held = False
-        self._rest()
 
     def _be_coarse(self) -> None:
         """Show a part of the cloud until nothing has moved for a while, and while a button is held."""

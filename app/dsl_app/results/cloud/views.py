@@ -120,11 +120,13 @@ class InteractiveCloud(CloudView):
         """Mark a point; the cloud is coarse until the marker rests."""
         rgb = np.frombuffer(bytes.fromhex(colour[1:]), np.uint8)[None]
         points = np.empty((0, 3), np.float32) if point is None else point[None]
-        self.renderer.mark("marker", points, rgb, round(14 * self.devicePixelRatioF()), moves=True)
+        size_px = round(14 * self.devicePixelRatioF())
+        self.renderer.call(lambda window: window.cloud.mark("marker", points, rgb, size_px), moves=True)
 
     def show_pins(self, points: Points, colours: Colours) -> None:
         """Mark the pins."""
-        self.renderer.mark("pins", points, colours, round(10 * self.devicePixelRatioF()))
+        size_px = round(10 * self.devicePixelRatioF())
+        self.renderer.call(lambda window: window.cloud.mark("pins", points, colours, size_px))
 
     def set_background(self, colour: str) -> None:
         """Set the colour behind the cloud, also where there is no picture yet."""
@@ -210,13 +212,13 @@ class InteractiveCloud(CloudView):
         self._zoom(event.angleDelta().y() / NOTCH)
 
     def _zoom(self, steps: float) -> None:
-        self.renderer.move_camera(lambda window: window.zoom(steps))
+        self.renderer.call(lambda window: window.zoom(steps), moves=True)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Rotate and zoom by keys."""
         step = arrow_step(event)
         if step is not None:
-            self.renderer.move_camera(lambda window: window.turn(step[0], -step[1]))
+            self.renderer.call(lambda window: window.turn(step[0], -step[1]), moves=True)
         elif event.key() in (Qt.Key.Key_Plus, Qt.Key.Key_Equal, Qt.Key.Key_Minus):
             self._zoom(-1.0 if event.key() == Qt.Key.Key_Minus else 1.0)
         elif event.key() == Qt.Key.Key_Home:

@@ -38,7 +38,7 @@ def test_without_graphics_the_cloud_is_a_picture_with_a_sentence(
 def test_the_cloud_hides_what_lies_outside_the_limits_and_keeps_its_view(bench: Bench, qtbot: QtBot) -> None:
     view = cloud_view(bench, qtbot)
     assert view.renderer.shown == 24 * 36 - 1
-    view.renderer.move_camera(lambda window: window.turn(3, 0))
+    view.renderer.call(lambda window: window.turn(3, 0), moves=True)
     qtbot.waitUntil(lambda: view.renderer.is_at_rest)
     before = view.projection()[:, 0].copy()
     bench.control.limit_depth((705.0, 710.0))
