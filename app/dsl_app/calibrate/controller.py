@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 from dsl_app.calibrate.calibrate_all import CANNOT_PLACE, CalibrateAll, products_text
@@ -23,7 +24,6 @@ from dsl_core.campaign.products import Products, write_products
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import DslError
 from dsl_core.io import CAMPAIGN_NAME
-from dsl_core.io.atomic import store_error
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.campaign_folder import CampaignFolder
 from dsl_core.io.scan.lock import FolderLock
@@ -50,7 +50,8 @@ class CalibrateController:
         self.library = LibraryController(state, rig, runner, notifier, self._store)
         self.wizard_ready: Event[tuple[WizardState, WizardController]] = Event()
         self._wizard: WizardController | None = None
-        self._lock = CampaignLock()
+        #: Holds the lock of the campaign that is written; a second release does nothing.
+        self._lock = ExitStack()
         self._stops = [
             rig.state.devices.changed.connect(lambda _: self.refresh()),
             rig.state.choice.changed.connect(lambda _: self.refresh()),
@@ -156,7 +157,7 @@ class CalibrateController:
     def _closed(self) -> None:
         self._wizard = None
         self.state.opening.set("")
-        self._lock.release()
+        self._lock.close()
         self.refresh()
         self.library.load()
 
@@ -187,7 +188,7 @@ class CalibrateController:
         self._everything.take_news()
 
     def _ended(self, note: str, error: Exception | None) -> None:
-        self._lock.release()
+        self._lock.close()
         self.state.note.set(note)
         self.refresh()
         self.library.load()
@@ -261,7 +262,7 @@ class CalibrateController:
             )
             return False
         try:
-            self._lock.take(path)
+            self._lock.callback(FolderLock(path / "lock").release)
         except DslError as error:
             self._notifier.tell("error", str(error))
             return False
@@ -285,7 +286,7 @@ class CalibrateController:
         if self._wizard is not None:
             self._wizard.leave()
         self.cancel_everything()
-        self._lock.release()
+        self._lock.close()
 
 
 def library_name(folder: Path) -> str:
@@ -296,23 +297,3 @@ def library_name(folder: Path) -> str:
     """
     name = re.sub(r"[^\w .+-]", "-", folder.name).lstrip(" .+-")
     return name or "campaign"
-
-
-class CampaignLock:
-    """One writer for each campaign, among all windows and commands of this computer."""
-
-    def __init__(self) -> None:
-        self._lock: FolderLock | None = None
-
-    def take(self, folder: Path) -> None:
-        """Lock it; raises `StoreError` when another process writes it, or the folder is read-only."""
-        try:
-            self._lock = FolderLock(folder / "lock")
-        except OSError as error:
-            raise store_error(folder / "lock", error) from error
-
-    def release(self) -> None:
-        """Unlock it; a second call does nothing."""
-        if self._lock is not None:
-            self._lock.release()
-            self._lock = None

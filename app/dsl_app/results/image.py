@@ -19,7 +19,7 @@ from dsl_app.shared.spectrum import Pixel
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import named
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.pictures import arrow_step, colour_map
+from dsl_app.shared.widgets.pictures import PictureView, arrow_step, colour_map
 from dsl_app.shared.widgets.plots import theme_bar
 
 #: Mouse moves are handled at most this often, Hz.
@@ -28,7 +28,7 @@ CURSOR_HZ = 60
 pg.setConfigOption("mouseRateLimit", -1)
 
 
-class _Canvas(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+class _Canvas(PictureView):
     """The graphics view, which passes keys on to the picture."""
 
     key = Signal(QKeyEvent)
@@ -51,19 +51,18 @@ class ResultImage(QWidget):
         self._theme = DARK
         self._mark_items: list[Any] = []
         self._bar: tuple[Any, ...] = ()
-        self.canvas = _Canvas()
-        self.canvas.setAccessibleName("Picture of the result")
-        self.canvas.setToolTip(
-            "Click or press Enter to pin a spectrum; drag to pan, wheel to zoom; arrow keys move the cursor"
-        )
         self.box = OutlineBox()
-        self.canvas.addItem(self.box, 0, 0)
-        self.image, self.overlay = (pg.ImageItem(axisOrder="row-major") for _ in range(2))
+        self.canvas = _Canvas(
+            "Picture of the result",
+            "Click or press Enter to pin a spectrum; drag to pan, wheel to zoom; arrow keys move the cursor",
+            self.box,
+        )
+        self.image, self.overlay = self.canvas.image, pg.ImageItem(axisOrder="row-major")
         self.overlay.setZValue(5)
         self._vertical, self._horizontal = (pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0))
         self.pins = pg.ScatterPlotItem(size=11, pxMode=True)
-        for item in (self.image, self.overlay, self._vertical, self._horizontal, self.pins):
-            self.box.addItem(item, ignoreBounds=item is not self.image)
+        for item in (self.overlay, self._vertical, self._horizontal, self.pins):
+            self.box.addItem(item, ignoreBounds=True)
         for line in (self._vertical, self._horizontal):
             line.setZValue(20)
             line.hide()
@@ -146,7 +145,7 @@ class ResultImage(QWidget):
 
     def fit(self) -> None:
         """Show the whole image."""
-        self.box.autoRange(padding=0.01, items=[self.image])
+        self.canvas.fit()
 
     def paint(self) -> None:
         """Paint the view of the state."""
@@ -231,7 +230,7 @@ class ResultImage(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
-        self.canvas.setBackground(theme.base)
+        self.canvas.apply_theme(theme)
         self.box.set_colour(theme.accent)
         for line in (self._vertical, self._horizontal):
             line.setPen(pg.mkPen(theme.accent, width=1))

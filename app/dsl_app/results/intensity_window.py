@@ -13,7 +13,7 @@ from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label
 from dsl_app.shared.widgets.help_window import add_help_key
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.plots import RGB_COLOURS, calm_plot, theme_plots
+from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot
 from dsl_core.workflows.inspection import IntensityGraph
 
 CHANNELS = ("R", "G", "B")
@@ -31,7 +31,7 @@ class IntensityWindow(QDialog):
         self.setWindowTitle("Intensity graph")
         self.resize(860, 440)
         add_help_key(self, "reading-an-intensity-graph")
-        self.plot = calm_plot(
+        self.plot = CalmPlot(
             "Intensity graph",
             "Points are measured; lines are modelled from the reconstructed spectrum. The dashed line marks"
             " the zero order; the upper axis shows the wavelengths of the first orders.",
@@ -102,7 +102,7 @@ class IntensityWindow(QDialog):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
-        theme_plots((self.plot,), theme)
+        self.plot.apply_theme(theme)
         self.item.getAxis("top").setPen(theme.line)
         self.item.getAxis("top").setTextPen(theme.muted)
         self.item.legend.setLabelTextColor(theme.text)

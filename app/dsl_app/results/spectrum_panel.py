@@ -14,7 +14,7 @@ from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.layouts import column_of
 from dsl_app.shared.widgets.pictures import spread_of
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 #: Higher reflectances are errors or gloss; zooming out shows them.
@@ -27,7 +27,7 @@ class SpectrumPanel(QWidget):
     def __init__(self, state: ResultsState) -> None:
         super().__init__()
         self._state, self._theme = state, DARK
-        self.plot = calm_plot(
+        self.plot = CalmPlot(
             "Spectra",
             "Reflectance with its 95 % band; dashed where the prior decides and not the data. Regions show"
             " the mean and one standard deviation of their pixels. Drag the line to change the band.",
@@ -102,7 +102,7 @@ class SpectrumPanel(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
-        theme_plots((self.plot,), theme)
+        self.plot.apply_theme(theme)
         self.band_line.setPen(pg.mkPen(theme.accent, width=1, style=Qt.PenStyle.DashLine))
         self.band_line.setHoverPen(pg.mkPen(theme.accent, width=3))
         self.live.set_colour(theme.text, width=2)

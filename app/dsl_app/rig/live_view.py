@@ -14,7 +14,7 @@ from dsl_app.rig.state import FrameCounts
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import check_box, label, push_button, set_role
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
-from dsl_app.shared.widgets.pictures import Region, RegionBox, arrow_step, cut, moved_within
+from dsl_app.shared.widgets.pictures import PictureView, Region, RegionBox, arrow_step, cut, moved_within
 from dsl_core.capture.preview import BINS, MANY_SATURATED, Statistics, quick_picture, statistics
 from dsl_core.devices.base import CameraInfo
 from dsl_core.model.frames import Frame
@@ -38,16 +38,13 @@ class LiveView(QWidget):
         self._frame: Frame | None = None
         self._times: list[float] = []
         self._figures_at = 0.0
-        self.view = pg.GraphicsLayoutWidget()
-        self.view.setAccessibleName("Live picture")
-        self.view.setToolTip(
-            "Wheel to zoom, drag to pan, F to fit; arrow keys move the pixel that is read, with Shift by ten"
+        self.view = PictureView(
+            "Live picture",
+            "Wheel to zoom, drag to pan, F to fit; arrow keys move the pixel that is read, with Shift by ten",
         )
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
-        self._box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False)
-        self._item = pg.ImageItem(axisOrder="row-major")
-        self._box.addItem(self._item)
+        self._box, self._item = self.view.box, self.view.image
         self._read: tuple[int, int] | None = None
         self.rectangle = RegionBox(CELL_PX)
         self._box.addItem(self.rectangle, ignoreBounds=True)
@@ -226,4 +223,4 @@ class LiveView(QWidget):
 
     def show_all(self) -> None:
         """Show the whole picture."""
-        self._box.autoRange(padding=0.01, items=[self._item])
+        self.view.fit()

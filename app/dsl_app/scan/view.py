@@ -12,12 +12,11 @@ from PySide6.QtWidgets import QSplitter, QWidget
 
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import LivePicture, ScanState
-from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.pictures import arrow_step
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_app.shared.widgets.pictures import PictureView, arrow_step
+from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_core.capture.preview import BlockGraph
 from dsl_core.model.plan import CapturePlan, Shot
 
@@ -38,15 +37,13 @@ class FramePicture(QWidget):
         super().__init__()
         self._shown: LivePicture | None = None
         self._cursor: tuple[int, int] | None = None
-        self.view = pg.GraphicsLayoutWidget()
-        self.view.setAccessibleName("Last frame of the scan")
-        self.view.setToolTip("The last frame. Point at a pixel, or use arrow keys, to plot its intensity.")
+        tip = "The last frame. Point at a pixel, or use arrow keys, to plot its intensity."
+        self.view = PictureView("Last frame of the scan", tip)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.view.setFocusProxy(self)
-        self.box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)
-        self._image = pg.ImageItem(axisOrder="row-major")
-        self._mark = pg.TargetItem(size=13, movable=False)
-        self.box.addItem(self._image)
+        self.box = self.view.box
+        self.box.setMouseEnabled(False, False)
+        self._mark = pg.TargetItem(size=13, movable=False, pen=pg.mkPen("#ffffff", width=2))
         self.box.addItem(self._mark, ignoreBounds=True)
         self._mark.hide()
         self._text = label(HINT, "muted", wraps=True)
@@ -57,14 +54,14 @@ class FramePicture(QWidget):
         """Show a frame of a plan."""
         before, self._shown = self._shown, shown
         if shown is None:
-            self._image.clear()
+            self.view.image.clear()
             self._text.setText(HINT)
             return
-        self._image.setImage(shown.picture, autoLevels=False, levels=None)
-        self._image.setRect(0, 0, *covered_px(shown))
+        self.view.image.setImage(shown.picture, autoLevels=False, levels=None)
+        self.view.image.setRect(0, 0, *covered_px(shown))
         self._text.setText(f"Frame {shown.shot.index + 1} of {plan.shot_count}: {words_of(shown.shot, plan)}")
         if before is None or covered_px(before) != covered_px(shown):
-            self.box.autoRange(padding=0.01)
+            self.view.fit()
 
     def show_cursor(self, pixel: tuple[int, int] | None) -> None:
         """Mark a pixel of the camera."""
@@ -97,11 +94,6 @@ class FramePicture(QWidget):
         x, y = min(x, width - 1), min(y, height - 1)
         self._point(x + 2 * cell * step[0], y + 2 * cell * step[1])
 
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self.view.setBackground(theme.base)
-        self._mark.setPen(pg.mkPen("#ffffff", width=2))
-
 
 class ScanView(QSplitter):
     """The last frame above the graph of a pixel; follows a `ScanState`."""
@@ -129,7 +121,7 @@ class GraphPlot(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.plot = calm_plot(
+        self.plot = CalmPlot(
             "Intensity graph",
             "Raw counts of the pixel while the lines move across the projector: the high peak is the zero"
             " order, the first orders are on either side.",
@@ -171,10 +163,6 @@ class GraphPlot(QWidget):
             self._curves.append(self.plot.plot([], []))
         for curve in self._curves[3 * settings :]:
             curve.setVisible(False)
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        theme_plots((self.plot,), theme)
 
 
 def covered_px(shown: LivePicture) -> tuple[int, int]:

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from dsl_core.errors import StoreError
-from dsl_core.io.atomic import write_all
+from dsl_core.io.atomic import store_error, write_all
 
 #: Windows locks byte ranges for reading too, so the locked byte is behind the text.
 _LOCK_BYTE = 1 << 20
@@ -18,8 +18,11 @@ class FolderLock:
     """Held from construction to `release`; a lock left by a killed process is free at once."""
 
     def __init__(self, path: Path) -> None:
-        """Take the lock; raises `StoreError` that names the process holding it."""
-        self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        """Take the lock; raises `StoreError` that names the process holding it, or why there is no file."""
+        try:
+            self._descriptor: int | None = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        except OSError as error:
+            raise store_error(path, error) from error
         try:
             _lock(self._descriptor)
         except OSError as error:

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QToolTip, QWidget
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import quiet
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.pictures import arrow_step
+from dsl_app.shared.widgets.pictures import PictureView, arrow_step
 from dsl_core.calibration.colour.patches import INNER, apply_homography, grid_corners
 from dsl_core.optics.charts import CHART_SHAPE
 
@@ -62,15 +62,17 @@ class ChartPicture(QWidget):
         self.setAccessibleName("Chart with its corners")
         tip = "Drag the corners, or choose one with 1 to 4 and move it with the arrow keys (Shift: by 10 px)."
         self.setToolTip(tip)
-        self.canvas = pg.GraphicsLayoutWidget()
+        self.canvas = PictureView("")
         self.canvas.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        self.box = self.canvas.addViewBox(lockAspect=True, invertY=True, enableMenu=False)
-        self.image = pg.ImageItem(axisOrder="row-major")
+        self.box, self.image = self.canvas.box, self.canvas.image
         # White on black, so that the outlines are seen on every patch.
-        self.shadow, self.outlines = (pg.PlotCurveItem(connect="finite") for _ in range(2))
+        self.shadow, self.outlines = (
+            pg.PlotCurveItem(connect="finite", pen=pg.mkPen(colour, width=width))
+            for colour, width in (("#000000", 3), ("#ffffff", 1))
+        )
         self.corners = [pg.TargetItem(size=14, movable=True) for _ in grid_corners()]
-        for item in (self.image, self.shadow, self.outlines, *self.corners):
-            self.box.addItem(item, ignoreBounds=item is not self.image)
+        for item in (self.shadow, self.outlines, *self.corners):
+            self.box.addItem(item, ignoreBounds=True)
         for corner in self.corners:
             corner.setZValue(10)
             corner.sigPositionChanged.connect(self._moved)
@@ -93,7 +95,7 @@ class ChartPicture(QWidget):
         self.image.setImage(picture, levels=(0, 255), autoLevels=False)
         height, width = picture.shape[:2]
         self.image.setRect(-0.5, -0.5, width, height)
-        self.box.autoRange(padding=0.02, items=[self.image])
+        self.canvas.fit(padding=0.02)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """1 to 4 choose a corner, arrows move it."""
@@ -130,9 +132,7 @@ class ChartPicture(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
-        self.canvas.setBackground(theme.base)
-        self.shadow.setPen(pg.mkPen("#000000", width=3))
-        self.outlines.setPen(pg.mkPen("#ffffff", width=1))
+        self.canvas.apply_theme(theme)
         self._paint_corners()
 
 

@@ -19,8 +19,9 @@ from dsl_app.shared.spectrum import Spectrum
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.deferred import call_deferred
 from dsl_app.shared.widgets.forms import label
+from dsl_app.shared.widgets.inside import apply_theme_inside
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.plots import RGB_COLOURS, calm_plot, theme_plots
+from dsl_app.shared.widgets.plots import RGB_COLOURS, CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 from dsl_core.model.spectral import SpectralCurve
 
@@ -52,7 +53,7 @@ class ChartBox(QWidget):
         """``prepare`` gets the plot when it is made."""
         super().__init__()
         self._theme, self._prepare = DARK, prepare
-        self._make = partial(calm_plot, title, tip, left, bottom, left_width)
+        self._make = partial(CalmPlot, title, tip, left, bottom, left_width)
         self._plot: Any = None
         self._draw: Callable[[], object] | None = None
         self._is_next = False
@@ -82,7 +83,7 @@ class ChartBox(QWidget):
             self._plot = self._make()
             self._plot.setMouseEnabled(False, False)
             self._plot.setMinimumHeight(90)
-            theme_plots((self._plot,), self._theme)
+            self._plot.apply_theme(self._theme)
             self._stack.addWidget(self._plot)
             self._prepare(self._plot)
 
@@ -148,8 +149,7 @@ class ChartBox(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme; what is drawn keeps its own."""
         self._theme = theme
-        if self._plot is not None:
-            theme_plots((self._plot,), theme)
+        apply_theme_inside(self, theme)
 
 
 def like_a_picture(plot: Any) -> None:

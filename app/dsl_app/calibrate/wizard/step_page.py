@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pyqtgraph as pg
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
@@ -11,9 +10,9 @@ from dsl_app.calibrate.wizard.placement_drawing import PlacementDrawing
 from dsl_app.calibrate.wizard.presentation import step_display
 from dsl_app.calibrate.wizard.state import Seen, WizardState
 from dsl_app.shared.evented import follow_any
-from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, set_role
 from dsl_app.shared.widgets.layouts import boxed, column_of, splitter
+from dsl_app.shared.widgets.pictures import PictureView
 from dsl_core.capture.preview import MANY_SATURATED
 
 TABLE_PX = 166
@@ -59,28 +58,21 @@ class LiveFrameView(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.view = pg.GraphicsLayoutWidget()
-        self.view.setAccessibleName("Camera picture")
-        self.view.setToolTip("The camera's last bright frame; saturated pixels are red")
+        tip = "The camera's last bright frame; saturated pixels are red"
+        self.view = PictureView("Camera picture", tip)
         self.view.setMinimumSize(220, 150)
-        self._box = self.view.addViewBox(lockAspect=True, invertY=True, enableMenu=False, enableMouse=False)
-        self._item = pg.ImageItem(axisOrder="row-major")
-        self._box.addItem(self._item)
+        self.view.box.setMouseEnabled(False, False)
         self._text = label(NO_PICTURE, "muted")
         column_of((self.view, 1), self._text, on=self, margins=0)
 
     def show_seen(self, seen: Seen | None) -> None:
         """Show a frame; None clears it."""
         if seen is None:
-            self._item.clear()
+            self.view.image.clear()
             self._text.setText(NO_PICTURE)
             set_role(self._text, "muted")
             return
-        self._item.setImage(seen.picture, autoLevels=False, levels=None)
-        self._box.autoRange(padding=0.01)
+        self.view.image.setImage(seen.picture, autoLevels=False, levels=None)
+        self.view.fit()
         self._text.setText(f"saturated {100 * seen.saturated:.2f} %")
         set_role(self._text, "bad" if seen.saturated > MANY_SATURATED else "muted")
-
-    def apply_theme(self, theme: Theme) -> None:
-        """Take the colours of a theme."""
-        self.view.setBackground(theme.base)

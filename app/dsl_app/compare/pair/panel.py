@@ -19,7 +19,7 @@ from dsl_app.shared.widgets.deferred import Deferred
 from dsl_app.shared.widgets.forms import label, push_button, remark_line, show_parts
 from dsl_app.shared.widgets.help_window import set_help
 from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, splitter
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots
+from dsl_app.shared.widgets.plots import CalmPlot
 from dsl_app.shared.widgets.spectrum_curve import SpectrumCurve
 
 
@@ -97,7 +97,7 @@ class PairFigures(QSplitter):
     def __init__(self, state: PairState) -> None:
         super().__init__(Qt.Orientation.Horizontal)
         self._state = state
-        self.plot = calm_plot(
+        self.plot = CalmPlot(
             "Spectra of A and B", "Reflectance under the cursor: A solid with its 95 % band, B dotted",
             "Reflectance", "Wavelength (nm)",
         )  # fmt: skip
@@ -130,6 +130,6 @@ class PairFigures(QSplitter):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
-        theme_plots((self.plot,), theme)
+        self.plot.apply_theme(theme)
         self.curves[0].set_colour(theme.pins[0], width=2)
         self.curves[1].set_colour(theme.pins[1], width=2, dashed=True)

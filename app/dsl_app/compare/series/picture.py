@@ -14,7 +14,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
-from dsl_app.shared.widgets.pictures import DIFFERENCE, RegionBox, colour_map, spread_of
+from dsl_app.shared.widgets.pictures import DIFFERENCE, PictureView, RegionBox, colour_map, spread_of
 from dsl_app.shared.widgets.plots import theme_bar
 
 
@@ -29,14 +29,12 @@ class SeriesPicture(QWidget):
             "Re&gion", "Use only the pixels in a rectangle, which you can drag on the picture", self._switch
         )
         self.part.setCheckable(True)
-        self.canvas = pg.GraphicsLayoutWidget()
-        self.canvas.setAccessibleName("Residuals of the plane")
-        self.canvas.setToolTip(
+        self.canvas = PictureView(
+            "Residuals of the plane",
             "How far each pixel is behind (red) or in front of (blue) the plane of the target; blank where"
-            " it is not counted."
+            " it is not counted.",
         )
-        self.box = pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
-        self.image = pg.ImageItem(axisOrder="row-major")
+        self.box, self.image = self.canvas.box, self.canvas.image
         self.bar = pg.ColorBarItem(interactive=False, width=14, colorMap=colour_map(DIFFERENCE))
         self.rectangle = RegionBox(1)
         self.rectangle.hide()
@@ -45,9 +43,7 @@ class SeriesPicture(QWidget):
         self.stops = follow_any(self.show_row, state.rows, state.selected, state.region)
 
     def _lay_out(self) -> None:
-        self.canvas.addItem(self.box, 0, 0)
         self.canvas.addItem(self.bar, 0, 1)
-        self.box.addItem(self.image)
         self.box.addItem(self.rectangle, ignoreBounds=True)
         head = row_of((self.title, 1), self.part)
         column_of(head, (self.canvas, 1), on=self, margins=0, spacing=2)
@@ -100,6 +96,6 @@ class SeriesPicture(QWidget):
 
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
-        self.canvas.setBackground(theme.base)
+        self.canvas.apply_theme(theme)
         self.rectangle.apply_theme(theme)
         theme_bar(self.bar, theme)

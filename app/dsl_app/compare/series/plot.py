@@ -15,7 +15,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import column_of
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks
+from dsl_app.shared.widgets.plots import CalmPlot, ticks
 from dsl_core.evaluation.stage_test import StageLine, StageTest
 from dsl_core.evaluation.time_sweep import SweepPoint, best_points
 from dsl_core.evaluation.uncertainty import BAND_95
@@ -30,7 +30,7 @@ class SeriesPlot(QWidget):
     def __init__(self, state: SeriesState) -> None:
         super().__init__()
         self._state, self._theme = state, DARK
-        self.plot = calm_plot(
+        self.plot = CalmPlot(
             "Series",
             "Depth: distance minus the fitted line over positions, with 95 % bars. Time: an error over the"
             " capture time, both logarithmic; lower and further left is better.",
@@ -136,7 +136,7 @@ class SeriesPlot(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Apply the colours of a theme."""
         self._theme = theme
-        theme_plots((self.plot,), theme)
+        self.plot.apply_theme(theme)
         self.draw()
 
 

@@ -16,7 +16,7 @@ from dsl_app.scan.forecast.state import ForecastPoint
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
-from dsl_app.shared.widgets.plots import calm_plot, theme_plots, ticks, time_ticks
+from dsl_app.shared.widgets.plots import CalmPlot, ticks, time_ticks
 
 #: Presets that are always labelled; other points only while chosen or pointed at.
 NAMED = ("preview", "balanced", "reference")
@@ -42,7 +42,7 @@ class OperatingCurve(QWidget):
         self.figure = ChoiceBox("Figure of accuracy", "The figure that the curve shows")
         for figure in CURVES:
             self.figure.addItem(figure.title)
-        self.plot = calm_plot(
+        self.plot = CalmPlot(
             "Accuracy against time",
             "Expected error against capture time; lower left is better. Click a point, drag the marker"
             " along the curve, or press the arrow keys. The star is the published plan.",
@@ -226,7 +226,7 @@ class OperatingCurve(QWidget):
     def apply_theme(self, theme: Theme) -> None:
         """Take the colours of a theme."""
         self._theme = theme
-        theme_plots((self.plot,), theme)
+        self.plot.apply_theme(theme)
         self._front.setPen(pg.mkPen(theme.accent, width=1.5))
         self._wanted.setPen(pg.mkPen(theme.muted, width=1, style=Qt.PenStyle.DashLine))
         self.marker.setPen(pg.mkPen(theme.text, width=2))

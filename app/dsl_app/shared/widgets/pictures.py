@@ -11,11 +11,33 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
 
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import named
 
 #: Perceptually uniform maps of pyqtgraph: grey for a band, colours for quantities that are not light.
 GREY, DEPTH, SHARE = "CET-L1", "viridis", "cividis"
 #: Differences: white is zero, blue negative, red positive; lightness changes evenly.
 DIFFERENCE = "CET-D1A"
+
+
+class PictureView(pg.GraphicsLayoutWidget):  # type: ignore[misc]
+    """A picture with square pixels, its first row at the top, on a background of the theme."""
+
+    def __init__(self, name: str, tip: str = "", box: pg.ViewBox | None = None) -> None:
+        """``box`` holds the picture; the default one pans and zooms."""
+        super().__init__()
+        named(self, name, tip)
+        self.box = box or pg.ViewBox(lockAspect=True, invertY=True, enableMenu=False)
+        self.addItem(self.box, 0, 0)
+        self.image = pg.ImageItem(axisOrder="row-major")
+        self.box.addItem(self.image)
+
+    def fit(self, padding: float = 0.01) -> None:
+        """Show the whole picture."""
+        self.box.autoRange(padding=padding, items=[self.image])
+
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme."""
+        self.setBackground(theme.base)
 
 
 def spread_of(values: NDArray[np.floating[Any]], low: float = 0.5, high: float = 99.5) -> tuple[float, float]:

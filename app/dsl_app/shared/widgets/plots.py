@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import Any
 
 import pyqtgraph as pg
 
 from dsl_app.shared.theme import Theme
+from dsl_app.shared.widgets.forms import named
 
 Ticks = list[tuple[float, str]]
 #: Seconds that are marked, as far as they are in view.
@@ -19,27 +19,25 @@ NARROW = 8.0
 RGB_COLOURS = ("#e0524d", "#2fa84f", "#4c8dff")
 
 
-def calm_plot(name: str, tip: str, left: str, bottom: str, left_width: int = 52) -> Any:
-    """A plot widget without menus and buttons that keeps its axes in place."""
-    plot = pg.PlotWidget(enableMenu=False)
-    plot.setAccessibleName(name)
-    plot.setToolTip(tip)
-    item = plot.getPlotItem()
-    item.hideButtons()
-    item.showGrid(x=True, y=True, alpha=0.18)
-    for side, text in (("left", left), ("bottom", bottom)):
-        item.setLabel(side, text)
-        item.getAxis(side).enableAutoSIPrefix(False)
-    item.getAxis("left").setWidth(left_width)
-    return plot
+class CalmPlot(pg.PlotWidget):  # type: ignore[misc]
+    """A plot without menus and buttons that keeps its axes in place."""
 
+    def __init__(self, name: str, tip: str, left: str, bottom: str, left_width: int = 52) -> None:
+        super().__init__(enableMenu=False)
+        named(self, name, tip)
+        item = self.getPlotItem()
+        item.hideButtons()
+        item.showGrid(x=True, y=True, alpha=0.18)
+        for side, text in (("left", left), ("bottom", bottom)):
+            item.setLabel(side, text)
+            item.getAxis(side).enableAutoSIPrefix(False)
+        item.getAxis("left").setWidth(left_width)
 
-def theme_plots(plots: Iterable[Any], theme: Theme) -> None:
-    """Apply the colours of a theme to plots."""
-    for plot in plots:
-        plot.setBackground(theme.base)
+    def apply_theme(self, theme: Theme) -> None:
+        """Apply the colours of a theme to background and axes."""
+        self.setBackground(theme.base)
         for side in ("left", "bottom"):
-            axis = plot.getPlotItem().getAxis(side)
+            axis = self.getPlotItem().getAxis(side)
             axis.setPen(theme.line)
             axis.setTextPen(theme.muted)
             axis.labelStyle["color"] = theme.muted
