@@ -73,10 +73,10 @@ def _read(
         begun = captured > 0 or waits
         reason = waiting or (f"{captured} captured" if captured else "")
         state = RowState.BEGUN if begun else RowState.MISSING
-        return Row(name, about, state, reason, captured=captured, has_candidate=waits), ""
+        return Row(name, about, state, reason, has_candidate=waits), ""
     state, reason = judge(accepted, before, conditions, now, ageing)
     reason = f"{reason} {waiting}".strip()
-    row = Row(name, about, state, reason, key_figure(accepted.figures), accepted.accepted, captured, waits)
+    row = Row(name, about, state, reason, key_figure(accepted.figures), accepted.accepted, waits)
     return row, accepted.accepted
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -80,7 +79,7 @@ class LibraryPanel(QGroupBox):
         self.check.clicked.connect(self._check)
         self.table.itemSelectionChanged.connect(self._select)
         self.table.itemActivated.connect(lambda _: self.report.click())
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             state.library.follow(self._list),
             state.in_use.changed.connect(lambda _: self._list(state.library.value)),
             state.note.follow(lambda text: show_label(self._note, LabelState(text, "muted"))),

@@ -62,7 +62,7 @@ class CalibratePage(PageWidget):
 
     def _connect(self) -> None:
         state = self._state
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             state.trouble.follow(self.banner.say),
             state.foreign.follow(self.banner.action.setVisible),
             *follow_any(self._show_rows, state.rows, state.opening, state.everything),

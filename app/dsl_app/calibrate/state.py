@@ -56,8 +56,8 @@ ABOUT = {
 class Row:
     """One calibration of the campaign.
 
-    ``reason`` explains the state; ``figure`` is the one nearest to its limits, or beyond; ``captured``
-    counts finished steps; ``has_candidate`` says that a fit waits to be judged.
+    ``reason`` explains the state; ``figure`` is the one nearest to its limits, or beyond; ``has_candidate``
+    says that a fit waits to be judged.
     """
 
     name: str
@@ -66,7 +66,6 @@ class Row:
     reason: str = ""
     figure: Figure | None = None
     accepted: str = ""
-    captured: int = 0
     has_candidate: bool = False
 
 
@@ -133,8 +132,3 @@ class CalibrateState:
     def is_busy(self) -> bool:
         """Whether a wizard is being opened, or everything is calibrated."""
         return bool(self.opening.value or self.everything.value)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether every calibration is accepted and none is superseded."""
-        return all(row.state.is_accepted for row in self.rows.value)

@@ -98,29 +98,18 @@ class DemoController:
 
     def scan_live(self) -> None:
         """Start a short scan of the simulated rig; connects it if no rig is connected."""
-        rig = self._rig.state
-        if rig.link.value is Link.OPENING:
-            self._when_open()
-        elif rig.link.value is not Link.OPEN:
+        link = self._rig.state.link
+        if link.value not in (Link.OPEN, Link.OPENING):
             self._rig.connect(LIVE_RIG)
-            self._when_open()
+        if link.value is Link.OPENING:
+            # The request is dropped when the rig cannot be connected.
+            link.changed.once(lambda _: self._start(), lambda now: now is not Link.OPENING)
         else:
             self._start()
 
-    def _when_open(self) -> None:
-        """Start as soon as the rig is connected; drop the request when it cannot be."""
-        link = self._rig.state.link
-
-        def judge(now: Link) -> None:
-            if now is not Link.OPENING:
-                stop()
-            if now is Link.OPEN:
-                self._start()
-
-        stop = link.changed.connect(judge)
-        judge(link.value)
-
     def _start(self) -> None:
+        if self._rig.state.link.value is not Link.OPEN:
+            return
         name = self._rig.state.choice.value.name
         if name != LIVE_RIG.name:
             self._notifier.tell(

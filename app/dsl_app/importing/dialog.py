@@ -35,7 +35,7 @@ class ImportDialog(JobDialog):
     """Follows an `ImportState` whose folder has been checked; the controller imports."""
 
     def __init__(self, state: ImportState, commands: ImportController, parent: QWidget) -> None:
-        super().__init__(commands, parent)
+        super().__init__(commands.start, commands.command_line, parent)
         request = state.request.value
         assert request is not None
         self._state, self._commands = state, commands

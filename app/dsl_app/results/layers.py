@@ -50,7 +50,7 @@ class Layers:
         """The layer of the current view; None where the result has nothing to show."""
         view = state.view.value if state.view.value is not ResultView.CLOUD else state.cloud_by.value
         if view is ResultView.BAND and self.result.has_spectra:
-            return self._band(state.band.value)
+            return self._of_band("reflectance", state.band.value, GREY, "Reflectance")
         if view is ResultView.DEPTH:
             return self._depth(state.depth_limits.value)
         if view is ResultView.QUALITY:
@@ -63,10 +63,11 @@ class Layers:
             self._known[name] = make()
         return self._known[name]
 
-    def _band(self, band: int) -> Layer:
-        cube = self.result["reflectance"]
-        top = self._once("reflectance", lambda: spread_of(cube[:: max(len(cube) // 6, 1)])[1])
-        return Layer(cube[band], (0.0, top), GREY, label="Reflectance")
+    def _of_band(self, name: str, band: int, colours: str, label: str) -> Layer:
+        """A band, with one scale for all bands."""
+        cube = self.result[name]
+        top = self._once(name, lambda: spread_of(cube[:: max(len(cube) // 6, 1)])[1])
+        return Layer(cube[band], (0.0, top), colours, label=label)
 
     def _map(self, name: str, colours: str, label: str) -> Layer:
         values = self.result[name]
@@ -80,10 +81,6 @@ class Layers:
         return Layer(shown, limits, DEPTH, label=whole.label)
 
     def _quality(self, what: QualityMap, band: int) -> Layer | None:
-        names = {
-            QualityMap.SHARE: ("data_share", "Data share"),
-            QualityMap.SPREAD: ("reflectance_std", "Standard deviation of reflectance"),
-        }
         if what is QualityMap.DEPTH_SPREAD:
             return self._map("depth_std_mm", DEPTH, "Standard deviation of depth (mm)")
         if what is QualityMap.FLAGS or not self.result.has_spectra:
@@ -91,14 +88,9 @@ class Layers:
             return layer
         if what is QualityMap.ORDERS:
             return self._orders(band)
-        name, label = names[what]
-        cube = self.result[name]
-        high = (
-            1.0
-            if what is QualityMap.SHARE
-            else self._once(name, lambda: spread_of(cube[:: len(cube) // 6 or 1])[1])
-        )
-        return Layer(cube[band], (0.0, high), SHARE, label=label)
+        if what is QualityMap.SHARE:
+            return Layer(self.result["data_share"][band], (0.0, 1.0), SHARE, label="Data share")
+        return self._of_band("reflectance_std", band, SHARE, "Standard deviation of reflectance")
 
     def _flags(self) -> Layer:
         classes = gravest_flag(self.result["flags"])

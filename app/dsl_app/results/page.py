@@ -222,7 +222,7 @@ class ResultsPage(PageWidget):
 
     def release(self) -> None:
         """Release the graphics and stop following the recent files."""
-        self.welcome.release()
+        super().release()
         if self._graph is not None:
             self._graph.close()
         self.cloud.release()

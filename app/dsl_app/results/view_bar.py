@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtWidgets import QButtonGroup, QFrame, QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
+from PySide6.QtWidgets import QButtonGroup, QFrame, QLabel, QSlider, QToolButton, QWidget
 
 from dsl_app.results.controller import ResultsController
 from dsl_app.results.state import QualityMap, ResultsState, ResultView, Tool
@@ -13,7 +13,7 @@ from dsl_app.shared.evented import follow_any
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, quiet
 from dsl_app.shared.widgets.icons import icon
-from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of
 from dsl_app.shared.widgets.pictures import spread_of
 from dsl_core.optics.relighting import LIGHTS
 
@@ -126,23 +126,16 @@ class ViewBar(QWidget):
         top = row_of(*self.views.values(), 6, line, 6, *self.tools.values(), STRETCH, spacing=4)
         self._light_label, self._cloud_label = QLabel("Light"), QLabel("Colour by")
         self._quality_label = QLabel("Show")
-        depth, colours = QWidget(), QWidget()
-        self._rows = depth, colours
         cloud = (self._cloud_label, self.cloud_by)
         limits = (QLabel("Depth"), self.near, QLabel("to"), self.far, self.automatic)
         light = (self._light_label, self.light, self.adapted)
         quality = (self._quality_label, self.quality)
-        for holder, widgets in ((depth, (*cloud, *limits)), (colours, (*light, *quality, self.nm))):
-            row = QHBoxLayout(holder)
-            row.setContentsMargins(0, 0, 0, 0)
-            row.setSpacing(8)
-            for widget in widgets:
-                row.addWidget(widget)
-            if holder is colours:
-                row.addWidget(self.slider, 1000)
-            row.addStretch(1)
+        depth = row_of(*cloud, *limits, STRETCH, margins=0, spacing=8)
+        colours = row_of(*light, *quality, self.nm, (self.slider, 1000), STRETCH, margins=0, spacing=8)
+        for row in (depth, colours):
             # Both have the same height, so that the picture does not move between views.
             row.addStrut(self.light.sizeHint().height())
+        self._rows = boxed(depth), boxed(colours)
         column_of(top, *self._rows, on=self, margins=0)
 
     def _connect(self) -> None:

@@ -28,8 +28,8 @@ class Welcome(QWidget):
     ) -> None:
         super().__init__()
         self._recent, self._open_path = recent, open_path
-        self.choose = push_button("Open…", "Choose the folder of a result or of a finished scan")
-        self.choose.setProperty("role", "primary")
+        tip = "Choose the folder of a result or of a finished scan"
+        self.choose = push_button("Open…", tip, role="primary")
         self.demo = push_button("Show the demo", "Open a finished scan of the simulated rig", lambda: demo())
         self.files = named(QListWidget(), "Recent files", "Double-click or press Enter to open")
         self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -41,7 +41,7 @@ class Welcome(QWidget):
         buttons = row_of(self.choose, self.demo, STRETCH)
         column_of(label("No result is open", "title"), hint, 6, buttons, 14, self._title, self.files, on=self)
         self.setFixedWidth(WIDTH_PX)
-        self._stop = recent.paths.follow(lambda _: self._fill())
+        self.stops = [recent.paths.follow(lambda _: self._fill())]
 
     def _fill(self) -> None:
         self.files.clear()
@@ -65,10 +65,6 @@ class Welcome(QWidget):
         super().showEvent(event)
         self._fill()
 
-    def release(self) -> None:
-        """Stop following the recent files."""
-        self._stop()
-
 
 class Offer(QWidget):
     """A message in place of a result, with buttons to reconstruct a scan that has none."""
@@ -77,10 +73,8 @@ class Offer(QWidget):
         super().__init__()
         self.message = label("", "muted", wraps=True)
         self.message.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.reconstruct = push_button(
-            "Reconstruct", "Compute depth and spectra from the frames; the result is saved next to the scan"
-        )
-        self.reconstruct.setProperty("role", "primary")
+        tip = "Compute depth and spectra from the frames; the result is saved next to the scan"
+        self.reconstruct = push_button("Reconstruct", tip, role="primary")
         self.otherwise = push_button(
             "With other parameters…", "Choose bands, solver, calibration and name first (Ctrl+R)"
         )

@@ -120,9 +120,8 @@ class RunBox(QGroupBox):
     def __init__(self, state: ScanState, controller: ScanController) -> None:
         super().__init__("Scan")
         self._state, self._controller = state, controller
-        self.start = QPushButton("&Start scan")
-        self.start.setProperty("role", "primary")
-        self.start.setToolTip("Capture all frames of the plan; each is saved before the next is captured")
+        tip = "Capture all frames of the plan; each is saved before the next is captured"
+        self.start = push_button("&Start scan", tip, controller.start)
         self.pause = push_button("&Pause", "Pause before the next frame; nothing is lost", self.toggle_pause)
         self.cancel = push_button("&Cancel", "Stop after the current frame; the scan can be resumed later")
         self.renew = push_button("Plan a &new scan", "Keep the interrupted scan on disk and plan another")
@@ -139,7 +138,6 @@ class RunBox(QGroupBox):
         self._bar = named(QProgressBar(), "Progress of the scan")
         self.remarks = label("", wraps=True)
         self._lay_out()
-        self.start.clicked.connect(controller.start)
         self.cancel.clicked.connect(controller.cancel)
         self.renew.clicked.connect(controller.plan_new_scan)
         self.then.toggled.connect(state.then_reconstruct.set)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 from typing import TypeVar
@@ -16,14 +15,13 @@ from dsl_app.results.state import QualityMap, ResultsState, ResultView
 from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import CalibrationChoice, ScanState, preset_of
 from dsl_app.session.records import ComparePart, ResultsPart, ScanPart, SeriesPart
-from dsl_app.shared.evented import Event, Value
+from dsl_app.shared.evented import Value
 from dsl_core.evaluation.time_sweep import FIGURES
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.result.result_arrays import ResultArrays
 from dsl_core.model.presets import on_cycles
 
 E = TypeVar("E", bound=Enum)
-T = TypeVar("T")
 #: The plan that a page begins with does not need to be restored.
 _FIRST_PLAN = "reference"
 
@@ -64,7 +62,7 @@ def restore_result(part: ResultsPart, control: ResultsController) -> None:
         if (part.light, part.adapted) != (state.light.value, state.adapted.value):
             control.relight(part.light, part.adapted)
 
-    _once(control.opened, look, lambda result: result.path == part.path)
+    control.opened.once(look, lambda result: result.path == part.path)
     control.open(part.path)
 
 
@@ -120,7 +118,7 @@ def restore_comparison(part: ComparePart, control: PairController) -> None:
         if part.second is not None:
             control.open_side(part.second, second=True)
         return
-    _once(control.state.first.changed, then, lambda side: _path(side) == part.first)
+    control.state.first.changed.once(then, lambda side: _path(side) == part.first)
     control.open_side(part.first, second=False)
 
 
@@ -160,14 +158,3 @@ def _set_named(value: Value[E], kind: type[E], name: str) -> None:
     found = _named(kind, name)
     if found is not None:
         value.set(found)
-
-
-def _once(event: Event[T], do: Callable[[T], object], if_: Callable[[T], bool]) -> None:
-    """Call ``do`` for the first event that meets a condition."""
-
-    def judge(now: T) -> None:
-        if if_(now):
-            stop()
-            do(now)
-
-    stop = event.connect(judge)

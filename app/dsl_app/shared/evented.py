@@ -24,6 +24,16 @@ class Event(Generic[T]):
 
         return disconnect
 
+    def once(self, listener: Callable[[T], object], if_: Callable[[T], bool]) -> None:
+        """Call a listener for the first event from now on that meets a condition."""
+
+        def judge(value: T) -> None:
+            if if_(value):
+                stop()
+                listener(value)
+
+        stop = self.connect(judge)
+
     def emit(self, value: T) -> None:
         """Call all current listeners; one that disconnects meanwhile is still called."""
         for listener in tuple(self._listeners):

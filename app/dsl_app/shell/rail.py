@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtWidgets import QButtonGroup, QFrame, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QToolButton, QWidget
 
 from dsl_app.shared.theme import Theme
 from dsl_app.shared.widgets.forms import named
@@ -23,17 +23,14 @@ class Rail(QFrame):
         super().__init__(parent)
         self.setObjectName("rail")
         self._pages = tuple(pages)
-        self._group = QButtonGroup(self)
-        self._group.setExclusive(True)
         self._buttons = {page.key: self._button(page, number) for number, page in enumerate(pages, 1)}
-        for button in self._buttons.values():
-            self._group.addButton(button)
         column_of(*self._buttons.values(), STRETCH, on=self, margins=(0, 6, 0, 6), spacing=2)
 
     def _button(self, page: Page, number: int) -> QToolButton:
         button = QToolButton(self)
         button.setText(page.title)
         button.setCheckable(True)
+        button.setAutoExclusive(True)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
         button.setIconSize(QSize(26, 26))
         button.setFixedWidth(84)

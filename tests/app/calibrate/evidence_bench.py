@@ -11,6 +11,7 @@ from dsl_app.calibrate.evidence.base import Evidence, make_evidence
 from dsl_app.calibrate.evidence.charts import ChartBox
 from dsl_app.calibrate.wizard.state import Fit
 from dsl_app.shared.theme import DARK, LIGHT, Theme
+from PySide6.QtWidgets import QTableWidget
 from pytestqt.qtbot import QtBot
 
 from dsl_core.campaign.session import CalibrationSession
@@ -52,6 +53,12 @@ def bump(centre_nm: float, width_nm: float, peak: float = 1.0, std: float | None
     """A curve with one peak, and the same deviation everywhere."""
     curve = SpectralCurve.of(NM, peak * np.exp(-0.5 * ((NM - centre_nm) / width_nm) ** 2))
     return curve if std is None else curve.model_copy(update={"std": (std,) * len(NM)})
+
+
+def row_texts(table: QTableWidget, row: int) -> list[str]:
+    """The texts of a row."""
+    cells = [table.item(row, column) for column in range(table.columnCount())]
+    return [each.text() if each is not None else "" for each in cells]
 
 
 def items(box: ChartBox, kind: type) -> list[Any]:

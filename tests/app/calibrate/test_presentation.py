@@ -98,7 +98,7 @@ def test_while_everything_runs_it_can_only_be_stopped() -> None:
     ("row", "word", "role"),
     [
         (ROW, "Run…", "muted"),
-        (replace(ROW, state=RowState.BEGUN, captured=2), "Continue…", "warn"),
+        (replace(ROW, state=RowState.BEGUN), "Continue…", "warn"),
         (replace(ROW, state=RowState.GOOD, accepted="2026-03-01T10:20:30+00:00"), "Open…", "good"),
         (
             replace(ROW, state=RowState.GOOD, accepted="2026-03-01T10:20:30+00:00", has_candidate=True),

@@ -90,7 +90,7 @@ def notice(window: MainWindow, asked: list[str]) -> tuple[object, ...]:
         tuple(toast.text for toast in window.toasts.shown),
         tuple(dialog.windowTitle() for dialog in dialogs(window)),
         tuple(asked),
-        tuple(job.number for job in window.parts.runner.active),
+        window.parts.runner.active,
         tuple(dock.isVisible() for dock in (window._log_dock,)),
         len(window.findChildren(Tour)),
         tuple(action.isChecked() for action in window.actions_by_key.values()),

@@ -91,7 +91,7 @@ class BandpassEvidence(Evidence[BandpassCalibration]):
                 draw_points(self.efficiency, nm, ratio, std, colour)
 
 
-def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell | str]:
+def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell]:
     own = [warning for warning in warnings if warning.startswith(f"the filter of {each.filter_nm:g} nm:")]
     found, off = "not found", ""
     if each.found_nm is not None:
@@ -101,11 +101,11 @@ def _row(each: FilterSample, warnings: tuple[str, ...]) -> list[Cell | str]:
     return [
         f"{each.filter_nm:g}",
         f"{each.effective_nm:.1f}",
-        Cell(found, "warn" if own else ""),
-        Cell(off, "warn" if own else ""),
+        (found, "warn" if own else ""),
+        (off, "warn" if own else ""),
         ", ".join(map(_signed, sorted(orders))) or "none",
-        Cell("measured" if each.curve_measured else "nominal", "muted"),
-        Cell(_sentence(own[0].split(": ", 1)[1]), "warn") if own else Cell("as requested", "good"),
+        ("measured" if each.curve_measured else "nominal", "muted"),
+        (_sentence(own[0].split(": ", 1)[1]), "warn") if own else ("as requested", "good"),
     ]
 
 

@@ -222,7 +222,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
         record, view = self._record, self._view
         if record is None:
             return
-        rows: list[list[Cell | str]] = []
+        rows: list[list[Cell]] = []
         for index, patch in enumerate(record.patches):
             measured, expected = ["", "", ""], ""
             if view is not None:
@@ -238,7 +238,7 @@ class ColorCheckerEvidence(Evidence[ColorCheckerCalibration]):
                     *measured,
                     expected,
                     f"{100 * patch.residual:.2f}",
-                    Cell(f"{held:.2f}", "bad" if held > WORST_PERCENT else ""),
+                    (f"{held:.2f}", "bad" if held > WORST_PERCENT else ""),
                 ]
             )
         self.table.fill(rows)

@@ -250,14 +250,14 @@ def _tab(charts: QWidget, below: QWidget | None = None) -> QWidget:
     return boxed(column_of((charts, 3), *(((below, 2),) if below is not None else ()), margins=(0, 8, 0, 0)))
 
 
-def _film_rows(record: DepthStageCalibration, before: Film) -> list[list[Cell | str]]:
+def _film_rows(record: DepthStageCalibration, before: Film) -> list[list[Cell]]:
     return [
         [
             name,
-            Cell(f"{getattr(before, field):.{digits}f}", "muted"),
+            (f"{getattr(before, field):.{digits}f}", "muted"),
             f"{getattr(record.film, field):.{digits}f}",
             f"± {record.film_std[field]:.{digits}f}",
-            Cell(unit, "muted"),
+            (unit, "muted"),
         ]
         for name, field, unit, digits in FILM
     ]

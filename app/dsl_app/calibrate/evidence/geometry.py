@@ -80,7 +80,7 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
 
     def _fill(self, record: GeometryCalibration) -> None:
         rows = {pose.name: _row(pose) for pose in record.poses}
-        rows |= {each.name: [each.name, *[""] * 7, Cell(each.reason, "warn")] for each in record.left_out}
+        rows |= {each.name: [each.name, *[""] * 7, (each.reason, "warn")] for each in record.left_out}
         order = [*(name for name in self._keys if name in rows), *(n for n in rows if n not in self._keys)]
         with quiet(self.table):
             self.table.fill([rows[name] for name in order])
@@ -175,7 +175,7 @@ class GeometryEvidence(Evidence[GeometryCalibration]):
         draw_bars(self.errors, kinds, names, GOOD_RMS_PX, self._theme)
 
 
-def _row(pose: PoseQuality) -> list[Cell | str]:
+def _row(pose: PoseQuality) -> list[Cell]:
     corners = f"{pose.corners}" + (f" ({pose.outliers} off)" if pose.outliers else "")
     return [
         pose.name,
@@ -186,7 +186,7 @@ def _row(pose: PoseQuality) -> list[Cell | str]:
         f"{pose.tilt_deg:.0f}",
         f"{pose.measured.square_mm:.3f} ± {pose.measured.square_std_mm:.3f}",
         f"{pose.measured.plane_rms_mm:.3f}",
-        Cell("used", "good") if pose.used else Cell("does not fit the others", "bad"),
+        ("used", "good") if pose.used else ("does not fit the others", "bad"),
     ]
 
 

@@ -12,6 +12,7 @@ from dsl_app.calibrate.evidence.charts import CHANNELS, ChartBox, channel_curves
 from dsl_app.calibrate.evidence.tables import Cell, NumberTable, with_spread
 from dsl_app.shared.widgets.forms import label
 from dsl_app.shared.widgets.layouts import boxed, column_of
+from dsl_app.shared.widgets.plots import theme_bar
 from dsl_core.model.calibration.spectralon import SpectralonCalibration
 
 HEADS = (
@@ -55,7 +56,7 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         like_a_picture(plot)
         self.bar = pg.ColorBarItem(interactive=False, width=12, colorMap=pg.colormap.get("viridis"))
         self.bar.setImageItem(self.image, insert_in=plot.getPlotItem())
-        self._theme_bar()
+        theme_bar(self.bar, self._theme)
 
     def _lay_out(self) -> None:
         charts = side_by_side(self.emission, self.field)
@@ -64,14 +65,9 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         below = boxed(column_of(title, (self.table, 1), self.words, margins=0))
         column_of(stacked(charts, below, (330, 170)), on=self, margins=0)
 
-    def _theme_bar(self) -> None:
-        for side in ("left", "right") if self.bar is not None else ():
-            axis = self.bar.getAxis(side)
-            axis.setTextPen(self._theme.muted)
-            axis.setPen(self._theme.line)
-
     def _draw_record(self, record: SpectralonCalibration) -> None:
-        self._theme_bar()
+        if self.bar is not None:
+            theme_bar(self.bar, self._theme)
         self.emission.draw(lambda: self._draw_emission(record))
         self.field.draw(lambda: self._draw_field(record))
         self.table.fill(_rows(record))
@@ -101,7 +97,7 @@ class SpectralonEvidence(Evidence[SpectralonCalibration]):
         self.field.item.autoRange(padding=0.01)
 
 
-def _rows(record: SpectralonCalibration) -> list[list[Cell | str]]:
+def _rows(record: SpectralonCalibration) -> list[list[Cell]]:
     white = record.white
     return [
         [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from PySide6.QtGui import QFont
@@ -11,13 +10,8 @@ from PySide6.QtWidgets import QTableWidgetItem
 
 from dsl_app.shared.widgets.read_table import LEFT, RIGHT, ReadTable, cell
 
-
-@dataclass(frozen=True)
-class Cell:
-    """A number or words of a table; ``role`` is text, good, warn, bad or muted."""
-
-    text: str
-    role: str = "text"
+#: A number or words of a table, alone or with its role: text, good, warn, bad or muted.
+Cell = str | tuple[str, str]
 
 
 class NumberTable(ReadTable):
@@ -39,20 +33,15 @@ class NumberTable(ReadTable):
         font.setFeature(QFont.Tag("tnum"), 1)
         self.setFont(font)
 
-    def fill(self, rows: Sequence[Sequence[Cell | str]]) -> None:
+    def fill(self, rows: Sequence[Sequence[Cell]]) -> None:
         """Show other rows, with typographic minus signs."""
         self.show_rows([[self._item(each, i) for i, each in enumerate(row)] for row in rows])
 
-    def _item(self, each: Cell | str, column: int) -> QTableWidgetItem:
-        known = Cell(each) if isinstance(each, str) else each
+    def _item(self, each: Cell, column: int) -> QTableWidgetItem:
+        text, role = (each, "text") if isinstance(each, str) else each
         if column in self._words:
-            return cell(known.text, known.role)
-        return cell(known.text.replace("-", "−"), known.role, RIGHT)
-
-    def row_texts(self, row: int) -> list[str]:
-        """The texts of a row."""
-        found = [self.item(row, column) for column in range(self.columnCount())]
-        return [each.text() if each is not None else "" for each in found]
+            return cell(text, role)
+        return cell(text.replace("-", "−"), role, RIGHT)
 
 
 def with_spread(value: float, std: float) -> str:

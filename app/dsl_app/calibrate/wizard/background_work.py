@@ -36,7 +36,6 @@ MEMORY_S = 3.0
 class Opened:
     """A calibration as it was found on disk."""
 
-    title: str
     statuses: tuple[StepStatus, ...]
     settings: tuple[SettingRow, ...]
     fit: Fit | None
@@ -94,7 +93,7 @@ class BackgroundWork:
         self._session, self._all = session, recipes
         settings = setting_rows(recipe, campaign.info.settings.get(self._name, {}))
         places = self._devices.place is not None
-        return Opened(recipe.title, statuses, settings, self._found(), places)
+        return Opened(statuses, settings, self._found(), places)
 
     def _recipe(self, recipes: Sequence[AnyRecipe]) -> AnyRecipe:
         return next(recipe for recipe in recipes if recipe.name == self._name)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeVar
 
-from dsl_app.calibrate.wizard.state import Doing, Told, WizardState
+from dsl_app.calibrate.wizard.state import Doing, WizardState
 from dsl_app.connection.controller import RIG, RigController
-from dsl_app.shared.jobs.base import Job, JobRunner
+from dsl_app.shared.jobs.base import Job, JobProgress, JobRunner
 from dsl_app.shared.notify import sentence_of
 from dsl_core.errors import DeviceError
 from dsl_core.progress import Progress
@@ -42,7 +43,7 @@ class WizardJobs:
         on_rig = doing in (Doing.LOOKING, Doing.CAPTURING)
         state.trouble.set("")
         state.can_reconnect.set(False)
-        state.progress.set(Told())
+        state.progress.set(JobProgress())
         job: Job[object] = Job(
             f"{state.title}: {title}",
             work,
@@ -75,8 +76,7 @@ class WizardJobs:
     def take_news(self) -> None:
         """Update how far the current job is."""
         if self._job is not None:
-            told = self._job.progress
-            self.state.progress.set(Told(told.stage, told.done, told.total, self._job.remaining_s))
+            self.state.progress.set(replace(self._job.progress, remaining_s=self._job.remaining_s))
 
     def stop(self) -> None:
         """Stop what a person waits for at its next safe point."""

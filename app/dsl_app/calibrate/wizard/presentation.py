@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from dsl_app.calibrate.wizard.state import Doing, Fit, Told, WizardState
+from dsl_app.calibrate.wizard.state import Doing, Fit, WizardState
+from dsl_app.shared.jobs.base import JobProgress
 from dsl_app.shared.notify import describe_seconds
 from dsl_app.shared.widget_state import ButtonState
 from dsl_core.campaign.session import State
@@ -107,7 +108,7 @@ def activity(state: WizardState) -> Activity:
     return Activity(_activity_text(doing, told), True, told.done, told.total)
 
 
-def _activity_text(doing: Doing, told: Told) -> str:
+def _activity_text(doing: Doing, told: JobProgress) -> str:
     if doing is Doing.STOPPING:
         return "stopping at the next safe point"
     parts = [told.stage or doing.value]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_app.shared.evented import Event, Value
+from dsl_app.shared.jobs.base import JobProgress
 from dsl_core.campaign.session import CalibrationSession, StepStatus
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -68,16 +69,6 @@ class SettingRow:
 
 
 @dataclass(frozen=True)
-class Told:
-    """The latest report of what runs; ``total`` 0 means that the end is not known."""
-
-    stage: str = ""
-    done: int = 0
-    total: int = 0
-    remaining_s: float | None = None
-
-
-@dataclass(frozen=True)
 class Seen:
     """A frame as people look at it: RGB, and the share of raw pixels at full scale."""
 
@@ -102,7 +93,7 @@ class WizardState:
         self.is_checking = Value(False)
         self.look: Value[Look | None] = Value(None)
         self.seen: Value[Seen | None] = Value(None)
-        self.progress = Value(Told())
+        self.progress = Value(JobProgress())
         self.trouble = Value("")
         self.can_reconnect = Value(False)
         self.note = Value("")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
@@ -79,7 +78,7 @@ class CalibrationWizard(QDialog):
         self.fit.settings_requested.connect(lambda values: commands.change_settings(values, then_fit=True))
         self.buttons.leave.clicked.connect(self.reject)
         add_help_key(self, HELP)
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             *follow_any(self._show_steps, state.statuses, state.fit),
             state.at.changed.connect(lambda _: self._show_page()),
             state.settings.follow(self.settings.show_settings),
@@ -162,10 +161,9 @@ class PageList(QListWidget):
         row = self.currentRow()
         with quiet(self):
             self.clear()
-            colours = {"good": self._theme.good, "bad": self._theme.bad}
             for line in lines:
                 item = QListWidgetItem(line.text)
-                item.setForeground(QColor(colours.get(line.role, self._theme.text)))
+                item.setForeground(QColor(getattr(self._theme, line.role or "text")))
                 item.setToolTip(line.tip)
                 item.setData(Qt.ItemDataRole.AccessibleTextRole, line.accessible_text)
                 self.addItem(item)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -111,7 +110,7 @@ class PairFigures(QSplitter):
         self.addWidget(self.plot)
         self.addWidget(self.table)
         self.setStretchFactor(0, 1)
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             state.pair.follow(self._show_pair),
             state.cursor.follow(lambda _: self._show_cursor()),
         ]

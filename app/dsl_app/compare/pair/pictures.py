@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -203,7 +202,7 @@ class PairControls(QWidget):
         self.nm, self.readout = label("", "muted"), label("", "muted", name="Values under the cursor")
         row_of(self.shown, self.band, self.nm, STRETCH, self.readout, on=self, margins=0)
         self.band.valueChanged.connect(control.set_band)
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             state.pair.follow(self._show_pair),
             *follow_any(self._show, state.shown, state.band),
             state.cursor.follow(lambda _: self._show_readout()),

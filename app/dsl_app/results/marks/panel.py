@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import QModelIndex, QSize, Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QKeySequence, QPixmap, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -21,7 +21,7 @@ from dsl_app.results.marks.comparison import comparison_html
 from dsl_app.results.marks.controller import MarksController
 from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
-from dsl_app.shared.widgets.forms import label, named, push_button
+from dsl_app.shared.widgets.forms import label, named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
 
 KEY = Qt.ItemDataRole.UserRole
@@ -38,7 +38,6 @@ class MarksPanel(QWidget):
     def __init__(self, state: ResultsState, control: MarksController) -> None:
         super().__init__()
         self._state, self._control, self._theme = state, control, DARK
-        self._filling = False
         self.tree = named(
             QTreeWidget(),
             "Pins, regions and references",
@@ -128,23 +127,24 @@ class MarksPanel(QWidget):
             )
 
     def _fill(self) -> None:
-        self._filling = True
-        self.tree.clear()
-        for mark in self._state.marks.value:
-            item = QTreeWidgetItem([mark.name, where(mark), count(mark)])
-            item.setData(0, KEY, mark.key)
-            item.setIcon(0, self._swatch(mark))
-            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
-            item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
-            if mark.trouble:
-                item.setForeground(1, QColor(self._theme.warn))
-                for i in range(3):
-                    item.setToolTip(i, mark.trouble)
-            item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            self.tree.addTopLevelItem(item)
-        self._filling = False
+        with quiet(self.tree):
+            self.tree.clear()
+            self.tree.addTopLevelItems([self._item(mark) for mark in self._state.marks.value])
         self.hint.setVisible(not self._state.marks.value)
         self._show_selection()
+
+    def _item(self, mark: Mark) -> QTreeWidgetItem:
+        item = QTreeWidgetItem([mark.name, where(mark), count(mark)])
+        item.setData(0, KEY, mark.key)
+        item.setIcon(0, self._swatch(mark))
+        item.setFlags(item.flags() | Qt.ItemFlag.ItemIsEditable | Qt.ItemFlag.ItemIsUserCheckable)
+        item.setCheckState(0, Qt.CheckState.Checked if mark.shown else Qt.CheckState.Unchecked)
+        if mark.trouble:
+            item.setForeground(1, QColor(self._theme.warn))
+            for i in range(3):
+                item.setToolTip(i, mark.trouble)
+        item.setTextAlignment(2, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        return item
 
     def _swatch(self, mark: Mark) -> QIcon:
         picture = QPixmap(14, 14)
@@ -152,7 +152,7 @@ class MarksPanel(QWidget):
         return QIcon(picture)
 
     def _item_changed(self, item: QTreeWidgetItem, column: int) -> None:
-        if self._filling or column != 0:
+        if column != 0:
             return
         key = int(item.data(0, KEY))
         shown = item.checkState(0) == Qt.CheckState.Checked
@@ -165,20 +165,14 @@ class MarksPanel(QWidget):
             self._control.rename(key, item.text(0))
 
     def _selection_changed(self, item: QTreeWidgetItem | None, _before: object) -> None:
-        if not self._filling:
-            self._state.selected.set(0 if item is None else int(item.data(0, KEY)))
+        self._state.selected.set(0 if item is None else int(item.data(0, KEY)))
 
     def _show_selection(self) -> None:
         key = self._state.selected.value
-        self._filling = True
-        for i in range(self.tree.topLevelItemCount()):
-            item = self.tree.topLevelItem(i)
-            if item is not None and item.data(0, KEY) == key:
-                self.tree.setCurrentItem(item)
-                break
-        else:
-            self.tree.setCurrentIndex(QModelIndex())
-        self._filling = False
+        items = [self.tree.topLevelItem(i) for i in range(self.tree.topLevelItemCount())]
+        chosen = [item for item in items if item is not None and item.data(0, KEY) == key]
+        with quiet(self.tree):
+            self.tree.setCurrentItem(chosen[0] if chosen else None)
         self.remove.setEnabled(self._state.selected_mark is not None)
         text = comparison_html(self._state, self._theme)
         self.below.setVisible(bool(text))

@@ -34,7 +34,7 @@ class ReconstructionDialog(JobDialog):
     def __init__(
         self, state: ReconstructionState, control: ReconstructionController, parent: QWidget
     ) -> None:
-        super().__init__(control, parent)
+        super().__init__(control.start, control.command_line, parent)
         source = state.source.value
         assert source is not None
         self._state, self._control, self._source = state, control, source

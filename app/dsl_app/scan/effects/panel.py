@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
@@ -75,7 +74,7 @@ class EffectsPanel(QWidget):
         self.unit.currentIndexChanged.connect(lambda _: self._look())
         self.table.itemChanged.connect(self._ticked)
         self.apply.clicked.connect(lambda: self._controller.apply(self._wanted(), self._chosen_tolerance()))
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             *follow_any(self._show_in_use, state.in_use, state.tolerance),
             state.view.follow(self._show),
             state.busy.follow(lambda _: self._show_state()),

@@ -280,7 +280,6 @@ def _with_errors(scan: MeasuredScan, found: Evaluation) -> MeasuredScan:
         scan,
         rmse=found.mean("rmse"),
         pixel_rmse=math.sqrt(sum(squares) / len(squares)),
-        angle_rad=found.mean("angle_rad"),
         pixel_angle_rad=found.mean("pixel_angle_rad"),
         delta_e=found.mean("delta_e"),
         fwhm_nm=found.mean_fwhm_nm,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractItemView, QFrame, QHeaderView, QWidget
 
@@ -78,7 +76,7 @@ class ForecastPanel(QWidget):
         for box in (self.budget, self.error):
             box.lineEdit().returnPressed.connect(self._ask)
         self._show_wish()
-        self.stops: list[Callable[[], None]] = [
+        self.stops = [
             *follow_any(self._show_points, state.points, state.current),
             *follow_any(self._show_figures, state.measured),
             *follow_any(self._show_note, state.progress, state.trouble, state.refusal),

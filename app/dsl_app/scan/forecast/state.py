@@ -49,7 +49,7 @@ class ForecastPoint:
 class MeasuredScan:
     """Measured figures of a scan; errors are None without a known truth, times on a rig that does not wait.
 
-    ``rmse``, ``angle_rad`` and ``delta_e`` are means over patches, ``pixel_*`` those of single pixels.
+    ``rmse`` and ``delta_e`` are means over patches, ``pixel_*`` those of single pixels.
     """
 
     name: str
@@ -60,7 +60,6 @@ class MeasuredScan:
     computing_s: float | None = None
     rmse: float | None = None
     pixel_rmse: float | None = None
-    angle_rad: float | None = None
     pixel_angle_rad: float | None = None
     delta_e: float | None = None
     fwhm_nm: float | None = None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import logging
 import time
 from collections.abc import Callable
@@ -15,7 +14,6 @@ from dsl_core.progress import CallbackProgress, CancelToken, Progress
 
 T = TypeVar("T")
 _log = logging.getLogger(__name__)
-_numbers = itertools.count(1)
 
 
 class JobState(Enum):
@@ -35,11 +33,12 @@ class JobState(Enum):
 
 @dataclass(frozen=True)
 class JobProgress:
-    """The latest report of a job; ``total`` 0 means that the end is not known."""
+    """The latest report of a job; ``total`` 0 means that the end is not known, nor the time left."""
 
     stage: str = ""
     done: int = 0
     total: int = 0
+    remaining_s: float | None = None
 
 
 @dataclass
@@ -62,7 +61,6 @@ class Job(Generic[T]):
     is_minor: bool = False
     on_accepted: Callable[[], object] | None = None
     on_ended: Callable[[], object] | None = None
-    number: int = field(default_factory=lambda: next(_numbers))
     state: JobState = JobState.WAITING
     progress: JobProgress = JobProgress()
     error: Exception | None = None

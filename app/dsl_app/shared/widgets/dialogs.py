@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontDatabase
@@ -40,25 +39,16 @@ def command_window(command: str, parent: QWidget) -> QDialog:
     return window
 
 
-class JobCommands(Protocol):
-    """What such a dialog asks of its controller."""
-
-    def start(self) -> bool:
-        """Start the work; False when it cannot start."""
-
-    def command_line(self) -> str:
-        """The command that does the same."""
-
-
 class JobDialog(QDialog):
     """Asks for the settings of long work, and closes once that has started.
 
-    Lay out the settings in `column`, then call `close_column`.
+    ``start`` starts it, or returns False; ``command_line`` gives the command that does the same. Lay out the
+    settings in `column`, then call `close_column`.
     """
 
-    def __init__(self, commands: JobCommands, parent: QWidget) -> None:
+    def __init__(self, start: Callable[[], bool], command_line: Callable[[], str], parent: QWidget) -> None:
         super().__init__(parent)
-        self._orders = commands
+        self._start_work = start
         #: Functions that disconnect the dialog from its state when it closes.
         self.stops: list[Callable[[], None]] = []
         self.column = column_of(on=self)
@@ -67,7 +57,7 @@ class JobDialog(QDialog):
         self.go = self.buttons.addButton("", QDialogButtonBox.ButtonRole.AcceptRole)
         self.command = self.buttons.addButton("Show command line", QDialogButtonBox.ButtonRole.ActionRole)
         self.command.setToolTip("Show the command that does the same in a terminal")
-        self.command.clicked.connect(lambda: command_window(commands.command_line(), self).open())
+        self.command.clicked.connect(lambda: command_window(command_line(), self).open())
         self.buttons.accepted.connect(self._start)
         self.buttons.rejected.connect(self.reject)
 
@@ -89,7 +79,7 @@ class JobDialog(QDialog):
         self.go.setEnabled(not trouble and not is_busy)
 
     def _start(self) -> None:
-        if self._orders.start():
+        if self._start_work():
             self.accept()
 
     def done(self, result: int) -> None:

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
 from dsl_core.model.spectral import SpectralCurve
-from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, points, shown
+from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, points, row_texts, shown
 
 
 def order(number: int, ratio: float) -> OrderSample:
@@ -57,12 +57,14 @@ def calibration(**changes: Any) -> BandpassCalibration:
 @pytest.mark.parametrize("theme", THEMES)
 def test_filters_and_efficiency_are_shown_with_deviations(qtbot: QtBot, theme: Theme) -> None:
     widget = shown(qtbot, "bandpass", calibration(), theme=theme)
-    assert widget.table.row_texts(0) == [
+    assert row_texts(widget.table, 0) == [
         "450", "451.0", "451.2 ± 0.6", "+0.2", "−1, +1", "measured", "as requested"
     ]  # fmt: skip
-    assert widget.table.row_texts(1)[2:4] == ["590.0 ± 0.6", "+39.0"]
-    assert widget.table.row_texts(1)[6] == "Its first orders stand where 590 nm belongs; put the right one in"
-    assert widget.table.row_texts(2)[2:4] == ["not found", ""]
+    assert row_texts(widget.table, 1)[2:4] == ["590.0 ± 0.6", "+39.0"]
+    assert (
+        row_texts(widget.table, 1)[6] == "Its first orders stand where 590 nm belongs; put the right one in"
+    )
+    assert row_texts(widget.table, 2)[2:4] == ["not found", ""]
     assert widget.table.item(1, 6).foreground().color().name() == theme.warn
     plus, minus = points(widget.efficiency)
     assert np.allclose(plus, [(451, 0.09), (551, 0.11), (651, 0.13)])
@@ -79,9 +81,9 @@ def test_filters_and_efficiency_are_shown_with_deviations(qtbot: QtBot, theme: T
 def test_without_doubts_no_warning_is_shown(qtbot: QtBot) -> None:
     widget = shown(qtbot, "bandpass", calibration(warnings=()))
     assert not widget.warnings.isVisible()
-    assert widget.table.row_texts(1)[6] == "as requested"
+    assert row_texts(widget.table, 1)[6] == "as requested"
 
 
 def test_a_record_without_deviations_of_filters_is_shown(qtbot: QtBot) -> None:
     widget = shown(qtbot, "bandpass", calibration(filters=(sample(450.0, 451.2, None),)))
-    assert widget.table.row_texts(0)[2] == "451.2"
+    assert row_texts(widget.table, 0)[2] == "451.2"

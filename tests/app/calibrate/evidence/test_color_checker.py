@@ -32,7 +32,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.charts import chart_reflectance
 from dsl_core.progress import NoProgress
 from dsl_core.simulation.sim_devices import open_twin
-from tests.app.calibrate.evidence_bench import THEMES, bars, curves, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, curves, row_texts, shown
 
 CHART = "BabelColor Average"
 #: Where the chart stands in the twin's picture of 222 x 145 pixels.
@@ -104,7 +104,7 @@ def test_chart_patches_and_curves_are_shown(qtbot: QtBot, session: CalibrationSe
     assert before == pytest.approx([0.3 * i for i in range(24)])
     assert held_out == pytest.approx([0.2 * i for i in range(24)])
     assert inside == pytest.approx([0.1 * i for i in range(24)])
-    first, last = widget.table.row_texts(0), widget.table.row_texts(23)
+    first, last = row_texts(widget.table, 0), row_texts(widget.table, 23)
     red, _, _ = (float(part) for part in first[4].split(" / "))
     assert first[0] == "dark skin"
     assert float(first[1].split(" ± ")[0]) == pytest.approx(1.1 * red, rel=0.01)

@@ -23,7 +23,7 @@ from dsl_core.model.calibration.depth_stage import (
 from dsl_core.model.rig import ColumnResidual, CorrespondenceGrid
 from dsl_core.optics.pinhole import project, rays_at
 from dsl_core.simulation.published_rig import published_rig
-from tests.app.calibrate.evidence_bench import THEMES, bars, items, points, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, items, points, row_texts, shown
 
 RIG = published_rig()
 #: alpha, beta, gamma of both orders, the same at every node and wavelength.
@@ -98,7 +98,7 @@ def test_planes_film_and_held_out_errors_are_shown(qtbot: QtBot, theme: Theme) -
     widget = shown(qtbot, "depth-stage", calibration(), SESSION, theme)
     assert bars(widget.planes) == [pytest.approx([0.006, 0.009])]
     assert np.allclose(points(widget.steps)[0], [(600, 0.01), (900, -0.12)])
-    assert widget.film.row_texts(0) == ["Lines", "480.00", "498.50", "± 0.02", "1/mm"]
+    assert row_texts(widget.film, 0) == ["Lines", "480.00", "498.50", "± 0.02", "1/mm"]
     assert bars(widget.held_out) == [
         pytest.approx([0.4, 0.3, 0.2]),
         pytest.approx([0.2, 0.25, 0.1]),

@@ -24,7 +24,7 @@ from dsl_core.model.calibration.geometry import (
     PoseQuality,
 )
 from dsl_core.simulation.published_rig import published_rig
-from tests.app.calibrate.evidence_bench import THEMES, bars, points, session_of, shown
+from tests.app.calibrate.evidence_bench import THEMES, bars, points, row_texts, session_of, shown
 
 FLAT = Flatness(square_mm=20.004, square_std_mm=0.03, plane_rms_mm=0.041)
 LENS = LensDeviation(fx_px=1, fy_px=1, cx_px=1, cy_px=1, distortion=(0, 0, 0, 0, 0))
@@ -81,12 +81,12 @@ def test_every_pose_has_its_corners_bars_and_row(qtbot: QtBot, theme: Theme) -> 
     camera, projector = bars(widget.errors)
     assert camera == pytest.approx([0.1, 0.2, 0.4, 0.5])
     assert projector == pytest.approx([0.2, 0.4, 0.8, 1.0])
-    assert [widget.table.row_texts(row)[0] for row in range(6)] == list(STEPS.values())
-    assert widget.table.row_texts(0) == [
+    assert [row_texts(widget.table, row)[0] for row in range(6)] == list(STEPS.values())
+    assert row_texts(widget.table, 0) == [
         "Pose 1", "4 (1 off)", "0.100", "0.200", "601", "10", "20.004 ± 0.030", "0.041", "used"
     ]  # fmt: skip
-    assert widget.table.row_texts(2)[-1] == "The board was not found."
-    assert widget.table.row_texts(3)[-1] == "does not fit the others"
+    assert row_texts(widget.table, 2)[-1] == "The board was not found."
+    assert row_texts(widget.table, 3)[-1] == "does not fit the others"
     assert widget.diagnosis.text() == "Pose 2 is blurred: focus."
     assert "covered, 25 % of the cells" in widget.coverage.legend.text().replace("&nbsp;", " ")
 

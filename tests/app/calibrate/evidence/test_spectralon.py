@@ -19,7 +19,7 @@ from dsl_core.model.calibration.spectralon import (
 )
 from dsl_core.model.rig import FlatField
 from dsl_core.model.spectral import SpectralCurve
-from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, session_of, shown
+from tests.app.calibrate.evidence_bench import NM, THEMES, bump, curves, row_texts, session_of, shown
 
 EVEN = FlatField(rows_px=(50.0,), columns_px=(80.0,), gain=((1.0,),))
 GAIN = ((0.98, 1.0, 0.98), (1.0, 1.04, 1.0))
@@ -62,7 +62,7 @@ def test_emission_field_and_white_are_shown(qtbot: QtBot, theme: Theme) -> None:
     assert (low, high) == pytest.approx((0.96, 1.04))
     rect = widget.image.mapRectToParent(widget.image.boundingRect())
     assert (rect.left(), rect.top(), rect.width(), rect.height()) == pytest.approx((-40, -50, 240, 200))
-    assert widget.table.row_texts(0) == ["red", "210.0 ± 2.1", "50.00 ± 0.50", "8.000 ± 0.080", "1.0000"]
+    assert row_texts(widget.table, 0) == ["red", "210.0 ± 2.1", "50.00 ± 0.50", "8.000 ± 0.080", "1.0000"]
     assert "1.0020 ± 0.0040, from 16 readings" in widget.words.text()
     assert "701 mm away, tilted by 1.2°" in widget.words.text()
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dsl_app.calibrate.evidence.tables import NumberTable, with_spread
 from pytestqt.qtbot import QtBot
 
+from tests.app.calibrate.evidence_bench import row_texts
+
 
 def test_numbers_are_written_as_people_do(qtbot: QtBot) -> None:
     assert with_spread(210.8184, 0.0204) == "210.818 ± 0.020"
@@ -13,4 +15,4 @@ def test_numbers_are_written_as_people_do(qtbot: QtBot) -> None:
     table = NumberTable("Numbers", [("Name", "Words"), ("Value", "Number")])
     qtbot.addWidget(table)
     table.fill([["a-b", "-1.5"]])
-    assert table.row_texts(0) == ["a-b", "−1.5"]
+    assert row_texts(table, 0) == ["a-b", "−1.5"]

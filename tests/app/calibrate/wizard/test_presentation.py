@@ -15,7 +15,8 @@ from dsl_app.calibrate.wizard.presentation import (
     page_lines,
     step_display,
 )
-from dsl_app.calibrate.wizard.state import Doing, Fit, Look, Told, WizardState
+from dsl_app.calibrate.wizard.state import Doing, Fit, Look, WizardState
+from dsl_app.shared.jobs.base import JobProgress
 
 from dsl_core.campaign.common.recipe import Step
 from dsl_core.campaign.session import CalibrationSession, State, StepStatus
@@ -193,22 +194,22 @@ def test_the_fit_button_and_the_leave_button_follow_the_fit() -> None:
 
 
 def test_the_activity_is_what_runs_else_the_note() -> None:
-    idle = wizard(note="Captured.", progress=Told("old", 3, 4))
+    idle = wizard(note="Captured.", progress=JobProgress("old", 3, 4))
     assert (activity(idle).text, activity(idle).is_busy) == ("Captured.", False)
     looking = wizard(FIRST, doing=Doing.LOOKING, note="Captured.")
     assert (activity(looking).text, activity(looking).is_busy) == ("Captured.", False)
     told = {
-        Told(): "capturing",
-        Told("white"): "white",
-        Told("white", 2, 8): "white · 2 of 8",
-        Told("white", 2, 8, 1.9): "white · 2 of 8",
-        Told("white", 2, 8, 44.0): "white · 2 of 8 · 44 s left",
+        JobProgress(): "capturing",
+        JobProgress("white"): "white",
+        JobProgress("white", 2, 8): "white · 2 of 8",
+        JobProgress("white", 2, 8, 1.9): "white · 2 of 8",
+        JobProgress("white", 2, 8, 44.0): "white · 2 of 8 · 44 s left",
     }
     for progress, text in told.items():
         shown = activity(wizard(FIRST, doing=Doing.CAPTURING, progress=progress))
         assert (shown.text, shown.is_busy) == (text, True)
         assert (shown.done, shown.total) == (progress.done, progress.total)
-    stopping = activity(wizard(FIRST, doing=Doing.STOPPING, progress=Told("white", 2, 8, 44.0)))
+    stopping = activity(wizard(FIRST, doing=Doing.STOPPING, progress=JobProgress("white", 2, 8, 44.0)))
     assert stopping.text == "stopping at the next safe point"
 
 
