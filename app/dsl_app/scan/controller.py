@@ -21,6 +21,7 @@ from dsl_app.shared.undo import UndoStack
 from dsl_core.capture.runner import State, Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError, DriftError, DslError
+from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.calibration_library import CalibrationLibrary
 from dsl_core.io.scan.origin import rig_notes
 from dsl_core.progress import Progress
@@ -257,8 +258,6 @@ class ScanController:
 
     def open(self, path: Path) -> bool:
         """Open a plan, or offer to resume an interrupted scan; False for anything else."""
-        from dsl_core.io import MANIFEST_NAME
-
         if kind_of(path) in (Kind.PLAN, Kind.PATTERNS):
             self.plans.open_plan(path)
             return True
@@ -280,7 +279,6 @@ class ScanController:
 
     def _remember(self, folder: Path) -> bool:
         """Offer to resume a scan that lacks frames; False when there is nothing to resume."""
-        from dsl_core.io import MANIFEST_NAME
         from dsl_core.io.scan.folder import ScanReader
 
         if not (folder / MANIFEST_NAME).is_file():

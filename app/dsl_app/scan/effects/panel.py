@@ -58,7 +58,9 @@ class EffectsPanel(QWidget):
         self._within = label("within", "muted")
         self.apply = QPushButton("Apply")
         self.apply.setToolTip("Reconnect the simulated rig with these effects; its scans record them")
-        self.table = _table()
+        tip = "Tick effects to choose them by name"
+        self.table = ReadTable("Effects of the simulated rig", tip, _COLUMNS)
+        self.table.wrap(len(_COLUMNS) - 1)
         self._summary, self._saved = label("", wraps=True), label("", "muted", wraps=True)
         self._lay_out()
         self._connect()
@@ -176,9 +178,3 @@ def number(value: float) -> str:
     ('0.667', '94731')
     """
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
-
-
-def _table() -> ReadTable:
-    table = ReadTable("Effects of the simulated rig", "Tick effects to choose them by name", _COLUMNS)
-    table.wrap(len(_COLUMNS) - 1)
-    return table
