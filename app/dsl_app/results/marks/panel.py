@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QModelIndex, QSize, Qt
 from PySide6.QtGui import QColor, QGuiApplication, QIcon, QKeySequence, QPixmap, QShortcut
 from PySide6.QtWidgets import (
     QAbstractItemView,
@@ -172,7 +172,7 @@ class MarksPanel(QWidget):
         items = [self.tree.topLevelItem(i) for i in range(self.tree.topLevelItemCount())]
         chosen = [item for item in items if item is not None and item.data(0, KEY) == key]
         with quiet(self.tree):
-            self.tree.setCurrentItem(chosen[0] if chosen else None)
+            self.tree.setCurrentIndex(self.tree.indexFromItem(chosen[0]) if chosen else QModelIndex())
         self.remove.setEnabled(self._state.selected_mark is not None)
         text = comparison_html(self._state, self._theme)
         self.below.setVisible(bool(text))
