@@ -32,8 +32,6 @@ _SCROLL = QStyle.PixelMetric.PM_ScrollBarExtent
 
 # A class has one base of Qt at most, so at run time the mixin is a plain class.
 if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
     _Base = QWidget
 else:
     _Base = object
@@ -208,7 +206,7 @@ def show_label(line: QLabel, state: LabelState) -> None:
     set_role(line, state.role)
 
 
-def show_parts(page: QWidget, view: DataclassInstance) -> None:
+def show_parts(page: QWidget, view: Any) -> None:
     """Draw a record that was decided without Qt: each of its fields on the part of a page with its name.
 
     A plain text is that of a label; a truth value says whether the part can be used.
