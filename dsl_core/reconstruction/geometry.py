@@ -97,11 +97,13 @@ def reconstruct_geometry(
     *,
     refine_columns: bool = True,
     surface_window_px: int | None = None,
+    shared_errors: bool = True,
     device: str = "cpu",
     progress: Progress | None = None,
 ) -> Geometry:
     """Refine decoded columns on the frames of the spectral patterns, triangulate, and fit the surface.
 
+    Deviations leave out what all columns share, unless ``shared_errors`` are wanted.
     ``surface_window_px`` is the window of the plane fits; by default it follows from the image's width.
     """
     shape = code.column.shape
@@ -113,7 +115,7 @@ def reconstruct_geometry(
     lit = _lit(white)
     settled = settle(code, maps, finder, lit, progress)
     waves = wave_std_px(maps.column_px.reshape(shape), maps.refined.reshape(shape), lines)
-    common = math.hypot(rig.column_std_px, _zero_std_px(rig))
+    common = math.hypot(rig.column_std_px, _zero_std_px(rig)) if shared_errors else 0.0
     dq = np.hypot(np.hypot(maps.column_std_px, common), waves.ravel())
     flags = _flags(rig, code, white, maps, settled, lit, profiles is not None)
     good = (flags & int(DEPTH_INVALID)) == 0

@@ -113,9 +113,15 @@ def middle(shape: tuple[int, ...], share: float = 0.5) -> NDArray[np.bool_]:
 
 
 def scanned_geometry(
-    source: FrameSource, rig: Rig, progress: Progress | None = None
+    source: FrameSource, rig: Rig, progress: Progress | None = None, *, shared_errors: bool = True
 ) -> tuple[LineStack, Geometry]:
-    """The lines of a scan with code and lines, and its geometry; raises what a reconstruction raises."""
+    """The lines of a scan with code and lines, and its geometry; raises what a reconstruction raises.
+
+    As in a reconstruction, columns follow the line spread that the scan itself shows. Deviations contain what
+    all its columns have in common where ``shared_errors`` are wanted.
+    """
+    from dsl_core.optics.line_set import LineSet
+    from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.merge import MergedScan, check_source, decode_columns, stack_lines
 
@@ -124,7 +130,10 @@ def scanned_geometry(
     code, white = decode_columns(merged, progress)
     require_light(white.radiance, white.saturated)
     stack = stack_lines(merged, progress)
-    geometry = reconstruct_geometry(rig, plan, code, white, stack, progress=progress)
+    rig = with_own_spread(rig, own_spread(rig, LineSet.of(plan), code, white, stack))
+    geometry = reconstruct_geometry(
+        rig, plan, code, white, stack, shared_errors=shared_errors, progress=progress
+    )
     require_pixels(geometry.flags)
     return stack, geometry
 

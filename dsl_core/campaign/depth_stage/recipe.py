@@ -304,8 +304,7 @@ def _filter_of(note: StageNote) -> StageFilter:
 def zero_order_columns(source: FrameSource, rig: Rig, progress: Progress | None = None) -> ColumnSamples:
     """Tile means of the columns of a scan with code and lines; raises what a reconstruction raises."""
     # What the geometry leaves open is common to neighbouring pixels, and is about to be found.
-    certain = rig.model_copy(update={"column_std_px": 0.0})
-    _, geometry = scanned_geometry(source, certain, progress)
+    _, geometry = scanned_geometry(source, rig, progress, shared_errors=False)
     invalid = (geometry.flags & int(DEPTH_INVALID)) != 0
     return tile_columns(np.where(invalid, np.nan, geometry.column_px), geometry.column_std_px)
 
