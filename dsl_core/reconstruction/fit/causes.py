@@ -7,7 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from dsl_core.model.fit import FitFinding
-from dsl_core.reconstruction.spectral.causes import MOST_GAIN, MOST_SHIFT_PX, Causes, fit_causes, matters
+from dsl_core.reconstruction.spectral.causes import (
+    MOST_GAIN,
+    MOST_SHIFT_PX,
+    SIGMAS,
+    Causes,
+    fit_causes,
+    matters,
+)
+from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion
 from dsl_core.reconstruction.spectral.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.probe import Probe
 
@@ -17,16 +25,29 @@ MOST_BLUR, MOST_TAIL, MOST_DRIFT = 0.03, 0.004, 0.014
 MOST_CHI_SQUARE = 1.5
 #: Said of what spectra already follow.
 CORRECTED = " The spectra of this result are corrected for it."
+#: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
+_MOTIONS = (
+    ("tilted about the horizontal", 2, "°"),
+    ("tilted about the vertical", 2, "°"),
+    ("turned in its plane", 2, "°"),
+    ("bent", 5, "/mm"),
+    ("away from the projector", 2, " mm"),
+)
 _CALIBRATE = "Run the drift check; calibrate again the part that it names."
 
 
-def cause_findings(probe: Probe, corrected: bool | None = None) -> Iterator[FitFinding]:
+def cause_findings(
+    probe: Probe, corrected: bool | None = None, motion: FilmMotion | None = None
+) -> Iterator[FitFinding]:
     """What the probed pixels of a scan say about each part of the model.
 
     ``corrected`` results follow what was found of the orders' light; where that was tried and did not make
-    the frames fit better (False), it is not a finding.
+    the frames fit better (False), it is not a finding. ``motion`` is that of the film, which the model of
+    the probe follows already.
     """
     causes = fit_causes(probe)
+    if motion is not None:
+        yield _motion(motion, probe)
     yield _film(causes, probe)
     for finding in _gains(causes, bool(corrected)):
         refuted = corrected is False and finding.part == "orders"
@@ -51,6 +72,30 @@ def cause_findings(probe: Probe, corrected: bool | None = None) -> Iterator[FitF
         significant=usual > MOST_CHI_SQUARE,
         sentence=f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
         advice=_CALIBRATE,
+    )
+
+
+def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
+    surely = np.abs(motion.values) > SIGMAS * motion.std
+    clauses = [
+        f"{words} by {value:+.{digits}f} ± {std:.{digits}f}{unit}"
+        for (words, digits, unit), value, std, sure in zip(
+            _MOTIONS, motion.values, motion.std, surely, strict=True
+        )
+        if sure
+    ]
+    return FitFinding(
+        part="film",
+        name="movement of the film",
+        value=motion.shift_px,
+        std=motion.shift_std_px,
+        unit="px",
+        limit=LEAST_MOTION_PX,
+        significant=True,
+        sentence=f"The film has moved since the calibration: {', '.join(clauses)}. This displaces wavelengths"
+        f" by {motion.shift_px * probe.nm_per_px:.2f} nm." + CORRECTED,
+        advice="Fix the film and run the drift check, with the Spectralon if possible: a scan cannot tell"
+        " whether the level of the light has changed, too.",
     )
 
 

@@ -35,8 +35,9 @@ def fit_of(
     width_nm = line_width_nm(rig, plan, grid, depth_mm)
     if spectra is not None and width_nm is not None:
         findings += band_findings(grid.step_nm, width_nm, spectra.data_share, spectra.reach)
-    if spectra is not None and spectra.probe is not None:
-        findings += cause_findings(spectra.probe, spectra.corrected)
+    if spectra is not None and spectra.followed is not None:
+        followed = spectra.followed
+        findings += cause_findings(followed.probe, followed.balanced, followed.motion)
     error = None if spectra is None else spectra.error
     return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.probe import PARAMETERS, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.pooled import pool
+from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, PRIOR_STD, Probe
 
 Floats = NDArray[np.float64]
 
@@ -63,17 +64,13 @@ def fit_causes(probe: Probe) -> Causes:
     """Fit all parameters at once; shifts are smooth over the picture, all others equal everywhere."""
     x, y = probe.place[:, 1], probe.place[:, 0]
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], 1)
-    count, rest = len(x), len(PARAMETERS) - 2
+    count, rest = len(x), LEADING - 2
     design = np.zeros((count, len(PARAMETERS), 2 * _TERMS + rest))
     design[:, 0, :_TERMS] = design[:, 1, _TERMS : 2 * _TERMS] = terms
-    design[:, 2:, 2 * _TERMS :] = np.eye(rest)
-    used, weight = probe.sound, probe.weight
-    score = np.einsum("npk,np->nk", design, probe.score)[used] * weight[used, None]
-    normal = np.einsum("npk,npq,nql->nkl", design, probe.normal, design)[used] * weight[used, None, None]
-    prior = np.r_[np.full(2 * _TERMS, PRIOR_STD[0]), PRIOR_STD[2:]] ** -2.0
-    inverse = np.linalg.inv(normal.sum(0) + np.diag(prior))
-    found = inverse @ score.sum(0)
-    covariance = inverse * _excess(score - normal @ found, normal, prior, probe.cell[used])
+    design[:, 2:LEADING, 2 * _TERMS :] = np.eye(rest)
+    prior_std = np.r_[np.full(2 * _TERMS, PRIOR_STD[0]), PRIOR_STD[2:LEADING]]
+    fit = pool(probe, design, prior_std)
+    found, covariance, used = fit.values, fit.covariance, probe.sound
     shift = design[:, :2] @ found
     spread = np.einsum("npk,kl,npl->np", design[:, :2], covariance, design[:, :2])
     # Noise adds its own square to that of the shift.
@@ -93,15 +90,3 @@ def fit_causes(probe: Probe) -> Causes:
         drift=float(found[-1]),
         drift_std=float(np.sqrt(covariance[-1, -1])),
     )
-
-
-def _excess(left: Floats, normal: Floats, prior: Floats, cell: NDArray[np.intp]) -> float:
-    """By how much what cells (n,) ask for scatters more than their noise does: at least 1."""
-    ratios = []
-    for index in np.unique(cell):
-        here = cell == index
-        asked, information = left[here].sum(0), normal[here].sum(0)
-        solved = np.linalg.solve(information + np.diag(prior), asked)
-        known = np.trace(np.linalg.solve(information + np.diag(prior), information))
-        ratios.append(float(asked @ solved) / max(known, 1.0))
-    return max(float(np.mean(ratios)), 1.0)

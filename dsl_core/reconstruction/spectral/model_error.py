@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.probe import CELLS, PARAMETERS, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probe import CELLS, LEADING, PARAMETERS, PRIOR_STD, Probe
 
 Floats = NDArray[np.float64]
 
@@ -56,12 +56,12 @@ def model_error(probe: Probe) -> ModelError:
     for cell in np.unique(probe.cell[probe.sound]):
         here = probe.sound & (probe.cell == cell)
         w = probe.weight[here]
-        information = np.tensordot(w, probe.normal[here], 1)
-        covariance = np.linalg.inv(information + np.diag(np.square(1 / np.array(PRIOR_STD))))
-        asked = covariance @ (w @ probe.score[here])
+        information = np.tensordot(w, probe.normal[here], 1)[:LEADING, :LEADING]
+        covariance = np.linalg.inv(information + np.diag(np.square(1 / np.array(PRIOR_STD[:LEADING]))))
+        asked = covariance @ (w @ probe.score[here])[:LEADING]
         # Noise alone asks for as much as the data know of the parameters.
         by_noise = covariance @ information @ covariance
-        bias = probe.bias[here]
+        bias = probe.bias[here][:, :, :LEADING]
         square = (bias @ asked) ** 2 - SURE * np.einsum("nbp,pq,nbq->nb", bias, by_noise, bias)
         square += (bias[:, :, _PROFILE] @ probe.lines.values) ** 2
         squares[cell], level[cell] = square.sum(0), (probe.reflectance[here] ** 2).sum(0)

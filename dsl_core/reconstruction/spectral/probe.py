@@ -36,11 +36,24 @@ from dsl_core.solve import banded
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: The parameters, in their order: shifts in projector columns, all others relative.
-PARAMETERS = ("shift +1", "shift -1", "gain +1", "gain -1", "blur", "tail", "drift")
+#: The parameters, in their order: shifts in projector columns, stretches (a shift that rises by this many
+#: columns from the middle wavelength to the last), all others relative.
+PARAMETERS = (
+    "shift +1",
+    "shift -1",
+    "gain +1",
+    "gain -1",
+    "blur",
+    "tail",
+    "drift",
+    "stretch +1",
+    "stretch -1",
+)
+#: The first of them that no other one makes up for, in a cell of the picture or over all of it.
+LEADING = 7
 #: What each may be off before any scan is seen, so that fits stay finite. Blur and tails hardly show in the
 #: first orders, where an error of the spectrum's prior looks like them; the zero order tells them far better.
-PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1)
+PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1, 0.5, 0.5)
 #: Cells (rows, columns) that the picture is divided into; pixels in each, one of so many, and their range.
 CELLS, ONE_OF, PIXELS_PER_CELL = (6, 8), 6000, (8, 12)
 #: With fewer pixels nothing is said; so many are worked out at a time.
@@ -76,8 +89,8 @@ class Probe:
     weighted by the noise; ``bias`` (n, b, p) is the error of the stated reflectance for a parameter of one;
     ``reflectance`` (n, b); ``chi_square`` (n,) is reduced; ``correlation`` (n,) is by how much sums of
     neighbouring residuals vary more than independent ones; ``place`` (n, 2) is row and column from -1 to 1,
-    ``cell`` (n,) the cell of `CELLS`. ``lines`` is what the zero order of the same pixels says, and
-    ``nm_per_px`` how far apart columns of the first orders are.
+    ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``lines`` is what the zero
+    order of the same pixels says, and ``nm_per_px`` how far apart columns of the first orders are.
     """
 
     normal: Floats
@@ -88,6 +101,7 @@ class Probe:
     correlation: Floats
     place: Floats
     cell: Indices
+    pixel: Indices
     lines: LineProbe
     nm_per_px: float
 
@@ -133,6 +147,13 @@ def sample_pixels(valid: NDArray[np.bool_], per_cell: int) -> Indices:
     order = np.argsort(cell, kind="stable")
     first = np.searchsorted(cell[order], cell[order])
     return np.sort(inner[order[np.arange(len(order)) - first < per_cell]])
+
+
+def along_bands(model: PixelModel) -> Floats:
+    """Place of each internal band over the reported ones, -1 to 1, which a stretch rises with."""
+    nm = model.bands.centres_nm
+    first, last = nm[model.bands.reported][[0, -1]]
+    return np.asarray((2 * nm - first - last) / (last - first))
 
 
 def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:
@@ -186,6 +207,7 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
         "correlation": _correlation(residual * weight.sqrt(), gather).numpy(),
         "place": np.stack([2 * y / shape[0] - 1, 2 * x / shape[1] - 1], 1),
         "cell": cell_of(y, x, shape),
+        "pixel": targets,
     }
 
 
@@ -324,6 +346,7 @@ class _Light:
         Shape (samples, k, parameters).
         """
         parts = []
+        along = torch.as_tensor(along_bands(self._scan.model), dtype=nodes.dtype)
         for number, light in enumerate(self._orders):
             own = (light.rows @ nodes[..., None])[..., 0]
             kinds = light.changes.shape[1]
@@ -333,6 +356,7 @@ class _Light:
             part[..., number], part[..., 2 + number] = shifted, own
             part[..., 4], part[..., 5] = blurred, tailed
             part[..., 6] = own * light.time
+            part[..., 7 + number] = (light.shifted @ (nodes * along)[..., None])[..., 0]
             parts.append(part)
         zero = torch.zeros_like(parts[0][:, :1])
         lines = self._scan.model.lines

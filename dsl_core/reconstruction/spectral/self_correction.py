@@ -1,25 +1,82 @@
-"""A model that takes over what a scan itself says about the light of the film's orders.
+"""A model that takes over what a scan itself says about the film: its motion, and the light of its orders.
 
-A film that has aged or become dirty since the calibration sends less light into one order than into the
-other. Pixels that both orders reach, and the zero order, tell by how much. What is too small to matter, or
-could be chance, is left as calibrated; so is what does not make the frames fit better. The place of the
-orders is not corrected: a scan cannot tell a film that has moved from one that is bent otherwise, or from a
-line spread that is not symmetric, and the wrong correction makes spectra worse. Deviations hold it instead.
+A film that has slipped since the calibration displaces both first orders as a motion does
+(`dsl_core.reconstruction.spectral.film_motion`). One that has aged or become dirty sends less light into one
+order than into the other. Pixels that both orders reach, and the zero order, tell by how much. What is too
+small to matter, or could be chance, is left as calibrated; so is what does not make the frames fit better.
+Displaced orders that no motion explains stay where they are, and deviations hold them: a scan cannot tell a
+film that is bent otherwise from a line spread that is not symmetric, and the wrong correction makes spectra
+worse.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.causes import Causes
-from dsl_core.reconstruction.spectral.probe import Probe
+from dsl_core.reconstruction.spectral.causes import Causes, fit_causes
+from dsl_core.reconstruction.spectral.film_motion import FilmMotion, fit_motion, moved
+from dsl_core.reconstruction.spectral.probe import Probe, ProbedScan, probe
 
 #: How many deviations the chi-square of pixels has to fall by.
 SURELY = 3.0
+#: Steps towards a film that has moved, and from which displacement of the orders (px) the first one does not
+#: go all the way.
+STEPS, FAR_PX = 2, 0.3
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A model that follows a scan, and what the scan says.
+
+    ``motion`` is that of the film, None where none was found; ``balanced`` whether the light of the orders
+    was taken over (None: nothing asked for it). ``probe`` is what the scan says of the model with the film
+    moved, ``left`` what it says of ``model``.
+    """
+
+    model: PixelModel
+    probe: Probe
+    left: Probe
+    motion: FilmMotion | None = None
+    balanced: bool | None = None
+
+
+def follow(scan: ProbedScan, as_calibrated: bool = False) -> Followed | None:
+    """The model of a scan with what the scan shows of the film taken over; None where it shows nothing.
+
+    With ``as_calibrated`` the model stays as it is.
+    """
+    found = probe(scan)
+    if found is None or as_calibrated:
+        return None if found is None else Followed(scan.model, found, found)
+    model, motion = scan.model, None
+    for _ in range(STEPS):
+        more = fit_motion(replace(scan, model=model), found)
+        if more is None:
+            break
+        better = _tried(replace(scan, model=moved(model, more)), found)
+        if better is None:
+            break
+        model, found = moved(model, more), better
+        motion = more if motion is None else motion.then(more)
+        if more.shift_px < FAR_PX:
+            break
+    balanced = corrected(model, fit_causes(found))
+    if balanced is None:
+        return Followed(model, found, found, motion)
+    left = _tried(replace(scan, model=balanced), found)
+    if left is None:
+        return Followed(model, found, found, motion, balanced=False)
+    return Followed(balanced, found, left, motion, balanced=True)
+
+
+def _tried(scan: ProbedScan, before: Probe) -> Probe | None:
+    """The probe of a scan with another model, None where its frames do not fit that better."""
+    after = probe(scan)
+    return after if after is not None and fits_better(before, after) else None
 
 
 def corrected(model: PixelModel, causes: Causes) -> PixelModel | None:

@@ -22,10 +22,9 @@ from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, 
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
-from dsl_core.reconstruction.spectral.causes import fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
-from dsl_core.reconstruction.spectral.probe import Probe, ProbedScan, probe
-from dsl_core.reconstruction.spectral.self_correction import corrected, fits_better
+from dsl_core.reconstruction.spectral.probe import ProbedScan
+from dsl_core.reconstruction.spectral.self_correction import Followed, follow
 from dsl_core.reconstruction.spectral.solver import Prior, Spectra, solve_spectra
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, TileFrames
 from dsl_core.solve.banded import multiply
@@ -63,8 +62,8 @@ def zero_order_error(rig: Rig, plan: CapturePlan) -> float:
 class SpectralMaps:
     """Cubes (bands, rows, columns) of the reported bands, and maps (rows, columns); NaN where invalid.
 
-    ``probe`` is what the scan says about its model, where it can say anything, ``corrected`` whether the
-    spectra are those of a model that follows it (None: nothing asked for it), and ``error`` what is left.
+    ``followed`` is what the scan says about its model, where it can say anything, and the model that spectra
+    are those of; ``error`` is what is left.
     """
 
     reflectance: NDArray[np.float32]
@@ -73,9 +72,8 @@ class SpectralMaps:
     reach: NDArray[np.uint8]
     at_bound: NDArray[np.bool_]
     chi_square: NDArray[np.float32]
-    probe: Probe | None = None
+    followed: Followed | None = None
     error: ModelError | None = None
-    corrected: bool | None = None
 
     @classmethod
     def empty(cls, bands: int, shape: tuple[int, int]) -> SpectralMaps:
@@ -128,9 +126,10 @@ class SpectralReconstruction:
             self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
         )
         with one_kernel_thread():
-            found = probe(self.probed)
-            left, taken = (found, None) if self._as_calibrated or found is None else self._follow(found)
-            self._error = None if left is None else model_error(left)
+            found = follow(self.probed, self._as_calibrated)
+            if found is not None:
+                self.model, self.bands = found.model, found.model.bands
+                self._error = model_error(found.left)
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
                 list(self._tiles()),
@@ -138,22 +137,11 @@ class SpectralReconstruction:
                 "spectra",
                 progress,
             )
-        return replace(out, probe=found, error=self._error, corrected=taken)
-
-    def _follow(self, found: Probe) -> tuple[Probe, bool | None]:
-        """Take over what a probe says if frames then fit better: what is left, and whether it was taken."""
-        better = corrected(self.model, fit_causes(found))
-        if better is None:
-            return found, None
-        left = probe(replace(self.probed, model=better))
-        if left is None or not fits_better(found, left):
-            return found, False
-        self.model, self.bands = better, better.bands
-        return left, True
+        return replace(out, followed=found, error=self._error)
 
     @property
     def probed(self) -> ProbedScan:
-        """What `probe` needs of the scan, with the model as it is now."""
+        """What a probe needs of the scan, with the model as it is now."""
         return ProbedScan(self.model, self.pixels, self.radiance, self.std, self.prior)
 
     def _tiles(self) -> Iterator[tuple[slice, slice]]:

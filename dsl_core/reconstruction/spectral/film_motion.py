@@ -1,0 +1,150 @@
+"""By how much the film has moved since the calibration, from where a scan's first orders are.
+
+A film that slips in its frame tilts, turns, bends or changes its distance: five numbers move both orders over
+the whole picture, each in its own way over place and wavelength. They are fitted to all probed pixels with
+the calibration as prior, together with gains and profile, which could look alike. A line spread that is not
+symmetric displaces both orders alike and is granted a little of that. Numbers that are not surely off zero
+stay as calibrated, and a motion is one only if it explains pixels that the fit has not seen. The density of
+the film's lines stays: no motion changes it. Of a film bent as no record says, the nearest motion is found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Rig
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.pixel_model import PixelModel
+from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.causes import SIGMAS
+from dsl_core.reconstruction.spectral.pooled import pool
+from dsl_core.reconstruction.spectral.probe import CELLS, LEADING, PARAMETERS, Probe, ProbedScan
+from dsl_core.reconstruction.spectral.probe import PRIOR_STD as PARAMETER_STD
+
+Floats = NDArray[np.float64]
+
+#: What moves, how far (one deviation), and steps of differences.
+FIELDS = ("tilt_x_deg", "tilt_y_deg", "roll_deg", "bend_per_mm", "distance_mm")
+PRIOR_STD = np.array([0.3, 0.3, 0.3, 0.0005, 0.3])
+STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-5, 1e-2])
+#: By how much lines that are not symmetric may displace both orders alike, px.
+LOPSIDED_PX = 0.03
+#: Less displacement of the orders than this (px, root mean square) is no motion that matters.
+LEAST_MOTION_PX = 0.02
+#: Parts that the picture's cells are divided into; each is judged by a fit to the others.
+FOLDS = 4
+#: Fall of chi-square of the pixels held out, over the excess of their scatter, and in deviations over cells.
+LEAST_FALL, FALL_SIGMAS = 25.0, 1.5
+
+
+@dataclass(frozen=True)
+class FilmMotion:
+    """Changes (5,) of `FIELDS` with deviations ``std`` (5,), in their units; 0 where none is sure.
+
+    ``shift_px`` is by how much they displace the first orders at the probed pixels, root mean square, and
+    ``shift_std_px`` its deviation.
+    """
+
+    values: Floats
+    std: Floats
+    shift_px: float
+    shift_std_px: float
+
+    def then(self, more: FilmMotion) -> FilmMotion:
+        """Both motions, the second of which is small and tells how sure all is."""
+        return FilmMotion(self.values + more.values, more.std, self.shift_px, more.shift_std_px)
+
+
+def moved(model: PixelModel, motion: FilmMotion) -> PixelModel:
+    """The model of a rig whose film has moved."""
+    rig = _with_film(model.rig, motion.values)
+    kind = type(model.correspondence)
+    assert issubclass(kind, GratingModel)
+    return PixelModel(rig, model.bands, model.profiles, kind(rig), model.lines)
+
+
+def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
+    """The motion of the film that a probe of a scan tells; None where it tells of none.
+
+    A model without the grating equation has no film that could move.
+    """
+    if not isinstance(scan.model.correspondence, GratingModel):
+        return None
+    effect = _effect(scan, scan.model.correspondence, probe)
+    count = len(FIELDS)
+    fit = pool(probe, *_design(effect))
+    covariance = fit.covariance[:count, :count]
+    std = np.sqrt(np.diag(covariance))
+    # What could be chance helps no pixel, and harms those at the edge of the frame.
+    values = np.where(np.abs(fit.values[:count]) > SIGMAS * std, fit.values[:count], 0.0)
+    shift = effect[probe.sound][:, _SHIFT]
+    spread = np.einsum("nok,kl,nol->no", shift, covariance, shift)
+    shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in ((shift @ values) ** 2, spread))
+    if shift_px < LEAST_MOTION_PX or not _explains(probe, effect):
+        return None
+    return FilmMotion(values, std, shift_px, shift_std_px)
+
+
+def _effect(scan: ProbedScan, correspondence: GratingModel, probe: Probe) -> Floats:
+    """What each of `FIELDS` does to the parameters of the probe, per unit, (n, p, 5)."""
+    nm = scan.model.bands.centres_nm[scan.model.bands.reported]
+    ends = np.array([nm[0], (nm[0] + nm[-1]) / 2, nm[-1]])
+    pixels = torch.as_tensor(probe.pixel)
+    depth = torch.as_tensor(scan.pixels.depth_mm.ravel()[probe.pixel], dtype=torch.float64)
+    effect = np.zeros((len(pixels), len(PARAMETERS), len(FIELDS)))
+    for index, step in enumerate(np.diag(STEPS)):
+        for number, order in enumerate(ORDERS):
+            low, high = (
+                type(correspondence)(_with_film(scan.model.rig, change))
+                .exact(pixels, depth, order, ends)
+                .columns.numpy()
+                for change in (-step, step)
+            )
+            first, middle, last = (high - low) / (2 * STEPS[index])
+            effect[:, _SHIFT[number], index] = (first + middle + last) / 3
+            effect[:, _STRETCH[number], index] = (last - first) / 2
+    return np.nan_to_num(effect)
+
+
+def _design(effect: Floats) -> tuple[Floats, Floats]:
+    """Design (n, p, k) and prior (k,) of a film's numbers, and of what could look like them."""
+    count = effect.shape[2]
+    design = np.zeros((*effect.shape[:2], count + 1 + LEADING - 2))
+    design[..., :count] = effect
+    design[:, _SHIFT, count] = 1.0
+    design[:, 2:LEADING, count + 1 :] = np.eye(LEADING - 2)
+    return design, np.r_[PRIOR_STD[:count], LOPSIDED_PX, PARAMETER_STD[2:LEADING]]
+
+
+def _explains(probe: Probe, effect: Floats) -> bool:
+    """Whether the film's numbers, fitted to some cells of the picture, explain the others surely."""
+    fold = (probe.cell // CELLS[1] + probe.cell % CELLS[1]) % FOLDS
+    fall, excess = np.zeros(CELLS[0] * CELLS[1]), 1.0
+    # Without the film, gains and profile explain a part already.
+    for effects, sign in ((effect, 1), (effect[..., :0], -1)):
+        design, prior = _design(effects)
+        for out in range(FOLDS):
+            fit = pool(probe, design, prior, fold != out)
+            here = probe.sound & (fold == out)
+            asked = design[here] @ fit.values
+            gained = 2 * (asked * probe.score[here]).sum(1)
+            gained -= np.einsum("np,npq,nq->n", asked, probe.normal[here], asked)
+            np.add.at(fall, probe.cell[here], sign * probe.weight[here] * gained)
+            excess = max(excess, fit.excess) if sign > 0 else excess
+    total = float(fall.sum())
+    return total > LEAST_FALL * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))
+
+
+def _with_film(rig: Rig, changes: Floats) -> Rig:
+    now = {
+        name: getattr(rig.film, name) + change for name, change in zip(FIELDS, changes.tolist(), strict=True)
+    }
+    return rig.model_copy(update={"film": rig.film.model_copy(update=now)})
+
+
+_SHIFT = [PARAMETERS.index(name) for name in ("shift +1", "shift -1")]
+_STRETCH = [PARAMETERS.index(name) for name in ("stretch +1", "stretch -1")]
