@@ -94,8 +94,9 @@ def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
         significant=True,
         sentence=f"The film has moved since the calibration: {', '.join(clauses)}. This displaces wavelengths"
         f" by {motion.shift_px * probe.nm_per_px:.2f} nm." + CORRECTED,
-        advice="Fix the film and run the drift check, with the Spectralon if possible: a scan cannot tell"
-        " whether the level of the light has changed, too.",
+        advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
+        " The level of the light may have changed, too, which no scan can tell: the drift check with the"
+        " Spectralon does.",
     )
 
 

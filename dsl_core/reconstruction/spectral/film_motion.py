@@ -22,8 +22,9 @@ from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.causes import SIGMAS
 from dsl_core.reconstruction.spectral.pooled import pool
-from dsl_core.reconstruction.spectral.probe import CELLS, LEADING, PARAMETERS, Probe, ProbedScan
+from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, Probe, ProbedScan
 from dsl_core.reconstruction.spectral.probe import PRIOR_STD as PARAMETER_STD
+from dsl_core.reconstruction.spectral.probed_pixels import CELLS
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ class FilmMotion:
 
 def moved(model: PixelModel, motion: FilmMotion) -> PixelModel:
     """The model of a rig whose film has moved."""
-    rig = _with_film(model.rig, motion.values)
+    rig = with_film(model.rig, motion.values)
     kind = type(model.correspondence)
     assert issubclass(kind, GratingModel)
     return PixelModel(rig, model.bands, model.profiles, kind(rig), model.lines)
@@ -99,7 +100,7 @@ def _effect(scan: ProbedScan, correspondence: GratingModel, probe: Probe) -> Flo
     for index, step in enumerate(np.diag(STEPS)):
         for number, order in enumerate(ORDERS):
             low, high = (
-                type(correspondence)(_with_film(scan.model.rig, change))
+                type(correspondence)(with_film(scan.model.rig, change))
                 .exact(pixels, depth, order, ends)
                 .columns.numpy()
                 for change in (-step, step)
@@ -139,7 +140,8 @@ def _explains(probe: Probe, effect: Floats) -> bool:
     return total > LEAST_FALL * excess and total > FALL_SIGMAS * float(np.linalg.norm(fall))
 
 
-def _with_film(rig: Rig, changes: Floats) -> Rig:
+def with_film(rig: Rig, changes: Floats) -> Rig:
+    """The rig with `FIELDS` of its film changed by as much (5,)."""
     now = {
         name: getattr(rig.film, name) + change for name, change in zip(FIELDS, changes.tolist(), strict=True)
     }

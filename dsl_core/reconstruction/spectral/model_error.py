@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.reconstruction.spectral.probe import CELLS, LEADING, PARAMETERS, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, PRIOR_STD, Probe
+from dsl_core.reconstruction.spectral.probed_pixels import CELLS
 
 Floats = NDArray[np.float64]
 

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from dsl_core.model.line_spread import Spread, stretched
-from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.correspondence import Footprint, like
 from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
@@ -29,12 +28,12 @@ from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
+from dsl_core.reconstruction.spectral.probed_pixels import Indices, cell_of, sample_pixels, samples_of
 from dsl_core.reconstruction.spectral.solver import Prior, band_mean, roughness
 from dsl_core.reconstruction.spectral.tile_frames import Pixels, weighted
 from dsl_core.solve import banded
 
 Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 #: The parameters, in their order: shifts in projector columns, stretches (a shift that rises by this many
 #: columns from the middle wavelength to the last), all others relative.
@@ -54,8 +53,8 @@ LEADING = 7
 #: What each may be off before any scan is seen, so that fits stay finite. Blur and tails hardly show in the
 #: first orders, where an error of the spectrum's prior looks like them; the zero order tells them far better.
 PRIOR_STD = (0.5, 0.5, 0.2, 0.2, 0.1, 0.02, 0.1, 0.5, 0.5)
-#: Cells (rows, columns) that the picture is divided into; pixels in each, one of so many, and their range.
-CELLS, ONE_OF, PIXELS_PER_CELL = (6, 8), 6000, (8, 12)
+#: Pixels probed in each cell: one of so many of the whole picture, and their range.
+ONE_OF, PIXELS_PER_CELL = 6000, (8, 12)
 #: With fewer pixels nothing is said; so many are worked out at a time.
 FEWEST, CHUNK = 40, 48
 #: Steps of the numerical derivatives: columns (px) and blur (share).
@@ -137,18 +136,6 @@ def probe(scan: ProbedScan) -> Probe | None:
     )
 
 
-def sample_pixels(valid: NDArray[np.bool_], per_cell: int) -> Indices:
-    """Flat indices of up to ``per_cell`` pixels of each cell whose eight neighbours are valid, too."""
-    from scipy.ndimage import minimum_filter
-
-    inner = np.flatnonzero(minimum_filter(valid.astype(np.uint8), 3, mode="constant"))
-    inner = np.random.default_rng(0).permutation(inner)
-    cell = cell_of(*np.divmod(inner, valid.shape[1]), valid.shape)
-    order = np.argsort(cell, kind="stable")
-    first = np.searchsorted(cell[order], cell[order])
-    return np.sort(inner[order[np.arange(len(order)) - first < per_cell]])
-
-
 def along_bands(model: PixelModel) -> Floats:
     """Place of each internal band over the reported ones, -1 to 1, which a stretch rises with."""
     nm = model.bands.centres_nm
@@ -164,14 +151,9 @@ def _nm_per_px(scan: ProbedScan, targets: Indices) -> float:
     return float((nm[-1] - nm[0]) / (columns[-1] - columns[0]).abs().mean())
 
 
-def cell_of(rows: Indices, columns: Indices, shape: tuple[int, ...]) -> Indices:
-    """Index of the cell of pixels in a picture of a shape."""
-    return np.asarray(rows * CELLS[0] // shape[0] * CELLS[1] + columns * CELLS[1] // shape[1], np.intp)
-
-
 def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     shape = scan.pixels.valid.shape
-    samples, owner = _samples(targets, shape, scan.model.rig.sensor.bayer)
+    samples, owner = samples_of(targets, shape, scan.model.rig.sensor.bayer)
     light = _Light(scan, samples)
     shading = torch.as_tensor(scan.pixels.shading.ravel()[targets], dtype=torch.float64)
     owners, count = torch.as_tensor(owner), len(targets)
@@ -223,20 +205,6 @@ def _correlation(standard: Tensor, gather: Callable[[Tensor], Tensor]) -> Tensor
         open_ &= rho > 0.02
         factor += 2 * torch.where(open_, rho, 0.0)
     return factor
-
-
-def _samples(targets: Indices, shape: tuple[int, ...], bayer: BayerPattern) -> tuple[Indices, Indices]:
-    """Flat indices of the samples that belong to inner targets, and the number of each one's target."""
-    y, x = np.divmod(targets, shape[1])
-    colour = bayer_colours(bayer, y, x)
-    samples, owner = [], []
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            other = bayer_colours(bayer, y + dy, x + dx)
-            use = np.flatnonzero((other != colour) | (dy == dx == 0))
-            samples.append((y[use] + dy) * shape[1] + x[use] + dx)
-            owner.append(use)
-    return np.concatenate(samples), np.concatenate(owner)
 
 
 @dataclass(frozen=True)
@@ -351,12 +319,13 @@ class _Light:
             own = (light.rows @ nodes[..., None])[..., 0]
             kinds = light.changes.shape[1]
             rows = light.changes.index_select(0, light.index.reshape(-1)).reshape(*light.index.shape, kinds)
-            shifted, blurred, tailed = torch.einsum("slbk,sb->ksl", rows, light.white * nodes)
+            light_of = light.white * nodes
+            shifted, blurred, tailed = torch.einsum("slbk,sb->ksl", rows, light_of)
             part = torch.zeros((*own.shape, len(PARAMETERS)), dtype=own.dtype)
             part[..., number], part[..., 2 + number] = shifted, own
             part[..., 4], part[..., 5] = blurred, tailed
             part[..., 6] = own * light.time
-            part[..., 7 + number] = (light.shifted @ (nodes * along)[..., None])[..., 0]
+            part[..., 7 + number] = torch.einsum("slb,sb->sl", rows[..., 0], light_of * along)
             parts.append(part)
         zero = torch.zeros_like(parts[0][:, :1])
         lines = self._scan.model.lines

@@ -14,6 +14,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.fit.causes import cause_findings
+from dsl_core.reconstruction.spectral.film_motion import FilmMotion
 from dsl_core.reconstruction.spectral.probe import Probe, probe
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
@@ -109,3 +110,17 @@ def test_gains_that_make_no_frame_fit_better_are_not_a_finding(
     assert said[True].parts[:1] == ("orders",)
     assert "corrected for it" in said[True].words
     assert "orders" not in said[False].parts
+
+
+def test_a_film_that_was_followed_is_said_to_have_moved_and_by_how_much(
+    scanned: tuple[DeviceRig, MemoryScan],
+) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    std = np.array([0.1, 0.01, 0.02, 2e-5, 0.02])
+    motion = FilmMotion(np.array([0.0, 0.0, 0.0, 0.0, 0.1]), std, 0.05, 0.01)
+    fit = Fit.of(cause_findings(probed(devices.calibration, scan), motion=motion))
+    assert fit.parts == ("film",)
+    assert "away from the projector by +0.10 ± 0.02 mm" in fit.words
+    assert "tilted" not in fit.words
+    assert "level of the light" in fit.words

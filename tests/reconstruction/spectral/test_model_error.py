@@ -7,7 +7,8 @@ import pytest
 
 from dsl_core.reconstruction.spectral.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.model_error import MARGIN, model_error, neighbour_contrast
-from dsl_core.reconstruction.spectral.probe import CELLS, PARAMETERS, Probe, cell_of, sample_pixels
+from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe
+from dsl_core.reconstruction.spectral.probed_pixels import CELLS
 
 PER_CELL, BANDS, LEVEL = 8, 5, 0.4
 GAIN = PARAMETERS.index("gain +1")
@@ -31,7 +32,7 @@ def made(wrong: float, noise: bool) -> Probe:
     return Probe(
         normal=normal, score=score, bias=bias, reflectance=np.full((count, BANDS), LEVEL),
         chi_square=np.ones(count), correlation=np.ones(count), place=np.zeros((count, 2)), cell=cell,
-        lines=sure, nm_per_px=2.0,
+        pixel=np.arange(count), lines=sure, nm_per_px=2.0,
     )  # fmt: skip
 
 
@@ -51,16 +52,6 @@ def test_the_error_is_linear_between_cells() -> None:
     rows, columns = np.array([5, 5, 5]), np.array([5, 40, 75])
     left, middle, right = error.at(rows, columns, shape)[0]
     assert left > middle > right
-
-
-def test_chosen_pixels_are_spread_over_all_cells_and_have_whole_neighbourhoods() -> None:
-    valid = np.ones((60, 80), bool)
-    valid[:, 40] = False
-    chosen = sample_pixels(valid, 3)
-    rows, columns = np.divmod(chosen, 80)
-    assert (np.bincount(cell_of(rows, columns, valid.shape), minlength=48) == 3).all()
-    assert not np.isin(columns, (0, 39, 40, 41, 79)).any()
-    assert not np.isin(rows, (0, 59)).any()
 
 
 def test_contrast_compares_samples_of_one_colour() -> None:

@@ -1,4 +1,4 @@
-"""Spectra follow the light of the orders where it has changed since the calibration, as the scan shows it."""
+"""Spectra follow a film that has slipped or lost light since the calibration, as the scan shows it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
-from dsl_core.reconstruction.spectral.probe import Probe
+from dsl_core.reconstruction.spectral.film_motion import with_film
 from dsl_core.reconstruction.spectral.self_correction import fits_better
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps, SpectralReconstruction
 from tests.cases.twin_scan import MemoryScan, solver_input, twin_scan
@@ -55,22 +55,41 @@ def test_most_of_the_error_of_a_darker_order_is_taken_back(
 ) -> None:
     rig, scan = scanned
     left, taken = (solved(one_order_brighter(rig), scan, as_calibrated) for as_calibrated in (True, False))
-    assert left.corrected is None
-    assert taken.corrected
+    assert left.followed is not None
+    assert left.followed.balanced is None
+    assert taken.followed is not None
+    assert taken.followed.balanced
+    assert error(taken, right) < 0.5 * error(left, right)
+
+
+def test_a_film_that_has_slipped_is_put_where_it_is(
+    scanned: tuple[Rig, MemoryScan], right: SpectralMaps
+) -> None:
+    rig, scan = scanned
+    slips = np.array([0.0, 0.3, 0.0, 0.0, 0.3])
+    before = with_film(rig, -slips)
+    left, taken = (solved(before, scan, as_calibrated) for as_calibrated in (True, False))
+    assert taken.followed is not None
+    motion = taken.followed.motion
+    assert motion is not None
+    assert (np.abs(motion.values - slips) < 4 * motion.std).all()
+    assert (motion.values[[1, 4]] > 3 * motion.std[[1, 4]]).all()
     assert error(taken, right) < 0.5 * error(left, right)
 
 
 def test_a_film_as_calibrated_changes_nothing(scanned: tuple[Rig, MemoryScan], right: SpectralMaps) -> None:
     found = solved(*scanned, as_calibrated=False)
-    assert not found.corrected
+    assert found.followed is not None
+    assert found.followed.motion is None
+    assert not found.followed.balanced
     assert np.array_equal(found.reflectance, right.reflectance, equal_nan=True)
 
 
 def test_a_model_is_taken_only_if_frames_fit_it_better(
     scanned: tuple[Rig, MemoryScan], right: SpectralMaps
 ) -> None:
-    before = right.probe
-    assert isinstance(before, Probe)
+    assert right.followed is not None
+    before = right.followed.probe
     scatter = 0.3 * np.random.default_rng(0).normal(size=len(before.chi_square))
     less, same = (replace(before, chi_square=before.chi_square + scatter - fall) for fall in (0.2, 0.0))
     assert fits_better(before, less)
@@ -87,4 +106,5 @@ def test_what_both_orders_share_is_left_to_the_responses(
         for order, curve in rig.efficiency.items()
     }
     found = solved(rig.model_copy(update={"efficiency": brighter}), scan, as_calibrated=False)
-    assert not found.corrected
+    assert found.followed is not None
+    assert not found.followed.balanced

@@ -1,0 +1,101 @@
+"""A motion of the film is found in the columns of the orders; what no motion does, or noise, is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.model.plan import CapturePlan, ScanLines
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.film_motion import FIELDS, FilmMotion, fit_motion, with_film
+from dsl_core.reconstruction.spectral.line_probe import LineProbe
+from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe, ProbedScan
+from dsl_core.reconstruction.spectral.probed_pixels import cell_of, sample_pixels
+from dsl_core.reconstruction.spectral.solver import Prior
+from dsl_core.reconstruction.spectral.spectra import model_of_plan
+from dsl_core.reconstruction.spectral.tile_frames import Pixels
+from dsl_core.simulation.published_rig import published_rig
+
+SHAPE, DEPTH_MM = (72, 112), 700.0
+#: What each pixel knows of its parameters, in deviations.
+STD = np.where(np.char.startswith(PARAMETERS, "s"), 0.15, 0.05)
+
+
+@pytest.fixture(scope="module")
+def scan() -> ProbedScan:
+    rig = published_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.resized(SHAPE[1], SHAPE[0])})
+    plan = CapturePlan(spectral=ScanLines(width_px=5, step_px=4))
+    model = model_of_plan(rig, plan, WavelengthGrid(step_nm=10.0), GratingModel(rig))
+    none = np.zeros(SHAPE, np.float32)
+    depth = np.full(SHAPE, DEPTH_MM, np.float32)
+    pixels = Pixels(none, depth, none, none, none, none, none, none, np.ones(SHAPE, bool))
+    return ProbedScan(model, pixels, none[None], none[None], Prior())
+
+
+def probed(asked: dict[str, np.ndarray[tuple[int], np.dtype[np.float64]]], seed: int = 0) -> Probe:
+    """A probe of pixels that ask for parameters (n,), with noise."""
+    pixel = sample_pixels(np.ones(SHAPE, bool), 8)
+    rows, columns = np.divmod(pixel, SHAPE[1])
+    count, p = len(pixel), len(PARAMETERS)
+    wanted = STD * np.random.default_rng(seed).standard_normal((count, p))
+    for name, values in asked.items():
+        wanted[:, PARAMETERS.index(name)] += values
+    normal = np.broadcast_to(np.diag(STD**-2.0), (count, p, p)).copy()
+    return Probe(
+        normal=normal, score=wanted / STD**2, bias=np.zeros((count, 1, p)), reflectance=np.ones((count, 1)),
+        chi_square=np.ones(count), correlation=np.ones(count),
+        place=np.stack([2 * rows / SHAPE[0] - 1, 2 * columns / SHAPE[1] - 1], 1),
+        cell=cell_of(rows, columns, SHAPE), pixel=pixel,
+        lines=LineProbe(np.eye(2)[None], np.zeros((1, 2)), np.ones(1)), nm_per_px=2.0,
+    )  # fmt: skip
+
+
+def displaced(rig: Rig, changes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Probe:
+    """What the pixels ask for when the film has moved: columns at three wavelengths, traced."""
+    pixel = torch.as_tensor(sample_pixels(np.ones(SHAPE, bool), 8))
+    depth = torch.full((len(pixel),), DEPTH_MM, dtype=torch.float64)
+    nm = np.array([440.0, 550.0, 660.0])
+    asked = {}
+    for order in ORDERS:
+        here, there = (
+            GratingModel(each).exact(pixel, depth, order, nm).columns.numpy()
+            for each in (rig, with_film(rig, changes))
+        )
+        first, middle, last = there - here
+        asked[f"shift {order:+d}"] = (first + middle + last) / 3
+        asked[f"stretch {order:+d}"] = (last - first) / 2
+    return probed(asked)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [[0.0, 0.1, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 0.3], [0.0, 0.1, 0.2, 2e-4, 0.2]],
+)
+def test_a_motion_is_found_within_its_deviations(scan: ProbedScan, changes: list[float]) -> None:
+    truth = np.array(changes)
+    found = fit_motion(scan, displaced(scan.model.rig, truth))
+    assert isinstance(found, FilmMotion)
+    off = np.abs(found.values - truth)[found.values != 0] / found.std[found.values != 0]
+    assert (off < 4).all(), dict(zip(FIELDS, found.values, strict=True))
+    assert ((found.values != 0) | (truth < 5 * found.std)).all()
+    assert found.shift_px > 5 * found.shift_std_px
+
+
+def test_noise_is_no_motion(scan: ProbedScan) -> None:
+    assert [fit_motion(scan, probed({}, seed)) for seed in range(8)] == [None] * 8
+
+
+def test_lines_that_are_not_symmetric_are_no_motion(scan: ProbedScan) -> None:
+    both = np.full(8 * 48, 0.04)
+    assert fit_motion(scan, probed({"shift +1": both, "shift -1": both})) is None
+
+
+def test_displacement_of_one_cell_is_no_motion_of_the_film(scan: ProbedScan) -> None:
+    pixel = sample_pixels(np.ones(SHAPE, bool), 8)
+    cell = cell_of(*np.divmod(pixel, SHAPE[1]), SHAPE)
+    assert fit_motion(scan, probed({"shift +1": np.where(cell == 20, 1.5, 0.0)})) is None
