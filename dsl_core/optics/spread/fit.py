@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 REACH_PX = 6.0
 #: Steps in which a curve is stretched, and in which it takes any shape.
 STRETCHINGS, ROUNDS = 3, 4
-#: How often curve and field are fitted in turn.
+#: How often curve and field are fitted in turn, at most.
 FIELD_ROUNDS = 2
 #: A shape that explains the lines so much worse than it first promised has gone astray.
 WORSE = 1.2
@@ -90,7 +90,10 @@ def fit_spread(
         again = None if curve is None else fields.fit(view, curve.response)
         if curve is None or again is None:
             return found
+        settled = not again.matters(varies.width)
         better, varies = curve, again
+        if settled:
+            break
     # Held-out squares of a degree of freedom: a field has few parameters.
     if found.after - better.after < better.after * CLEARLY / better.pixels:
         return found
