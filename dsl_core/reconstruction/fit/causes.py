@@ -48,7 +48,8 @@ def cause_findings(
     causes = fit_causes(probe)
     if motion is not None:
         yield _motion(motion, probe)
-    yield _film(causes, probe)
+    place = _film(causes, probe)
+    yield place.model_copy(update={"significant": place.significant and probe.places})
     for finding in _gains(causes, bool(corrected)):
         refuted = corrected is False and finding.part == "orders"
         yield finding.model_copy(update={"significant": finding.significant and not refuted})

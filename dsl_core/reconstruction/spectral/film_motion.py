@@ -73,7 +73,7 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
 
     A model without the grating equation has no film that could move.
     """
-    if not isinstance(scan.model.correspondence, GratingModel):
+    if not probe.places or not isinstance(scan.model.correspondence, GratingModel):
         return None
     effect = _effect(scan, scan.model.correspondence, probe)
     count = len(FIELDS)

@@ -65,6 +65,9 @@ TAIL_BLUR = 4.0
 ZERO_ERROR = 0.01
 #: Pixels whose chi-square exceeds the usual one by this factor see several surfaces.
 MIXED_FROM = 5.0
+#: A picture less wide than this (share of the distance) is a small piece, and spectra whose shapes differ by
+#: less are of one colour.
+ONE_VIEW, ONE_COLOUR = 0.2, 0.05
 #: Degrees of freedom that a spectrum takes, roughly.
 SPECTRUM = 25
 
@@ -89,7 +92,9 @@ class Probe:
     ``reflectance`` (n, b); ``chi_square`` (n,) is reduced; ``correlation`` (n,) is by how much sums of
     neighbouring residuals vary more than independent ones; ``place`` (n, 2) is row and column from -1 to 1,
     ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``lines`` is what the zero
-    order of the same pixels says, and ``nm_per_px`` how far apart columns of the first orders are.
+    order of the same pixels says, and ``nm_per_px`` how far apart columns of the first orders are. ``places``
+    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
+    looks like a shift.
     """
 
     normal: Floats
@@ -103,6 +108,7 @@ class Probe:
     pixel: Indices
     lines: LineProbe
     nm_per_px: float
+    places: bool = True
 
     @property
     def sound(self) -> NDArray[np.bool_]:
@@ -129,11 +135,20 @@ def probe(scan: ProbedScan) -> Probe | None:
     response = scan.model.response(0.0)
     column = torch.as_tensor(scan.pixels.column_px.ravel()[targets], dtype=torch.float64)
     widths = widths_at(scan.model.rig, torch.as_tensor(targets), column)
+    camera = scan.model.rig.camera
+    wide = camera.width_px / camera.fx_px > ONE_VIEW
     return Probe(
         **together,
+        places=wide or variety(together["reflectance"]) > ONE_COLOUR,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
     )
+
+
+def variety(reflectance: Floats) -> float:
+    """By how much the shapes of spectra (n, bands) differ, as a share of their level: root mean square."""
+    shape = reflectance / np.maximum(reflectance.mean(1, keepdims=True), 0.02)
+    return float(np.sqrt(np.nanmean((shape - np.nanmedian(shape, 0)) ** 2)))
 
 
 def along_bands(model: PixelModel) -> Floats:

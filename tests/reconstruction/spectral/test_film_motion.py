@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -99,3 +101,8 @@ def test_displacement_of_one_cell_is_no_motion_of_the_film(scan: ProbedScan) -> 
     pixel = sample_pixels(np.ones(SHAPE, bool), 8)
     cell = cell_of(*np.divmod(pixel, SHAPE[1]), SHAPE)
     assert fit_motion(scan, probed({"shift +1": np.where(cell == 20, 1.5, 0.0)})) is None
+
+
+def test_a_small_piece_of_one_colour_tells_nothing(scan: ProbedScan) -> None:
+    slipped = displaced(scan.model.rig, np.array([0.0, 0.1, 0.0, 0.0, 0.0]))
+    assert fit_motion(scan, replace(slipped, places=False)) is None
