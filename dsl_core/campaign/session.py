@@ -80,6 +80,7 @@ class CalibrationSession:
         self.based_on = {name: each.accepted for name, each in accepted.items()}
         rig = apply_records(accepted, nominal_rig(devices), before)
         self.bench = Bench(devices, campaign.home(recipe.name), rig)
+        self._stood = self._standing()
         for step in self.steps:
             recover(self._folder(step))
 
@@ -112,11 +113,20 @@ class CalibrationSession:
         if self.devices.place is None:
             return False
         self.devices.place(step.placement)
+        self._stood = self._standing()
         return True
+
+    def _standing(self) -> str:
+        return "" if self.devices.standing is None else self.devices.standing()
+
+    def _place_again(self, step: Step) -> None:
+        """A scan may have come since the target was placed, and have put back what was there before."""
+        if self._stood != self._standing():
+            self.place(step)
 
     def look(self, step: Step) -> tuple[Figure, ...]:
         """Check with a few frames whether the target is right; nothing is kept."""
-        self.place(step)
+        self._place_again(step)
         return self.recipe.look(self.bench, step)
 
     def capture(self, step: Step, progress: Progress | None = None) -> None:
@@ -140,8 +150,7 @@ class CalibrationSession:
         note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
         write_note(folder, note)
         self.campaign.discard(self.recipe.name)
-        # A scan may have come between the look and this, and put back what was there before.
-        self.place(step)
+        self._place_again(step)
         try:
             self.recipe.capture(self.bench, step, progress)
         except CalibrationError as error:

@@ -14,6 +14,7 @@ Every file is written whole or not at all, so that a campaign can be left and co
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -141,7 +142,7 @@ class CampaignFolder:
         if old is not None:
             folder = self.path / "history" / name
             make_folder(folder)
-            replace_record(folder / f"{old.accepted.replace(':', '')}.json", old)
+            replace_record(folder / f"{_as_name(old.accepted)}.json", old)
         fresh = candidate.model_copy(update={"accepted": now()})
         replace_record(self.path / f"{name}.json", fresh)
         self.discard(name)
@@ -161,6 +162,15 @@ class CampaignFolder:
 def _is_unborn(path: Path) -> bool:
     """Whether a file may be left by a campaign that was killed while it was created."""
     return path.name == "lock" or path.name.startswith(CAMPAIGN_NAME)
+
+
+def _as_name(time: str) -> str:
+    """A time as the name of a file; a campaign from elsewhere may hold any text, also a path.
+
+    >>> _as_name("2026-03-01T10:20:30.000400+00:00")
+    '2026-03-01T102030.000400+0000'
+    """
+    return re.sub(r"[^0-9A-Za-z.+-]", "", time).lstrip(".")[:64] or "unknown"
 
 
 def now() -> str:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import stat
+import tokenize
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dsl_core.io.sealed import unseal
 
@@ -33,6 +38,33 @@ def read_json(path: Path) -> Any:
         return json.loads(unseal(read_bounded(path)))
     except RecursionError as error:
         raise ValueError("it is nested too deeply") from error
+
+
+def read_array(path: Path) -> NDArray[Any]:
+    """The array in a NumPy file, never one of Python objects.
+
+    Raises `OSError` as `read_bounded` does, and ``ValueError`` for what is no array or declares more than the
+    file holds, before anything is allocated for it.
+    """
+    size = require_plain(path)
+    with path.open("rb") as file:
+        try:
+            version = np.lib.format.read_magic(file)
+            read_header = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, _, dtype = read_header(file)
+            declared = math.prod(shape) * dtype.itemsize
+            if declared > size:
+                raise ValueError(f"it declares {declared} bytes of values, but has {size} bytes in all")
+            file.seek(0)
+            array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+        except (SyntaxError, TypeError, tokenize.TokenError, OverflowError) as error:
+            # NumPy parses the header as Python, and lets out what the parser says.
+            raise ValueError(f"its header is damaged ({type(error).__name__})") from error
+    return array
 
 
 def require_plain(path: Path) -> int:

@@ -10,6 +10,9 @@ from pydantic import Field, model_validator
 
 from dsl_core.model.base import Record
 
+#: More than any camera or projector has a side, and than anybody takes of one scene in a day.
+MOST_PX, MOST_SHOTS = 65_535, 200_000
+
 
 class GrayCode(Record):
     """Binary reflected Gray code, each bit followed by its inverse, then white, then black.
@@ -162,12 +165,17 @@ class CapturePlan(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        sizes = (*self.camera_size_px, *self.projector_size_px)
+        if not all(0 < size <= MOST_PX for size in sizes):
+            raise ValueError(f"images must have 1 to {MOST_PX} pixels a side")
         if not self.settings:
             raise ValueError("a plan needs at least one setting (exposure and level)")
         if not self.code_settings or any(not 0 <= i < len(self.settings) for i in self.code_settings):
             raise ValueError(
                 f"code_settings {self.code_settings} must name settings 0 to {len(self.settings) - 1}"
             )
+        if self.shot_count > MOST_SHOTS:
+            raise ValueError(f"the plan has {self.shot_count} frames; at most {MOST_SHOTS} are possible")
         return self
 
     def sized(self, camera: Sized, projector: Sized) -> Self:

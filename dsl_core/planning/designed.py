@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
-from dsl_core.io.reading import read_bounded
-from dsl_core.io.records import write_record
-from dsl_core.io.sealed import unseal
+from dsl_core.io.records import read_record, write_record
 from dsl_core.model.base import Record
 from dsl_core.model.plan import Columns
 from dsl_core.resources import resource_path
@@ -61,13 +59,12 @@ def save_design(made: DesignedSet, path: Path, overwrite: bool = False) -> Path:
 
 def load_design(path: Path) -> DesignedSet:
     """Read a set; raises `StoreError`."""
+    remedy = "'dsl-scan design' writes one."
+    made = read_record(path, DesignedSet, remedy, called="The pattern set", fault="cannot be read")
     try:
-        made = DesignedSet.model_validate_json(unseal(read_bounded(path)))
         _ = made.array
-    except (OSError, ValueError, zlib.error) as error:
-        raise StoreError(
-            f"The pattern set {path} cannot be read ({error}). 'dsl-scan design' writes one."
-        ) from error
+    except (ValueError, OverflowError, zlib.error) as error:
+        raise StoreError(f"The pattern set {path} cannot be read ({error}). {remedy}") from error
     return made
 
 

@@ -384,6 +384,9 @@ class Placer:
     def put_back(self) -> None:
         self.done.append("put back")
 
+    def standing(self) -> str:
+        return "target" if self.done[-1:] == ["place"] else "scene"
+
 
 def test_a_rig_that_places_targets_puts_back_what_was_there(
     devices: DeviceRig, campaign: CampaignFolder
@@ -399,9 +402,12 @@ def test_a_rig_that_places_targets_puts_back_what_was_there(
 
 
 def test_a_target_is_placed_again_before_it_is_captured(devices: DeviceRig, campaign: CampaignFolder) -> None:
-    one, hand = session(devices, campaign, FakeRecipe()), Placer()
-    devices.place, devices.put_back = hand.place, hand.put_back
+    hand = Placer()
+    devices.place, devices.put_back, devices.standing = hand.place, hand.put_back, hand.standing
+    one = session(devices, campaign, FakeRecipe())
     one.place(one.steps[0])
+    one.look(one.steps[0])
+    assert hand.done == ["place"]
     hand.put_back()  # as a scan does that comes between
     one.capture(one.steps[0])
     assert hand.done == ["place", "put back", "place"]

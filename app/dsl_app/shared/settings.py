@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 from pathlib import Path
@@ -13,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dsl_app.shared.evented import Value
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import set_aside, write_atomic
+from dsl_core.io.reading import read_json
 
 _log = logging.getLogger(__name__)
 RECENT_COUNT = 12
@@ -102,7 +102,7 @@ def load_settings(path: Path) -> tuple[Settings, str]:
     application from starting.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
     except FileNotFoundError:
         return Settings(), ""
     except (OSError, ValueError) as error:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from collections.abc import Callable
 from dataclasses import fields
 from math import ceil
@@ -40,6 +41,7 @@ from dsl_core.campaign.selftest.survey import Survey, survey
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import CalibrationError, DeviceError, StoreError
 from dsl_core.io.atomic import make_folder, write_atomic
+from dsl_core.io.reading import require_plain
 from dsl_core.progress import Progress
 
 SEED = 20240617
@@ -140,6 +142,15 @@ def _unit(cycle: Cycle) -> float:
     return ceil(_UNIT_MS / cycle.period_ms.value) * cycle.period_ms.value
 
 
+#: More than all frames of a self-test take, bytes.
+_MOST_BYTES = 1 << 30
+#: What NumPy and zlib raise for an archive that is damaged or made up.
+_FAILURES = (
+    *(OSError, ValueError, KeyError, EOFError, TypeError, IndexError, AttributeError),
+    *(MemoryError, RecursionError, NotImplementedError, zipfile.BadZipFile, zlib.error),
+)
+
+
 def save_capture(capture: SelfTestCapture, folder: Path) -> Path:
     """Write the archive into a folder, which is made if need be; raises `StoreError`."""
     arrays: dict[str, Any] = {
@@ -163,12 +174,16 @@ def load_capture(folder: Path) -> SelfTestCapture:
     """Read the archive of a folder; raises `StoreError` when it is missing, damaged or of another version."""
     path = folder / ARCHIVE_NAME
     try:
+        require_plain(path)
+        with zipfile.ZipFile(path) as archive:
+            if sum(each.file_size for each in archive.infolist()) > _MOST_BYTES:
+                raise ValueError("it unpacks to more than any self-test")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
             about = json.loads(str(stored["about"]))
             if about["version"] != _VERSION:
                 raise ValueError(f"version {about['version']} instead of {_VERSION}")
             return _unpacked({name: stored[name] for name in stored.files}, about)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except _FAILURES as error:
         raise StoreError(
             f"{path} is missing, damaged or of another version ({error}). Capture the self-test again."
         ) from error

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from dsl_core.errors import CalibrationError
 from dsl_core.io.published.layout import FileRecord
 from dsl_core.io.published.stereo import Size, Stereo, load_stereo, save_stereo
+from dsl_core.io.reading import read_array
 from dsl_core.io.staging import staged
 from dsl_core.model.rig import Provenance, Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve, WavelengthGrid
@@ -230,7 +231,7 @@ def _load(folder: Path, name: str) -> list[SpectralCurve]:
 
 def _open(path: Path) -> NDArray[np.generic]:
     try:
-        table = np.load(path, allow_pickle=False)
+        table = read_array(path)
     except (OSError, ValueError, EOFError) as error:
         raise CalibrationError(f"{path} is not an array that NumPy can read ({error}).") from error
     if not isinstance(table, np.ndarray) or table.dtype.kind not in "iuf":

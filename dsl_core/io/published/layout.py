@@ -26,7 +26,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from dsl_core.model.plan import CapturePlan, Role, Setting
+from dsl_core.io.reading import require_plain
+from dsl_core.model.plan import MOST_PX, CapturePlan, Role, Setting
 
 #: ``optional`` is what is not there and need not be.
 Status = Literal["ok", "missing", "optional", "misnamed", "wrong size", "wrong type", "unreadable", "extra"]
@@ -230,6 +231,7 @@ def _loss(role: Role) -> str:
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _END = b"\0\0\0\0IEND\xaeB`\x82"
+_MOST_PIXELS = 200_000_000
 _CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 
 
@@ -246,9 +248,10 @@ class PngInfo:
 def probe_png(path: Path) -> PngInfo | str:
     """The header of a PNG (specification, 11.2), undecoded, or in words why the file is not a whole one."""
     try:
+        size = require_plain(path)
         with path.open("rb") as file:
             head = file.read(33)
-            file.seek(max(path.stat().st_size - len(_END), 0))
+            file.seek(max(size - len(_END), 0))
             tail = file.read()
     except OSError as error:
         return f"cannot be read ({error.strerror})"
@@ -257,4 +260,6 @@ def probe_png(path: Path) -> PngInfo | str:
     if tail != _END:
         return "is cut off"
     width, height, bits, colour = struct.unpack(">IIBB", head[16:26])
+    if not (0 < width <= MOST_PX and 0 < height <= MOST_PX and width * height <= _MOST_PIXELS):
+        return f"declares {width} x {height} px, which no camera has"
     return PngInfo(width, height, bits, _CHANNELS.get(colour, 0))

@@ -9,6 +9,7 @@ coordinates, ``x_p = R x_c + t``; the unit of ``t`` is that of the calibration b
 from __future__ import annotations
 
 import difflib
+import re
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.io.reading import read_bounded
 from dsl_core.io.staging import staged
 from dsl_core.model.base import Record, problems_in_words
 from dsl_core.model.calibration.geometry import GeometryCalibration
@@ -24,6 +26,11 @@ from dsl_core.model.geometry import Lens, Pose
 
 Dialect = Literal["dsl", "procam", "moreno-taubin"]
 Size = tuple[int, int]
+#: A calibration takes a few kilobytes, is nested three deep, and holds matrices of at most 14 numbers.
+_MOST_BYTES, _MOST_NESTED, _MOST_INDENT = 1 << 20, 20, 200
+#: What begins or ends a level in XML, YAML and JSON; declarations, comments and empty elements do neither.
+_NESTING = re.compile(rb"</?[A-Za-z_][^<>]*(?<!/)>|[\[\]{}]")
+_DECLARED = re.compile(rb"(?:rows|cols)\W{1,9}([0-9]+)")
 
 _PROCAM = {
     "camera matrix": "cam_int",
@@ -154,6 +161,7 @@ def _read_nodes(path: Path) -> dict[str, Any]:
 
     if not path.is_file():
         raise CalibrationError(f"{path} does not exist. Give the path of the calibration's XML or YAML file.")
+    _require_modest(path)
     try:
         file = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         names = file.root().keys()
@@ -165,6 +173,25 @@ def _read_nodes(path: Path) -> dict[str, Any]:
         raise CalibrationError(
             f"{path} is not a calibration that OpenCV can read: it is cut off, or not OpenCV's XML or YAML."
         ) from error
+
+
+def _require_modest(path: Path) -> None:
+    """Refuse what would crash OpenCV: it nests without limit, and allocates whatever is declared."""
+    try:
+        text = read_bounded(path, _MOST_BYTES)
+    except OSError as error:
+        raise CalibrationError(f"{path} cannot be read ({error.strerror or error}).") from error
+    depth = deepest = 0
+    for token in _NESTING.findall(text):
+        depth += 1 if token[:1] in b"[{" or (token[:1] == b"<" and token[1:2] != b"/") else -1
+        deepest = max(deepest, depth)
+    indented = max((len(found) for found in re.findall(rb"^[ \t-]+", text, re.MULTILINE)), default=0)
+    counts = [number for number in _DECLARED.findall(text) if len(number) > 4]
+    if deepest > _MOST_NESTED or indented > _MOST_INDENT or counts:
+        raise CalibrationError(
+            f"{path} is not the calibration of a camera and a projector: it is nested too deeply, or declares"
+            " matrices that are too large. Export the calibration again."
+        )
 
 
 def _dialect_of(nodes: dict[str, Any], path: Path) -> Dialect:

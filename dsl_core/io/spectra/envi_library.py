@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.reading import read_bounded, require_plain
 
 Floats = NDArray[np.float64]
 LIBRARY = "envi spectral library"
@@ -26,7 +27,10 @@ _KINDS = {
 }
 _NANOMETRES = {"nanometers": 1.0, "nanometres": 1.0, "nm": 1.0, "micrometers": 1e3, "micrometres": 1e3}
 _NANOMETRES |= {"um": 1e3, "µm": 1e3, "μm": 1e3, "microns": 1e3}
-_FIELD = re.compile(r"^[ \t]*([^=;{}\n]+?)[ \t]*=[ \t]*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
+#: Without repetitions within each other: the time stays in proportion to the length, whatever the text.
+_FIELD = re.compile(r"^([^=;{}\n]+)=[ \t]*(\{[^{}]*\}|[^\n]*)", re.MULTILINE)
+#: Digits of a whole number, and values of a library, that no instrument reaches.
+_MOST_DIGITS, _MOST_VALUES = 12, 100_000_000
 #: Below this no instrument measures: such values mark what was deleted, as -1.23e34 does in many libraries.
 DELETED_BELOW = -1e30
 #: Reflectance above this can only be a percentage, above a hundred times this only a count of unstated scale.
@@ -75,15 +79,17 @@ def _pair(path: Path) -> tuple[Path, Path]:
 def _read_header(path: Path) -> dict[str, str]:
     """The fields of a header by their names in small letters, lists with their commas but without braces."""
     try:
-        content = path.read_bytes()
+        content = read_bounded(path)
     except OSError as error:
-        raise CalibrationError(f"The header {path} cannot be read ({error}). Correct its path.") from error
+        raise CalibrationError(
+            f"The header {path} cannot be read ({error.strerror or error}). Correct its path."
+        ) from error
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
     text = text.replace("\r\n", "\n")
-    return {key.lower(): value.strip().strip("{}").strip() for key, value in _FIELD.findall(text)}
+    return {key.strip().lower(): value.strip().strip("{}").strip() for key, value in _FIELD.findall(text)}
 
 
 def _read_data(path: Path, data: Path, header: Mapping[str, str]) -> Floats:
@@ -98,11 +104,15 @@ def _read_data(path: Path, data: Path, header: Mapping[str, str]) -> Floats:
     dtype = np.dtype(kind).newbyteorder(">" if header.get("byte order", "0") == "1" else "<")
     offset, wanted = _whole(path, header, "header offset", 0), bands * spectra
     try:
-        there = (data.stat().st_size - offset) // dtype.itemsize
+        there = (require_plain(data) - offset) // dtype.itemsize
         if there < wanted:
             raise CalibrationError(
                 f"{data.name} is cut off: {spectra} spectra of {bands} bands are {wanted} values, but it"
                 f" contains {max(there, 0)}. Copy it again."
+            )
+        if wanted > _MOST_VALUES:
+            raise CalibrationError(
+                f"{path.name} declares {wanted} values; at most {_MOST_VALUES} are read. Split the library."
             )
         values = np.fromfile(data, dtype, wanted, offset=offset)
     except OSError as error:
@@ -112,9 +122,9 @@ def _read_data(path: Path, data: Path, header: Mapping[str, str]) -> Floats:
 
 def _whole(path: Path, header: Mapping[str, str], key: str, default: int | None = None) -> int:
     text = header.get(key, "" if default is None else str(default))
-    if not text.isdecimal() or (default is None and int(text) == 0):
+    if not text.isdecimal() or len(text) > _MOST_DIGITS or (default is None and int(text) == 0):
         raise CalibrationError(
-            f"{path.name}: a whole number is needed as {key!r}; the header says {text or 'nothing'!r}."
+            f"{path.name}: a whole number is needed as {key!r}; the header says {text[:40] or 'nothing'!r}."
             " Correct the header."
         )
     return int(text)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.reading import read_bounded
 from dsl_core.io.spectra.envi_library import read_library
 from dsl_core.io.spectra.spectrum_file import read_spectrum
 from dsl_core.model.spectral import SpectralCurve
@@ -64,20 +65,23 @@ def read_reference(path: Path, name: str = "") -> SpectralCurve:
 def _is_table(path: Path) -> bool:
     """Whether this program wrote a table; only its names tell spectra from their deviations."""
     try:
-        with path.open(encoding="utf-8-sig", errors="replace") as file:
-            head = next((line for line in file if not line.startswith("#")), "")
+        head = next(iter(_lines(path)), "")
     except OSError:
         return False
     return head.startswith(f"{WAVELENGTH},") and MEAN in head
 
 
+def _lines(path: Path) -> list[str]:
+    """The lines of a table without what it says of itself; raises `OSError`."""
+    text = read_bounded(path).decode("utf-8-sig", errors="replace")
+    return [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
+
+
 def _read_table(path: Path) -> ReferenceFile:
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        lines = [line for line in file if not line.startswith("#")]
-    head, *rows = csv.reader(lines)
     try:
+        head, *rows = csv.reader(_lines(path))
         cells = np.array([[float(cell or "nan") for cell in row] for row in rows]).reshape(-1, len(head))
-    except ValueError as error:
+    except (ValueError, csv.Error) as error:
         raise CalibrationError(
             f"{path.name}: a cell is not a number ({error}). Export the table again."
         ) from error

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dsl_core.errors import CalibrationError
+from dsl_core.io.reading import read_bounded
 from dsl_core.model.spectral import SpectralCurve
 
 #: What radiance is kept in.
@@ -37,9 +38,11 @@ def read_spectrum(
     and quantities that are not radiance.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig", errors="replace")
+        text = read_bounded(path).decode("utf-8-sig", errors="replace")
     except OSError as error:
-        raise CalibrationError(f"The spectrum {path} cannot be read ({error}). Correct its path.") from error
+        raise CalibrationError(
+            f"The spectrum {path} cannot be read ({error.strerror or error}). Correct its path."
+        ) from error
     header, rows, numbers = _split(text)
     if len(rows) < MIN_ROWS:
         raise CalibrationError(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from dsl_core import __version__
 from dsl_core.errors import StoreError
 from dsl_core.io.atomic import write_atomic
+from dsl_core.io.reading import read_json
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
 
@@ -33,7 +34,7 @@ class ForecastStore:
         self._known: dict[str, dict[str, object]] = {}
         self._is_changed = False
         try:
-            content = json.loads(self._path.read_bytes())
+            content = read_json(self._path)
             self._known = {str(key): dict(value) for key, value in content.items()}
         except FileNotFoundError:
             pass
