@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.capture.preflight import fit_plan, require_possible
+from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.runner import Runner, Status
 from dsl_core.capture.sink import Watch, WatchedSink
 from dsl_core.devices.base import DeviceRig
@@ -21,7 +22,7 @@ from dsl_core.evaluation import summary
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.evaluation.report.scan_report import ReportContent, render_report
 from dsl_core.evaluation.summary import Evaluation, Truth
-from dsl_core.io.scan.folder import ScanWriter
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.staging import write_text
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
@@ -49,15 +50,22 @@ def open_scan(
     notes: dict[str, str] | None = None,
     token: CancelToken | None = None,
     watch: Watch | None = None,
+    prove: bool = True,
 ) -> Iterator[Runner]:
     """A runner over a scan's folder, for callers that pause, cancel or listen; ``watch`` sees every frame.
 
-    An interrupted scan resumes at its next missing frame.
+    An interrupted scan resumes at its next missing frame. Pictures that do not show their pattern are
+    captured again, unless ``prove`` is off, as for cameras that can only repeat what they gave before.
     """
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
         sink = WatchedSink(writer, watch) if watch else writer
-        yield Runner(rig, plan, sink, pattern_image, progress=progress, token=token)
+        camera = rig.camera.info
+        proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer) if prove else None
+        stored = ScanReader(folder)
+        yield Runner(
+            rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored
+        )
 
 
 def scan(
@@ -66,9 +74,10 @@ def scan(
     folder: Path,
     progress: Progress | None = None,
     notes: dict[str, str] | None = None,
+    prove: bool = True,
 ) -> Status:
     """Capture a plan into a folder; an interrupted scan resumes at its next missing frame."""
-    with open_scan(rig, plan, folder, progress, notes) as runner:
+    with open_scan(rig, plan, folder, progress, notes, prove=prove) as runner:
         return runner.run()
 
 

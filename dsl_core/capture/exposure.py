@@ -63,13 +63,21 @@ class ShotTaker:
         self._last: Frame | None = None
         self._noiseless = False
 
-    def take(self, shot: Shot) -> Frame:
-        """The frame of a shot; raises `DeviceError` when all attempts failed, or `Cancelled`."""
+    def take(self, shot: Shot, earlier_rounds: int = 0, settle_ms: float = 0.0) -> Frame:
+        """The frame of a shot; raises `DeviceError` when all attempts failed, or `Cancelled`.
+
+        ``earlier_rounds`` counts how often it was taken before in vain: then the pattern is sent again, and
+        ``settle_ms`` waited until the exposure.
+        """
+        if earlier_rounds:
+            self._shown = None
         before = self._last
         twins: list[Frame] = []
+        first = earlier_rounds * self._policy.attempts
         for attempt in range(self._policy.attempts):
             try:
-                frame = replace(self._attempt(shot, attempt), attempts=attempt + 1)
+                frame = self._attempt(shot, first + attempt, settle_ms)
+                frame = replace(frame, attempts=first + attempt + 1)
             except DeviceError as error:
                 self._recover(shot, attempt, error)
                 continue
@@ -96,8 +104,10 @@ class ShotTaker:
         self._shown = None
         self._rig.projector.show(np.zeros((info.height_px, info.width_px), np.uint8))
 
-    def _attempt(self, shot: Shot, attempt: int) -> Frame:
+    def _attempt(self, shot: Shot, attempt: int, settle_ms: float) -> Frame:
         self._set(shot)
+        if settle_ms:
+            self._sleep(settle_ms / 1000.0)
         self._rig.camera.prepare(shot.index, attempt)
         frame = self._rig.camera.snap(shot.exposure_ms + self._policy.timeout_ms)
         self._check(frame)

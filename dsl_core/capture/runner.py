@@ -15,9 +15,11 @@ from enum import StrEnum
 
 from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.preflight import require_possible
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.proven import ProvenShots
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, DslError, StoreError
-from dsl_core.model.frames import FrameSink
+from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken, NoProgress, Progress
 
@@ -45,6 +47,7 @@ class Status:
     """A moment of a scan; ``done`` counts saved frames, those of earlier runs included.
 
     ``elapsed_s`` is the time spent running, pauses left out; ``remaining_s`` is estimated from it.
+    ``corrected`` counts shots that were taken again because a picture did not show their pattern.
     """
 
     state: State
@@ -54,6 +57,7 @@ class Status:
     elapsed_s: float = 0.0
     remaining_s: float = 0.0
     message: str = ""
+    corrected: int = 0
 
 
 Listener = Callable[[Status], None]
@@ -76,16 +80,24 @@ class Runner:
         pattern_image: PatternImage,
         *,
         policy: RetryPolicy | None = None,
+        proof: FrameProof | None = None,
+        stored: FrameSource | None = None,
         progress: Progress | None = None,
         token: CancelToken | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time."""
+        """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time.
+
+        With ``proof`` every picture is judged, and taken again if it does not show its pattern; ``stored``
+        has the frames of earlier runs, from which it learns.
+        """
         self._rig = rig
         self._plan = plan
         self._sink = sink
         self._token = token or CancelToken()
         self._taker = ShotTaker(rig, plan, pattern_image, policy or RetryPolicy(), self._token)
+        self._shots = ProvenShots(self._taker, proof, sink, self._token)
+        self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
         self._status = Status(State.IDLE, total=plan.shot_count)
@@ -130,7 +142,10 @@ class Runner:
         try:
             self._set(State.CHECKING)
             require_possible(self._rig, self._plan)
-            self._take_all(list(self._sink.missing()))
+            missing = list(self._sink.missing())
+            if self._stored is not None:
+                self._shots.learn(self._stored, {shot.index for shot in missing})
+            self._take_all(missing)
             self._complete()
         except (Cancelled, KeyboardInterrupt) as error:
             self._end(
@@ -144,7 +159,7 @@ class Runner:
         except BaseException as error:
             self._end(State.FAILED, f"{type(error).__name__}: {error}")
             raise
-        self._end(State.FINISHED, f"All {self._plan.shot_count} frames are saved.")
+        self._end(State.FINISHED, f"All {self._plan.shot_count} frames are saved.{self._shots.note}")
         return self._status
 
     def _take_all(self, missing: list[Shot]) -> None:
@@ -153,11 +168,10 @@ class Runner:
         for shot in missing:
             self._between_shots(shot, done)
             self._set(State.RUNNING, shot=shot, done=done)
-            frame = self._taker.take(shot)
-            self._sink.write(shot, frame)
+            self._shots.take(shot)
             self._pace.passed(shot)
             done += 1
-            self._set(State.RUNNING, shot=shot, done=done)
+            self._set(State.RUNNING, shot=shot, done=done, corrected=self._shots.corrected)
             self._report(done)
 
     def _complete(self) -> None:

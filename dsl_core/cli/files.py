@@ -88,13 +88,20 @@ def _print_files(output: Output, kind: str, records: Sequence[FileRecord]) -> No
 
 def info(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="A scan, result, rig or plan.")],
-    verify: Annotated[bool, typer.Option("--verify", help="Also read every frame of a scan.")] = False,
+    verify: Annotated[
+        bool,
+        typer.Option(
+            "--verify", help="Also read every frame of a scan, and say which do not show their pattern."
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Show what a folder or file contains and whether it is complete."""
     from dsl_core.io.describe import describe
 
     output, facts = Output(json), describe(path, verify)
+    if verify and facts["kind"] == "session":
+        facts["wrong_pictures"] = _wrong_pictures(path)
     for name, value in facts.items():
         if isinstance(value, dict):
             value = "; ".join(f"{key}: {item}" for key, item in value.items())
@@ -103,3 +110,9 @@ def info(
         output.say(f"{name.replace('_', ' '):18s} {value}")
     output.put(**facts)
     output.finish()
+
+
+def _wrong_pictures(path: Path) -> list[str]:
+    from dsl_core.workflows.scans import prove_scan
+
+    return list(prove_scan(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -57,7 +58,7 @@ def reconstruct(
     from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
     from dsl_core.model.options import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
-    from dsl_core.workflows.scans import reconstruct_scan
+    from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
     _require_one_of("--model", model, names(MODELS))
@@ -80,10 +81,13 @@ def reconstruct(
         with timer.stage("save the result"):
             save_result(result, target, overwrite=force)
     output.costs(timer.stages)
+    doubts = loads(result.attrs.get(DOUBTS, "[]"))
+    for sentence in doubts:
+        output.say(f"{sentence} The result may be wrong; scan again, or see 'dsl-scan info --verify'.")
     share = coverage(result)
     print_fit(output, result)
     output.say(f"{share:.1%} of the pixels have a depth. The result is saved in {target}")
-    output.put(result=target, pixels_with_depth=share)
+    output.put(result=target, pixels_with_depth=share, wrong_pictures=doubts)
     output.finish()
 
 

@@ -16,7 +16,8 @@ from dsl_core.model.plan import CapturePlan, Shot
 class Frame:
     """One exposure: the raw mosaic, uint16, shape (rows, columns), in DN, and how it was taken.
 
-    ``attempts`` counts the exposures it took until this one was kept (a runner sets it).
+    ``attempts`` counts the exposures it took until this one was kept, and ``corrected`` says what an earlier
+    one showed instead of the pattern (a runner sets both).
     """
 
     pixels: NDArray[np.uint16]
@@ -24,6 +25,7 @@ class Frame:
     timestamp_s: float = 0.0
     frame_id: int = 0
     attempts: int = 1
+    corrected: str = ""
 
 
 class FrameSource(Protocol):

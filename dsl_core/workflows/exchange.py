@@ -101,7 +101,7 @@ def import_scan(
         source.require_frames()
         notes = {"imported_from": root.absolute().name, _FINGERPRINT: source.fingerprint()}
         _refuse_other_scan(target, notes[_FINGERPRINT], calibration, root)
-        scan(replay_rig(source, calibration), source.plan, target, progress, notes)
+        scan(replay_rig(source, calibration), source.plan, target, progress, notes, prove=False)
     return source.table
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.capture.movement import check_movement, pick_reference_shots
+from dsl_core.capture.proof.report import WatchedSource, prove
 from dsl_core.capture.runner import Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import conditions_of
@@ -31,6 +32,9 @@ from dsl_core.progress import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Attribute of a result: sentences about pictures that do not show their pattern, as a list in JSON.
+DOUBTS = "frames_in_doubt"
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
@@ -85,9 +89,13 @@ def reconstruct_scan(
     if calibration is not None and not override_calibration:
         _require_conditions(folder, reader.manifest, calibration)
     rig, options = calibration_of(reader, calibration), options or Options()
-    result = reconstruct(reader, rig, options, progress, timer)
+    watched = WatchedSource(reader)
+    result = reconstruct(watched, rig, options, progress, timer)
+    with timer.stage("compare frames with their patterns"):
+        doubts = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer).sentences
     return result.assign_attrs(
         {
+            **({DOUBTS: json.dumps(doubts)} if doubts else {}),
             **reader.manifest.notes,
             **model_notes(rig, options.correspondence),
             "captured": reader.manifest.created,
@@ -97,6 +105,14 @@ def reconstruct_scan(
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def prove_scan(folder: Path) -> tuple[str, ...]:
+    """A sentence for every picture of a scan that does not show its pattern; raises `StoreError`."""
+    reader = ScanReader(folder)
+    camera = reader.manifest.camera
+    settings = (camera.bit_depth, camera.bayer) if camera else ()
+    return prove(reader, reader.calibration, *settings).sentences
 
 
 def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:

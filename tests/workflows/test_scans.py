@@ -13,6 +13,7 @@ from dsl_core.errors import DeviceError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.patterns.images import pattern_image
 from dsl_core.workflows.scans import prepare_resume, resume
 from tests.cases.memory_sink import MemorySink
 from tests.cases.small_rig import small_rig
@@ -30,8 +31,11 @@ PLAN = CapturePlan(
 def _taken(scene: int) -> MemorySink:
     """A scan of one of many scenes, the same each time."""
     sink = MemorySink(PLAN)
+    light = np.random.default_rng(scene).integers(500, 3500, (16, 24))
     for shot in PLAN.shots():
-        pixels = np.random.default_rng((scene, shot.index)).integers(200, 4000, (16, 24)).astype(np.uint16)
+        shown = pattern_image(PLAN, shot)[:16, :24, 1] > 0
+        noise = np.random.default_rng((scene, shot.index)).integers(200, 230, (16, 24))
+        pixels = (light * shown + noise).astype(np.uint16)
         # Frame numbers that no two shots share, as a camera counts them.
         sink.write(shot, Frame(pixels, shot.exposure_ms, 0.5 * shot.index, shot.index + 1))
     return sink

@@ -23,7 +23,8 @@ class LogEntry(Record):
     """How a saved frame was captured.
 
     ``run`` counts how often the scan was opened for writing: frame numbers and clocks of a camera
-    start again with it. ``attempts`` above one means that the frame was taken again before it was kept.
+    start again with it. ``attempts`` above one means that the frame was taken again before it was kept,
+    and ``corrected`` why, where an earlier picture did not show the pattern.
     """
 
     shot: int = Field(ge=0)
@@ -32,6 +33,7 @@ class LogEntry(Record):
     frame_id: int
     crc32: int
     attempts: int = 1
+    corrected: str = ""
     run: int = 0
     darkest_dn: int = 0
     brightest_dn: int = 65535

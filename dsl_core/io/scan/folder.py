@@ -218,6 +218,7 @@ class ScanWriter:
             frame_id=frame.frame_id,
             crc32=checksum(frame.pixels),
             attempts=frame.attempts,
+            corrected=frame.corrected,
             run=self._run,
             darkest_dn=int(frame.pixels.min()),
             brightest_dn=int(frame.pixels.max()),

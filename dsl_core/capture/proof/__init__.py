@@ -1,0 +1,1 @@
+"""Whether a picture shows the pattern that was asked for."""

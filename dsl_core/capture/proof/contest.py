@@ -1,0 +1,57 @@
+"""Two predictions of a picture, and which of them it is: every pixel that tells them apart has a vote."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32]
+
+#: Votes needed to tell anything.
+FEWEST = 12
+#: Mean vote below which a picture is not the one wanted: 1 if it is, -1 if it is the rival.
+LEAST_MEAN = 0.15
+#: Votes against, net of those for, at the upper or lower end of a picture that make it torn: at least so
+#: many, and at least this share of all.
+TORN_VOTES, TORN_SHARE = 8.0, 0.02
+
+
+@dataclass(frozen=True)
+class Contest:
+    """The result of `vote`: ``count`` voters, their ``mean``, and the lowest sum from either end on."""
+
+    count: int = 0
+    mean: float = 1.0
+    worst_end: float = 0.0
+
+    @property
+    def is_told(self) -> bool:
+        """Whether there were votes enough."""
+        return self.count >= FEWEST
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the picture as a whole is not the one wanted."""
+        return self.is_told and self.mean < LEAST_MEAN
+
+    @property
+    def is_torn(self) -> bool:
+        """Whether the picture is the one wanted only above or below some row."""
+        return self.is_told and self.worst_end < -max(TORN_VOTES, TORN_SHARE * self.count)
+
+
+def vote(seen: Floats, wanted: Floats, rival: Floats) -> Contest:
+    """Let pixels vote, each between -1 and 1; flat arrays, row after row, of pixels that tell them apart.
+
+    A pixel half way between both predictions has no opinion; one at or beyond a prediction votes for it.
+    """
+    if seen.size == 0:
+        return Contest()
+    votes = np.clip((2 * seen - wanted - rival) / (wanted - rival), -1, 1)
+    sums = np.cumsum(votes, dtype=np.float64)
+    total = float(sums[-1])
+    # What is left after the best beginning is the worst end.
+    worst = min(float(sums.min()), total - float(sums.max()), 0.0)
+    return Contest(seen.size, total / seen.size, worst)

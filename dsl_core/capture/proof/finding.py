@@ -1,0 +1,103 @@
+"""What a picture was found to show, and the sentences that say so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from dsl_core.model.plan import Shot, describe_shot
+
+
+class Verdict(StrEnum):
+    """What a picture shows; all but the first two need the shot to be taken again."""
+
+    RIGHT = "right"
+    UNTOLD = "cannot tell"
+    LATE = "late"
+    REPEATED = "repeated"
+    SWAPPED = "swapped"
+    TORN = "torn"
+    EXPOSURE = "wrong exposure"
+    SATURATED = "saturated"
+    DARK = "dark"
+    OTHER = "another picture"
+
+
+_SEEN = {
+    Verdict.LATE: "it still shows the pattern before",
+    Verdict.REPEATED: "it is the picture before, pixel by pixel",
+    Verdict.SWAPPED: "it shows the pattern of another shot",
+    Verdict.TORN: "only a part of it shows that pattern, the rest another one",
+    Verdict.EXPOSURE: "its brightness is wrong",
+    Verdict.SATURATED: "most of it is saturated",
+    Verdict.DARK: "the pattern is missing from it",
+    Verdict.OTHER: "it shows something else",
+}
+_REMEDY = {
+    Verdict.LATE: "Let the projector settle for longer (its latency), and check that it follows.",
+    Verdict.REPEATED: "Restart the camera.",
+    Verdict.SWAPPED: "Check how camera and projector are synchronised.",
+    Verdict.TORN: "Let the projector settle for longer (its latency), or expose for whole frames of it.",
+    Verdict.EXPOSURE: "Switch automatic exposure and gain of the camera off, and check the lamp.",
+    Verdict.SATURATED: "Check exposure and gain of the camera, and the light of the room.",
+    Verdict.DARK: "Check that the projector is on and that nothing stands in its way.",
+    Verdict.OTHER: "Check that camera, target and light have not moved since the scan began.",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the picture of ``shot`` was found to show.
+
+    ``again`` are the shots to take again, in the order of the plan: more than one where only together they
+    are known to be wrong. ``detail`` says what was seen in more words, such as which other shot.
+    """
+
+    shot: Shot
+    verdict: Verdict
+    again: tuple[Shot, ...] = ()
+    detail: str = ""
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether shots have to be taken again."""
+        return bool(self.again)
+
+    @property
+    def names(self) -> str:
+        """The shots that are wrong, or of which at least one is."""
+        if len(self.again) == 1:
+            return describe_shot(self.again[0])
+        first, last = self.again[0], self.again[-1]
+        between = "or" if len(self.again) == 2 else "to"
+        return f"{describe_shot(first)} {between} {describe_shot(last)}"
+
+    @property
+    def seen(self) -> str:
+        """What was seen instead of the pattern, as a clause."""
+        what = _SEEN.get(self.verdict, "")
+        return f"{what} ({self.detail})" if self.detail else what
+
+    @property
+    def sentence(self) -> str:
+        """Which shots do not show their pattern, and what was seen instead."""
+        return f"{self.names.capitalize()} does not show its pattern: {self.seen}."
+
+    @property
+    def remedy(self) -> str:
+        """What a person can do."""
+        return _REMEDY.get(self.verdict, "")
+
+
+@dataclass(frozen=True)
+class ProofReport:
+    """What a check of ``judged`` frames found: what is ``wrong``, and how many cannot be told."""
+
+    judged: int
+    wrong: tuple[Finding, ...]
+    untold: int
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """A sentence for everything that is wrong."""
+        return tuple(each.sentence for each in self.wrong)

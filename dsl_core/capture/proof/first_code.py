@@ -1,0 +1,205 @@
+"""Pictures of the first code of a scan, judged by each other: nothing else is known yet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.code_pairs import CodePairs, Pair, alike, dominant
+from dsl_core.capture.proof.columns import LEAST_MARGIN, decode, exchanged_pairs
+from dsl_core.capture.proof.contest import vote
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.prediction import Lit
+from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.model.plan import BinaryCode, CapturePlan, Shot
+
+#: Pixels that have to be lit to tell anything.
+_FEWEST_LIT = 60
+
+
+class FirstCode:
+    """The code, white and black of one setting, as far as they are there."""
+
+    def __init__(
+        self, plan: CapturePlan, code: BinaryCode, shots: Sequence[Shot], raster: Raster, noise: Noise,
+        bayer: str, rises: bool | None, at_the_end: bool = False,
+    ) -> None:  # fmt: skip
+        """Judge ``shots``, those of the code, white and black of one setting.
+
+        ``rises`` says whether columns of the projector rise with those of the camera, None if unknown.
+        ``at_the_end``: pairs are judged by all others, once all are there, rather than by those before.
+        """
+        self._plan, self._code, self._noise, self._raster = plan, code, noise, raster
+        self._channels = raster.channels(bayer)
+        self._rises = rises
+        self._shots = {(shot.role, shot.pattern): shot for shot in shots}
+        self._pairs = CodePairs(noise)
+        self._half: dict[int, Counts] = {}
+        self._ends: dict[str, Counts] = {}
+        self._lit: Lit | None = None
+        self._at_the_end, self._is_believed = at_the_end, False
+        #: What the last look at all pairs together found.
+        self.reviewed: list[Finding] = []
+
+    @property
+    def lit(self) -> Lit | None:
+        """Pixels whose column is known, once all pictures are there and fit each other."""
+        if self._lit is None and not self._missing and "white" in self._ends and "black" in self._ends:
+            self._lit = self._located()
+        return self._lit
+
+    @property
+    def _missing(self) -> bool:
+        return 2 * len(self._pairs.pairs) < self._plan.code_count
+
+    def add(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
+        """Judge a picture, given that of the shot taken before it, and keep it where it may be right."""
+        self._lit, self.reviewed = None, []
+        if shot.role == "code":
+            found = self._add_half(shot, seen, before)
+        else:
+            found = self._add_end(shot, seen, before)
+        if found.is_wrong:
+            return found
+        whole = not self._missing and len(self._ends) == 2
+        return (self._review(shot) or found) if whole else found
+
+    def _add_half(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
+        number, inverse = divmod(shot.pattern, 2)
+        self._pairs.pairs.pop(number, None)  # a pair is taken again as a whole
+        other = self._half.pop(2 * number + 1 - inverse, None)
+        if other is None:
+            self._half[shot.pattern] = seen
+            return Finding(shot, Verdict.UNTOLD)
+        pair = (other, seen) if inverse else (seen, other)
+        again = self._pair_shots(number)
+        expected = None if self._at_the_end else self._pairs.sum()
+        broken = self._pairs.broken(pair, expected)
+        if broken is not None and expected is not None:
+            if len(self._pairs.pairs) == 1 and not self._ends:
+                # Nobody knows which of two is wrong.
+                first = next(iter(self._pairs.pairs))
+                again = (*self._pair_shots(first), *again)
+                self._pairs.pairs.pop(first)
+            verdict, detail = self._explain(pair, expected, broken)
+            return Finding(shot, verdict, again, detail)
+        self._pairs.pairs[number] = pair
+        is_told = expected is not None and int(self._pairs.contrast()[2].sum()) >= _FEWEST_LIT
+        return Finding(shot, Verdict.RIGHT if is_told else Verdict.UNTOLD)
+
+    def _add_end(self, shot: Shot, seen: Counts, before: Counts | None) -> Finding:
+        self._ends.pop(shot.role, None)
+        if not self._pairs.pairs:
+            self._ends[shot.role] = seen
+            return Finding(shot, Verdict.UNTOLD)
+        dark, bright, lit = self._pairs.contrast()
+        if int(lit.sum()) < _FEWEST_LIT:
+            self._ends[shot.role] = seen
+            return Finding(shot, Verdict.UNTOLD)
+        wanted, rival = (bright, dark) if shot.role == "white" else (dark, bright)
+        result = vote(seen[lit].astype(np.float32), wanted[lit], rival[lit])
+        if result.is_lost or result.is_torn:
+            late = before is not None and alike(seen, before, bright - dark, lit)
+            torn = Verdict.TORN if result.is_torn and not result.is_lost else Verdict.OTHER
+            if shot.role == "white" and result.mean < -0.5:
+                torn = Verdict.DARK
+            return Finding(shot, Verdict.LATE if late else torn, (shot,), self._named(seen, shot))
+        expected, other = self._pairs.sum(), self._ends.get("black" if shot.role == "white" else "white")
+        if other is not None and len(self._pairs.pairs) > 2:
+            pair = (seen, other)
+            broken = self._pairs.broken(pair, expected)
+            if broken is not None and expected is not None:
+                verdict, detail = self._explain(pair, expected, broken)
+                return Finding(shot, verdict, (self._shots["white", 0], self._shots["black", 0]), detail)
+        self._ends[shot.role] = seen
+        return Finding(shot, Verdict.RIGHT)
+
+    def _review(self, shot: Shot) -> Finding | None:
+        """Judge all pairs by the sum that most of them have, then the columns that they give."""
+        expected = self._pairs.sum()
+        self.reviewed = []
+        for number, pair in list(self._pairs.pairs.items()):
+            broken = self._pairs.broken(pair, expected)
+            if broken is not None and expected is not None:
+                verdict, detail = self._explain(pair, expected, broken)
+                self.reviewed.append(Finding(shot, verdict, self._pair_shots(number), detail))
+        if not self.reviewed and not self._is_believed:
+            numbers = self._exchanged()
+            if numbers:
+                # Taken again with the same result, it is what there is to see.
+                self._is_believed = True
+                again = tuple(each for number in numbers for each in self._pair_shots(number))
+                detail = "pattern and inverse exchanged"
+                self.reviewed.append(Finding(shot, Verdict.SWAPPED, again, detail))
+        if not self.reviewed:
+            return None
+        for each in self.reviewed:
+            for wrong in each.again:
+                self._pairs.pairs.pop(wrong.pattern // 2, None)
+        again = tuple(wrong for each in self.reviewed for wrong in each.again)
+        return replace(self.reviewed[0], again=again)
+
+    def _exchanged(self) -> tuple[int, ...]:
+        _, _, lit = self._pairs.contrast()
+        size_px, pairs = self._plan.projector_size_px, self._pairs.pairs
+        trusted = lit & self._margins()
+        return exchanged_pairs(self._code, size_px, pairs, trusted, self._raster.shape, self._rises)
+
+    def substitute(self, number: int, pair: Pair) -> None:
+        """Take a pair of another setting for a wrong one: for the columns alone."""
+        self._pairs.pairs[number] = pair
+        self._lit = None
+
+    @property
+    def lacking(self) -> tuple[int, ...]:
+        """Pairs that are not there, or were found wrong."""
+        return tuple(n for n in range(self._plan.code_count // 2) if n not in self._pairs.pairs)
+
+    def _margins(self) -> NDArray[np.bool_]:
+        dark, bright, _ = self._pairs.contrast()
+        _, margin = decode(self._code, self._plan.projector_size_px, self._pairs.pairs)
+        return np.asarray(margin > LEAST_MARGIN * (bright - dark))
+
+    def _located(self) -> Lit | None:
+        white, black = self._ends["white"], self._ends["black"]
+        column, margin = decode(self._code, self._plan.projector_size_px, self._pairs.pairs)
+        contrast = white.astype(np.float32) - black.astype(np.float32)
+        sigma = np.sqrt(self._noise.variance(white) + self._noise.variance(black))
+        sound = (column >= 0) & (contrast > 12 * sigma) & (margin > LEAST_MARGIN * contrast)
+        index = np.flatnonzero(sound)
+        if index.size < _FEWEST_LIT:
+            return None
+        key = 3 * column[index] + self._channels[index]
+        return Lit(index, key, black[index].astype(np.float32), contrast[index], sigma[index])
+
+    def _explain(self, pair: Pair, expected: Floats, broken: NDArray[np.bool_]) -> tuple[Verdict, str]:
+        """What a pair that breaks the sum shows instead."""
+        if np.array_equal(*pair):
+            return Verdict.REPEATED, ""
+        ratios = self._pairs.brightness(pair, expected)
+        if ratios is not None:
+            worst = min(ratios, key=lambda ratio: -abs(np.log(ratio)))
+            return Verdict.EXPOSURE, f"{worst:.2g} times what was expected"
+        dark, bright, lit = self._pairs.contrast([pair])
+        if alike(*pair, bright - dark, lit):
+            return Verdict.LATE, ""
+        for picture in pair:
+            for number, known in self._pairs.pairs.items():
+                for inverse, other in enumerate(known):
+                    if other is not picture and alike(picture, other, bright - dark, lit):
+                        return Verdict.LATE, f"like code pattern {2 * number + inverse}"
+        return dominant(broken, lit), ""
+
+    def _named(self, seen: Counts, shot: Shot) -> str:
+        dark, bright, lit = self._pairs.contrast()
+        for number, known in self._pairs.pairs.items():
+            for inverse, other in enumerate(known):
+                if alike(seen, other, bright - dark, lit):
+                    return f"like code pattern {2 * number + inverse}"
+        return ""
+
+    def _pair_shots(self, number: int) -> tuple[Shot, ...]:
+        return self._shots["code", 2 * number], self._shots["code", 2 * number + 1]

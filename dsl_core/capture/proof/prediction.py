@@ -1,0 +1,130 @@
+"""Pictures predicted from what is known so far, and rivals that they are told apart from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.contest import Contest, vote
+from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.model.plan import CapturePlan, Shot
+from dsl_core.patterns.multiplexed import profile
+
+#: Two predictions tell a pixel apart if they differ by this share of its light and so many deviations.
+APART, SIGMAS = 0.3, 6.0
+#: Share of a column's light that its neighbours on either side get.
+BLUR = 0.15
+#: Brightness is measured if all its pixels together are so many deviations bright, and there are so many.
+BRIGHT_SIGMAS, FEWEST_BRIGHT = 25.0, 12
+#: Of the pixels that a rival leaves bright or dark, every so many are asked where there are plenty.
+PLENTY = 4000
+
+
+@dataclass(frozen=True)
+class Lit:
+    """Pixels whose column is known, at one setting: flat indices, ``key`` = 3 column + channel, counts."""
+
+    index: NDArray[np.intp]
+    key: NDArray[np.int32]
+    black: Floats
+    contrast: Floats
+    sigma: Floats
+
+
+def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
+    """Light over columns and LEDs, flat (3 width,), as a camera sees it; None for a pattern with rows."""
+    width = plan.projector_size_px[0]
+    match shot.role:
+        case "white":
+            return np.ones(3 * width, np.float32)
+        case "black":
+            return np.zeros(3 * width, np.float32)
+        case "code":
+            return None
+    sharp = profile(plan.spectral, width, shot.pattern).astype(np.float32)
+    wide = np.pad(sharp, ((1, 1), (0, 0)), mode="edge")
+    return np.asarray((1 - 2 * BLUR) * sharp + BLUR * (wide[2:] + wide[:-2])).ravel()
+
+
+def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> Contest:
+    """Which of two patterns of columns (`line_profile`) a picture shows."""
+    asked = (np.abs(wanted - rival) > APART)[lit.key]
+    chosen = np.flatnonzero(asked)
+    chosen = chosen[:: max(chosen.size // PLENTY, 1)]
+    black, contrast = lit.black[chosen], lit.contrast[chosen]
+    key = lit.key[chosen]
+    return vote(
+        seen[lit.index[chosen]].astype(np.float32),
+        black + contrast * wanted[key],
+        black + contrast * rival[key],
+    )
+
+
+def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> float | None:
+    """Light of a picture over that expected where it should be brightest; None where too little is lit."""
+    chosen = np.flatnonzero((wanted > 0.1)[lit.key])
+    counts = seen[lit.index[chosen]]
+    chosen, counts = (each[counts < noise.sensor.full_scale_dn] for each in (chosen, counts))
+    light = lit.contrast[chosen] * wanted[lit.key[chosen]]
+    return _ratio(counts - lit.black[chosen], light, lit.sigma[chosen] ** 2)
+
+
+def _ratio(seen: Floats, wanted: Floats, variance: Floats) -> float | None:
+    """Light over the light wanted, of all pixels together; None where noise blurs it."""
+    total = float(wanted.sum())
+    if seen.size < FEWEST_BRIGHT or total < BRIGHT_SIGMAS * float(np.sqrt(variance.sum())):
+        return None
+    return float(seen.sum()) / total
+
+
+@dataclass(frozen=True)
+class Expected:
+    """A picture predicted from one of an earlier setting: flat counts, and their variance."""
+
+    counts: Floats
+    variance: Floats
+
+
+def rescaled(picture: Counts, old_black: Counts, new_black: Floats, scale: float, noise: Noise) -> Expected:
+    """The picture of an earlier setting at another one, whose light is ``scale`` times as strong."""
+    factor, full = np.float32(scale), noise.sensor.full_scale_dn
+    light = factor * (picture.astype(np.float32) - old_black.astype(np.float32))
+    counts = np.clip(new_black + light, 0, np.float32(full))
+    variance = factor**2 * (noise.variance(picture) + noise.variance(old_black))
+    # Nobody knows how much brighter a saturated pixel was.
+    unknown = (picture >= full) & (counts < full)
+    return Expected(counts, np.where(unknown, np.float32(np.inf), variance))
+
+
+def contest_of_pictures(
+    seen: Counts, wanted: Expected, rival: Expected, black: Floats, noise: Noise, raster: Raster
+) -> Contest:
+    """Which of two predicted pictures a picture is; ``black`` is the one without any light of the pattern.
+
+    Where pixels are too noisy to tell, means over blocks are asked.
+    """
+    found = _contest(seen.astype(np.float32), noise.variance(seen), wanted, rival, black)
+    if found.is_told:
+        return found
+    share = np.float32(1 / raster.pooled)
+    coarse = [Expected(raster.pool(e.counts), raster.pool(e.variance) * share) for e in (wanted, rival)]
+    variance = raster.pool(noise.variance(seen)) * share
+    return _contest(raster.pool(seen), variance, *coarse, raster.pool(black))
+
+
+def _contest(seen: Floats, variance: Floats, wanted: Expected, rival: Expected, black: Floats) -> Contest:
+    apart = np.abs(wanted.counts - rival.counts)
+    light = np.maximum(wanted.counts, rival.counts) - black
+    sigma = np.sqrt(variance + wanted.variance + rival.variance)
+    chosen = np.flatnonzero((apart > APART * light) & (apart > SIGMAS * sigma))
+    return vote(seen[chosen], wanted.counts[chosen], rival.counts[chosen])
+
+
+def brightness_of_picture(seen: Counts, wanted: Expected, black: Floats, noise: Noise) -> float | None:
+    """Light of a picture over that expected; None where too little of it can be measured."""
+    full = noise.sensor.full_scale_dn
+    sound = (seen < full) & (wanted.counts < 0.9 * full)
+    light = (wanted.counts - black)[sound]
+    return _ratio(seen[sound] - black[sound], light, (wanted.variance + noise.variance(seen))[sound])

@@ -1,0 +1,92 @@
+"""A part of every picture that is cheap to compare: whole rows, spread evenly over the height.
+
+Rows instead of the means of blocks, because the finest stripes of a code average away in a block; and whole
+ones, because a line lights only a few pixels of each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.rig import Sensor
+
+Floats = NDArray[np.float32]
+Counts = NDArray[np.uint16]
+#: Rows of a large picture, and the pixels up to which a small one may have more.
+_ROWS, _PIXELS = 36, 32_000
+#: Pixels of a row at most; wider pictures are thinned.
+_WIDTH = 1024
+#: Blocks down and across that stand in for pixels where these are too noisy.
+BLOCKS = 16
+
+
+class Raster:
+    """Which pixels of a picture are compared: flat arrays, row after row."""
+
+    def __init__(self, size_px: tuple[int, int]) -> None:
+        """For pictures of ``size_px`` = (width, height)."""
+        width, height = size_px
+        count = min(height, max(_ROWS, _PIXELS // width))
+        self._rows = np.unique(np.linspace(0, height - 1, count).round().astype(int))
+        self._step = -(-width // _WIDTH)
+        #: Rows and columns of the raster.
+        self.shape = (self._rows.size, -(-width // self._step))
+        self._mosaic = (self._rows[:, None] % 2) * 2 + np.arange(0, width, self._step)[None, :] % 2
+
+    def take(self, pixels: NDArray[np.uint16]) -> Counts:
+        """The compared pixels of a raw mosaic (rows, columns), flat."""
+        return np.ascontiguousarray(pixels[self._rows, :: self._step]).ravel()
+
+    def pool(self, values: Counts | Floats) -> Floats:
+        """Means over blocks of the raster, `BLOCKS` of them down and across, flat."""
+        down, across = (max(size // BLOCKS, 1) for size in self.shape)
+        rows, columns = self.shape[0] // down, self.shape[1] // across
+        whole = values.reshape(self.shape)[: rows * down, : columns * across]
+        sums = np.add.reduceat(whole, np.arange(0, rows * down, down), axis=0, dtype=np.float32)
+        sums = np.add.reduceat(sums, np.arange(0, columns * across, across), axis=1)
+        return np.asarray(sums / np.float32(down * across)).ravel()
+
+    @property
+    def pooled(self) -> int:
+        """Pixels of a block."""
+        down, across = (max(size // BLOCKS, 1) for size in self.shape)
+        return down * across
+
+    def channels(self, bayer: str) -> NDArray[np.int8]:
+        """Channel of every compared pixel, flat: 0 red, 1 green, 2 blue."""
+        table = np.array(["RGB".index(letter) for letter in bayer], np.int8)
+        return np.asarray(table[self._mosaic].ravel())
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What a camera's counts are worth."""
+
+    sensor: Sensor
+
+    @classmethod
+    def of(cls, sensor: Sensor | None, bit_depth: int) -> Noise:
+        """Of a known sensor, or else of one like the published camera's with this bit depth."""
+        if sensor is not None:
+            return cls(sensor)
+        share = 2.0 ** (bit_depth - 12)
+        usual = Sensor()
+        return cls(
+            Sensor(
+                bit_depth=bit_depth,
+                black_level_dn=0.0,
+                electrons_per_dn=usual.electrons_per_dn / share,
+                read_noise_dn=max(2.0 * share, 0.5),
+            )
+        )
+
+    def variance(self, counts: Counts | Floats) -> Floats:
+        """Variance of counts, DN^2."""
+        sensor = self.sensor
+        light = np.maximum(counts.astype(np.float32) - np.float32(sensor.black_level_dn), 0)
+        return np.asarray(
+            light / np.float32(sensor.electrons_per_dn) + np.float32(sensor.read_noise_dn**2 + 0.1)
+        )

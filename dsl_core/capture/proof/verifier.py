@@ -1,0 +1,309 @@
+"""Judges every picture of a scan as it comes, by what the pictures before it showed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.contest import Contest
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.first_code import FirstCode
+from dsl_core.capture.proof.prediction import (
+    Expected,
+    brightness_of_lines,
+    brightness_of_picture,
+    contest_of_lines,
+    contest_of_pictures,
+    line_profile,
+    rescaled,
+)
+from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
+from dsl_core.model.rig import Rig
+
+#: Brightness relative to that of the shots before that is taken for the same exposure.
+SAME_EXPOSURE = (0.68, 1.5)
+#: The same for the first shot of a setting, where only the calibration says how bright it should be.
+FIRST_EXPOSURE = (0.55, 1.8)
+#: With less light than this, as a share of what is expected, a pattern counts as missing.
+LEAST_LIGHT = 0.2
+#: Light of a line relative to what it adds to white: a film sends the rest elsewhere.
+FILM_SHARE = 0.85
+#: Shots whose brightness is remembered.
+_REMEMBERED = 9
+#: Projectors without a calibration are taken to have this gamma.
+_USUAL_GAMMA = 2.2
+#: Share of the pixels that may be saturated where they should not be.
+_SATURATED_SHARE = 0.3
+
+
+class FrameProof:
+    """Judges the shots of a plan one after the other; coarse, and quick enough to keep up with any camera.
+
+    Pictures that are found wrong are forgotten, so that those after them are judged by right ones only. Shots
+    may be judged again when they were taken again, and in any order.
+    """
+
+    def __init__(
+        self,
+        plan: CapturePlan,
+        calibration: Rig | None = None,
+        bit_depth: int = 12,
+        bayer: str = "RGGB",
+        at_the_end: bool = False,
+    ) -> None:
+        """Without ``calibration``, camera and projector are taken to be usual ones.
+
+        ``at_the_end``: nothing will be taken again, so the first code is judged once all of it is there.
+        """
+        self._plan, self._calibration = plan, calibration
+        self._shots = tuple(plan.shots())
+        self._raster = Raster(plan.camera_size_px)
+        self._noise = Noise.of(calibration.sensor if calibration else None, bit_depth)
+        self._bayer = calibration.sensor.bayer if calibration else bayer
+        self._first = min(plan.code_settings)
+        self._places = {(s.role, s.pattern): s.index for s in self._shots if s.setting == self._first}
+        self._blacks = {s.setting: s.index for s in self._shots if s.role == "black"}
+        self._code = self._first_code(at_the_end)
+        self._kept: dict[int, Counts] = {}
+        self._untold: set[int] = set()
+        self._contested: set[int] = set()
+        self._last: tuple[Shot, Counts] | None = None
+        #: What the last picture said of the pairs of the first code, one by one.
+        self.reviewed: list[Finding] = []
+        self._light: dict[tuple[str, int], deque[float]] = {}
+        self._scale: dict[int, float] = {}
+
+    def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
+        """What the raw mosaic of a shot shows; remembers it for the shots after it, unless it is wrong."""
+        return self.judge_raster(shot, self._raster.take(pixels))
+
+    def judge_raster(self, shot: Shot, seen: Counts) -> Finding:
+        """The same of what a `Raster` takes of a mosaic."""
+        before = self._last
+        found = self._judge(shot, seen)
+        if found.is_wrong and before is not None and np.array_equal(seen, before[1]):
+            found = Finding(shot, Verdict.REPEATED, found.again)
+        self._last = (shot, seen)
+        for wrong in found.again:
+            self._kept.pop(wrong.index, None)
+        if shot not in found.again:
+            self._kept[shot.index] = seen
+            (self._untold.discard if found.verdict is Verdict.RIGHT else self._untold.add)(shot.index)
+        return found
+
+    @property
+    def lacking_pairs(self) -> tuple[int, ...]:
+        """Pairs of the first code that are not there or were found wrong."""
+        return self._code.lacking if self._code is not None else ()
+
+    def substitute(self, number: int, pair: tuple[Counts, Counts]) -> None:
+        """Take a pair of another setting for one of the first code, for the columns alone."""
+        if self._code is not None:
+            self._code.substitute(number, pair)
+
+    def _first_code(self, at_the_end: bool) -> FirstCode | None:
+        plan = self._plan
+        if isinstance(plan.code, NoCode):
+            return None
+        own = [s for s in self._shots if s.setting == self._first and s.role != "spectral"]
+        rises = None if self._calibration is None else self._calibration.pose.matrix[0, 0] > 0
+        return FirstCode(plan, plan.code, own, self._raster, self._noise, self._bayer, rises, at_the_end)
+
+    def _judge(self, shot: Shot, seen: Counts) -> Finding:
+        before = self._last[1] if self._last is not None else None
+        self.reviewed = []
+        if self._code is not None and shot.setting == self._first and shot.role != "spectral":
+            found = self._code.add(shot, seen, before)
+            self.reviewed = self._code.reviewed
+            return found
+        if self._code is None or self._code.lit is None:
+            return Finding(shot, Verdict.UNTOLD)
+        if shot.setting == self._first:
+            return self._judge_lines(shot, seen)
+        return self._judge_again(shot, seen)
+
+    # The lines of the first setting: columns, white and black are known ------------------------------
+
+    def _judge_lines(self, shot: Shot, seen: Counts) -> Finding:
+        assert self._code is not None
+        lit, wanted = self._code.lit, line_profile(self._plan, shot)
+        if lit is None or wanted is None:
+            return Finding(shot, Verdict.UNTOLD)
+        share = brightness_of_lines(seen, lit, wanted, self._noise)
+        usual = np.float32(self._usual(shot))
+        rivals = [(verdict, line_profile(self._plan, rival)) for verdict, rival in self._rivals(shot)]
+        rivals += [(Verdict.DARK, np.zeros_like(wanted)), (Verdict.OTHER, np.ones_like(wanted))]
+        contests = {
+            verdict: contest_of_lines(seen, lit, usual * wanted, usual * rival)
+            for verdict, rival in rivals
+            if rival is not None
+        }
+        return self._decide(shot, contests, share, lambda: self._line_shown(seen, shot))
+
+    def _rivals(self, shot: Shot) -> list[tuple[Verdict, Shot]]:
+        """The shots whose pattern a picture most likely shows instead."""
+        found = []
+        if shot.index + 1 < len(self._shots):
+            found.append((Verdict.SWAPPED, self._shots[shot.index + 1]))
+        if shot.index > 0:
+            found.append((Verdict.LATE, self._shots[shot.index - 1]))
+        return found
+
+    def _line_shown(self, seen: Counts, shot: Shot) -> Shot | None:
+        """The shot whose line it is that a picture shows."""
+        lit = self._code.lit if self._code is not None else None
+        if lit is None:
+            return None
+        share = (seen[lit.index].astype(np.float32) - lit.black) / lit.contrast
+        size = 3 * self._plan.projector_size_px[0]
+        count = np.bincount(lit.key, minlength=size)
+        mean = np.bincount(lit.key, np.clip(share, 0, 1.2), size) / np.maximum(count, 1)
+        weight = np.minimum(count, 10).astype(np.float64)
+        best, found = 0.5, None
+        for other in self._shots:
+            pattern = line_profile(self._plan, other) if other.setting == shot.setting else None
+            if pattern is None or not pattern.any():
+                continue
+            norm = float(np.sqrt((weight * pattern**2).sum() * (weight * mean**2).sum()))
+            score = float((weight * pattern * mean).sum()) / norm if norm > 0 else 0.0
+            if score > best:
+                best, found = score, other
+        if found is None:
+            return None
+        pattern = line_profile(self._plan, found)
+        is_lit = pattern is not None and float(mean[(pattern > 0.5) & (count > 0)].mean()) > LEAST_LIGHT
+        return found if is_lit else None
+
+    # Later settings: the same pictures were taken before ------------------------------------------------
+
+    def _judge_again(self, shot: Shot, seen: Counts) -> Finding:
+        old_black, old_white = (
+            self._earlier(self._role("black", shot)),
+            self._earlier(self._role("white", shot)),
+        )
+        wanted = self._expected(shot, shot)
+        if wanted is None or old_black is None or old_white is None:
+            return Finding(shot, Verdict.UNTOLD)
+        black = self._black(shot, old_black)
+        white = rescaled(old_white, old_black, black, self._scale_of(shot), self._noise)
+        dark = Expected(black, self._noise.variance(old_black))
+        rivals = [(verdict, self._expected(rival, shot)) for verdict, rival in self._rivals(shot)]
+        rivals += [(Verdict.DARK, dark), (Verdict.OTHER, white)]
+        contests = {
+            verdict: contest_of_pictures(seen, wanted, rival, black, self._noise, self._raster)
+            for verdict, rival in rivals
+            if rival is not None
+        }
+        share = None if shot.role == "black" else brightness_of_picture(seen, wanted, black, self._noise)
+        first_of_role = (shot.role, shot.setting) not in self._light
+        found = self._decide(shot, contests, share, lambda: None)
+        if found.is_wrong:
+            return self._with_doubtful(found)
+        if share is not None and first_of_role and shot.setting not in self._scale:
+            # The first shots of a setting say how strong its light is.
+            self._scale[shot.setting] = self._scale_of(shot) * share
+            self._light[shot.role, shot.setting] = deque([1.0], _REMEMBERED)
+        return found
+
+    def _with_doubtful(self, found: Finding) -> Finding:
+        """Take the picture that a wrong one was compared with again as well, where it may be that one."""
+        old = self._places[found.shot.role, found.shot.pattern]
+        is_doubtful = old in self._untold or found.shot.index in self._contested
+        self._contested.add(found.shot.index)
+        if found.shot.role != "spectral" or not is_doubtful:
+            return found
+        return replace(found, again=(self._shots[old], *found.again))
+
+    def _expected(self, pattern: Shot, shot: Shot) -> Expected | None:
+        """The picture of a pattern at the setting of ``shot``, from that at an earlier setting."""
+        old, old_black = self._earlier(pattern), self._earlier(self._role("black", shot))
+        if old is None or old_black is None:
+            return None
+        black = self._black(shot, old_black)
+        if pattern.role == "black":
+            return Expected(black, self._noise.variance(old_black))
+        return rescaled(old, old_black, black, self._scale_of(shot), self._noise)
+
+    def _role(self, role: str, shot: Shot) -> Shot:
+        return Shot(-1, role, 0, shot.setting, shot.exposure_ms, shot.level)  # type: ignore[arg-type]
+
+    def _earlier(self, shot: Shot) -> Counts | None:
+        """The picture of the same pattern at the first setting."""
+        return self._kept.get(self._places.get((shot.role, shot.pattern), -1))
+
+    def _black(self, shot: Shot, old_black: Counts) -> Floats:
+        """Black at the setting of a shot: as taken, else what the exposure makes of the first one."""
+        own = self._blacks[shot.setting]
+        taken = self._kept.get(own) if own != shot.index else None
+        if taken is not None:
+            return taken.astype(np.float32)
+        level = np.float32(self._noise.sensor.black_level_dn)
+        first = self._plan.settings[self._first]
+        ratio = np.float32(shot.exposure_ms / first.exposure_ms)
+        full = np.float32(self._noise.sensor.full_scale_dn)
+        return np.asarray(np.minimum(level + ratio * (old_black.astype(np.float32) - level), full))
+
+    def _scale_of(self, shot: Shot) -> float:
+        """How much stronger light is at the setting of a shot than at the first one."""
+        if shot.setting in self._scale:
+            return self._scale[shot.setting]
+        first = self._plan.settings[self._first]
+        if self._calibration is not None:
+            radiance = self._calibration.projector_response.radiance
+            dark = float(radiance(0.0))
+            ratio = (float(radiance(shot.level)) - dark) / max(float(radiance(first.level)) - dark, 1e-9)
+        else:
+            ratio = (shot.level / first.level) ** _USUAL_GAMMA
+        return shot.exposure_ms / first.exposure_ms * ratio
+
+    # What it all says -------------------------------------------------------------------------------------
+
+    def _decide(
+        self, shot: Shot, contests: dict[Verdict, Contest], share: float | None, name: Callable[[], Shot | None]
+    ) -> Finding:
+        told = {verdict: contest for verdict, contest in contests.items() if contest.is_told}
+        lost = {verdict: contest for verdict, contest in told.items() if contest.is_lost}
+        ratio = None if share is None else share / self._usual(shot)
+        if set(lost) == {Verdict.DARK} and ratio is not None and ratio > LEAST_LIGHT:
+            return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
+        if lost:
+            return self._named(shot, lost, name())
+        if any(contest.is_torn for contest in told.values()):
+            return Finding(shot, Verdict.TORN, (shot,))
+        found = self._judge_exposure(shot, share)
+        # That a picture is neither white nor black does not say that it is the one wanted.
+        return found if Verdict.LATE in told or found.is_wrong else Finding(shot, Verdict.UNTOLD)
+
+    def _named(self, shot: Shot, lost: dict[Verdict, Contest], shown: Shot | None) -> Finding:
+        """What a picture shows that is not the one wanted, from the rivals that won and the line it shows."""
+        if shown is not None and shown != shot:
+            near = {-1: Verdict.LATE, 1: Verdict.SWAPPED}
+            verdict = near.get(shown.index - shot.index, Verdict.OTHER)
+            return Finding(shot, verdict, (shot,), f"that of {describe_shot(shown)}")
+        worst = min(lost, key=lambda verdict: lost[verdict].mean)
+        if Verdict.LATE in lost and lost[Verdict.LATE].mean < lost[worst].mean + 0.3:
+            worst = Verdict.LATE
+        return Finding(shot, worst, (shot,))
+
+    def _usual(self, shot: Shot) -> float:
+        """Light of the pictures before relative to their prediction; at first, what a film usually leaves."""
+        known = self._light.get((shot.role, shot.setting))
+        if known:
+            return float(np.median(known))
+        return FILM_SHARE if shot.setting == self._first else 1.0
+
+    def _judge_exposure(self, shot: Shot, share: float | None) -> Finding:
+        if share is None:
+            return Finding(shot, Verdict.RIGHT)
+        known = self._light.setdefault((shot.role, shot.setting), deque(maxlen=_REMEMBERED))
+        low, high = SAME_EXPOSURE if known else FIRST_EXPOSURE
+        ratio = share / self._usual(shot)
+        if not low < ratio < high and (known or self._calibration is not None):
+            return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
+        known.append(share)
+        return Finding(shot, Verdict.RIGHT)

@@ -1,0 +1,39 @@
+"""Pixels vote for one of two predictions; an end of the picture that votes against shows a tear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dsl_core.capture.proof.contest import vote
+
+WANTED, RIVAL = np.full(400, 900, np.float32), np.full(400, 100, np.float32)
+
+
+def test_a_picture_as_predicted_wins_and_the_rival_loses() -> None:
+    won, lost = vote(WANTED, WANTED, RIVAL), vote(RIVAL, WANTED, RIVAL)
+    assert (won.mean, lost.mean) == (1.0, -1.0)
+    assert won.is_told and not won.is_lost and not won.is_torn
+    assert lost.is_lost
+
+
+def test_half_way_between_is_no_vote_and_beyond_counts_no_more() -> None:
+    assert vote(np.full(400, 500, np.float32), WANTED, RIVAL).mean == 0.0
+    assert vote(np.full(400, 4000, np.float32), WANTED, RIVAL).mean == 1.0
+
+
+def test_a_tear_is_found_at_either_end() -> None:
+    for torn in (np.r_[WANTED[:360], RIVAL[360:]], np.r_[RIVAL[:40], WANTED[40:]]):
+        found = vote(torn, WANTED, RIVAL)
+        assert found.is_torn and not found.is_lost
+        assert found.worst_end == -40.0
+
+
+def test_scattered_pixels_against_are_no_tear() -> None:
+    seen = WANTED.copy()
+    seen[::9] = 100
+    assert not vote(seen, WANTED, RIVAL).is_torn
+
+
+def test_few_pixels_tell_nothing() -> None:
+    assert not vote(RIVAL[:11], WANTED[:11], RIVAL[:11]).is_told
+    assert not vote(RIVAL[:0], WANTED[:0], RIVAL[:0]).is_told

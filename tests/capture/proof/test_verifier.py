@@ -1,0 +1,123 @@
+"""Pictures of a small scene are judged one by one: right ones pass, wrong ones are named for what they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.devices.base import DeviceRig
+from dsl_core.model.plan import Shot
+from tests.cases.rendered_rig import RenderedScene, token_image
+
+Counts = NDArray[np.uint16]
+
+
+def _take(rig: DeviceRig, scene: RenderedScene, shot: Shot, shown: Shot | None = None) -> Counts:
+    rig.camera.configure(shot.exposure_ms)
+    pattern = shown or shot
+    level = Shot(shot.index, pattern.role, pattern.pattern, shot.setting, shot.exposure_ms, shot.level)
+    rig.projector.show(token_image(scene.plan, level))
+    return rig.camera.snap().pixels
+
+
+def _judge_with(scene: RenderedScene, wrong: dict[int, Counts]) -> list[Finding]:
+    """All that is found wrong when some pictures are replaced, and taken again where that is found at once."""
+    rig, proof = scene.open(3), FrameProof(scene.plan, scene.calibration)
+    found = []
+    enough = max(_shot(scene, "black", 0, 0).index, *wrong) + 1
+    for shot in list(scene.plan.shots())[:enough]:
+        finding = proof.judge(shot, wrong.get(shot.index, _take(rig, scene, shot)))
+        if finding.is_wrong:
+            found.append(finding)
+            for again in finding.again:
+                finding = proof.judge(again, _take(rig, scene, again))
+            assert not finding.is_wrong, "a second take is right"
+    return found
+
+
+def _shot(scene: RenderedScene, role: str, pattern: int, setting: int) -> Shot:
+    return next(
+        s for s in scene.plan.shots() if (s.role, s.pattern, s.setting) == (role, pattern, setting)
+    )
+
+
+def test_nothing_is_wrong_with_right_pictures_and_most_can_be_told(scene: RenderedScene) -> None:
+    rig, proof = scene.open(1), FrameProof(scene.plan, scene.calibration)
+    verdicts = [proof.judge(shot, _take(rig, scene, shot)).verdict for shot in scene.plan.shots()]
+    assert set(verdicts) == {Verdict.RIGHT, Verdict.UNTOLD}
+    # Of a code, patterns are judged with their inverse; nothing is known at the first.
+    assert verdicts.count(Verdict.UNTOLD) <= scene.plan.code_count // 2 + 2
+
+
+@pytest.mark.parametrize(
+    ("role", "pattern", "setting"),
+    [
+        ("code", 6, 0), ("code", 1, 0), ("white", 0, 0), ("black", 0, 0), ("spectral", 0, 0), ("spectral", 9, 0),
+        ("code", 6, 1), ("black", 0, 1), ("spectral", 9, 1),
+    ],
+)  # fmt: skip
+def test_a_late_picture_is_found_whatever_its_shot(
+    scene: RenderedScene, role: str, pattern: int, setting: int
+) -> None:
+    shot = _shot(scene, role, pattern, setting)
+    before = list(scene.plan.shots())[shot.index - 1]
+    late = _take(scene.open(5), scene, shot, before)
+    found = _judge_with(scene, {shot.index: late})
+    assert found
+    assert shot in found[0].again
+
+
+@pytest.mark.parametrize("number", [0, 4, 9])
+def test_a_pattern_and_its_inverse_that_changed_places_are_found(scene: RenderedScene, number: int) -> None:
+    shots = [_shot(scene, "code", 2 * number + inverse, 0) for inverse in (0, 1)]
+    rig = scene.open(5)
+    wrong = {shots[i].index: _take(rig, scene, shots[i], shots[1 - i]) for i in (0, 1)}
+    found = _judge_with(scene, wrong)
+    assert [finding.verdict for finding in found] == [Verdict.SWAPPED]
+    assert set(shots) <= set(found[0].again)
+
+
+@pytest.mark.parametrize(("role", "pattern", "setting"), [("code", 8, 0), ("spectral", 6, 0), ("code", 8, 1)])
+def test_a_torn_picture_is_found(scene: RenderedScene, role: str, pattern: int, setting: int) -> None:
+    shot, rig = _shot(scene, role, pattern, setting), scene.open(5)
+    other = list(scene.plan.shots())[shot.index - 1]
+    torn = _take(rig, scene, shot)
+    torn[36:] = _take(rig, scene, shot, other)[36:]
+    found = _judge_with(scene, {shot.index: torn})
+    assert shot in found[0].again
+
+
+@pytest.mark.parametrize(
+    ("role", "pattern", "setting"), [("code", 9, 0), ("spectral", 6, 0), ("code", 8, 1), ("spectral", 6, 1)]
+)
+def test_half_the_exposure_is_found_and_said(
+    scene: RenderedScene, role: str, pattern: int, setting: int
+) -> None:
+    shot, rig = _shot(scene, role, pattern, setting), scene.open(5)
+    rig.camera.configure(shot.exposure_ms / 2)
+    rig.projector.show(token_image(scene.plan, shot))
+    found = _judge_with(scene, {shot.index: rig.camera.snap().pixels})
+    assert [finding.verdict for finding in found] == [Verdict.EXPOSURE]
+    assert "0.5 times" in found[0].sentence or "0.4" in found[0].sentence
+
+
+def test_a_picture_given_twice_is_called_repeated(scene: RenderedScene) -> None:
+    shot, rig = _shot(scene, "spectral", 6, 0), scene.open(3)
+    pictures = {s.index: _take(rig, scene, s) for s in scene.plan.shots() if s.index < shot.index}
+    proof = FrameProof(scene.plan, scene.calibration)
+    for each in scene.plan.shots():
+        if each.index < shot.index:
+            proof.judge(each, pictures[each.index])
+    found = proof.judge(shot, pictures[shot.index - 1])
+    assert found.verdict is Verdict.REPEATED
+    assert "pixel by pixel" in found.sentence
+
+
+def test_dark_scenes_are_not_judged(scene: RenderedScene) -> None:
+    proof, rng = FrameProof(scene.plan, scene.calibration), np.random.default_rng(0)
+    for shot in scene.plan.shots():
+        pixels = rng.integers(258, 264, (48, 64)).astype(np.uint16)
+        assert proof.judge(shot, pixels).verdict is Verdict.UNTOLD

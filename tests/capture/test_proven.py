@@ -1,0 +1,103 @@
+"""A scan takes pictures again that do not show their pattern, says so, and stops where that does not help."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.capture.proven import SETTLE_MS
+from dsl_core.capture.runner import Runner, State
+from dsl_core.errors import DeviceError
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from tests.cases.memory_sink import MemorySink
+from tests.cases.pattern_faults import PatternFault, PatternFaults
+from tests.cases.rendered_rig import RenderedScene, render, token_image
+
+
+@pytest.fixture(scope="module")
+def scene() -> RenderedScene:
+    plan = CapturePlan(
+        code=GrayCode(rows=False),
+        spectral=LineComb(step_px=4, period_px=64),
+        settings=(Setting(exposure_ms=500 / 3, level=0.2),),
+        code_settings=(0,),
+    )
+    return render(plan, scene="plane", size="64x48")
+
+
+def _run(scene: RenderedScene, sink: MemorySink, *faults: PatternFault) -> tuple[Runner, PatternFaults]:
+    spoiled = PatternFaults(scene.open(), scene.plan, token_image, faults)
+    proof = FrameProof(scene.plan, scene.calibration)
+    runner = Runner(spoiled.rig, scene.plan, sink, token_image, proof=proof, stored=sink)
+    return runner, spoiled
+
+
+def _wrong(sink: MemorySink, spoiled: PatternFaults) -> list[int]:
+    return [index for index, frame in sink.frames.items() if frame.frame_id in spoiled.wrong]
+
+
+@pytest.mark.parametrize("kind", ["late", "swapped", "torn", "half", "dark", "saturated"])
+@pytest.mark.parametrize("at", [5, 20, 30])
+def test_a_wrong_picture_is_taken_again_and_noted(scene: RenderedScene, kind: str, at: int) -> None:
+    sink = MemorySink(scene.plan)
+    runner, spoiled = _run(scene, sink, PatternFault(kind, at))
+    status = runner.run()
+    assert status.state is State.FINISHED
+    assert spoiled.wrong and _wrong(sink, spoiled) == []
+    assert status.corrected > 0
+    assert "captured again, because a picture did not show its pattern" in status.message
+    assert sink.frames[at].corrected
+    assert sink.frames[at].attempts > 1
+
+
+def test_right_pictures_are_taken_once(scene: RenderedScene) -> None:
+    sink = MemorySink(scene.plan)
+    status = _run(scene, sink)[0].run()
+    assert status.corrected == 0
+    assert status.message == f"All {scene.plan.shot_count} frames are saved."
+    assert {(frame.attempts, frame.corrected) for frame in sink.frames.values()} == {(1, "")}
+
+
+@pytest.mark.parametrize("kind", ["projector late", "camera late"])
+def test_devices_that_are_always_one_picture_late_still_give_a_right_scan(
+    scene: RenderedScene, kind: str
+) -> None:
+    sink = MemorySink(scene.plan)
+    runner, spoiled = _run(scene, sink, PatternFault(kind, 24))
+    runner.run()
+    assert _wrong(sink, spoiled) == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [
+        ("frozen", "pattern before"),
+        ("camera repeats", "pixel by pixel"),
+        ("half from", "brightness is wrong"),
+        ("dark from", "pattern is missing"),
+    ],
+)
+def test_what_stays_wrong_stops_the_scan_and_is_named(scene: RenderedScene, kind: str, what: str) -> None:
+    sink = MemorySink(scene.plan)
+    runner, spoiled = _run(scene, sink, PatternFault(kind, 30))
+    with pytest.raises(DeviceError, match=f"^Frame 30 .* after {len(SETTLE_MS) + 1} exposures: .*{what}"):
+        runner.run()
+    assert runner.status.state is State.FAILED
+    assert sorted(sink.frames) == list(range(30))
+    assert _wrong(sink, spoiled) == []
+
+
+def test_a_resumed_scan_learns_from_saved_frames_and_takes_wrong_ones_again(scene: RenderedScene) -> None:
+    whole = MemorySink(scene.plan)
+    _run(scene, whole)[0].run()
+    sink = MemorySink(scene.plan)
+    for index in range(28):
+        # What an older program saved: frame 25 shows the pattern of frame 24.
+        sink.frames[index] = replace(whole.frames[24 if index == 25 else index], frame_id=-1)
+    runner, spoiled = _run(scene, sink, PatternFault("late", 30))
+    assert runner.run().corrected == 2
+    assert spoiled.wrong and _wrong(sink, spoiled) == []
+    assert sink.frames[25].corrected and sink.frames[30].corrected
+    assert sink.frames[26].frame_id == -1
