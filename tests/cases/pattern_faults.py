@@ -95,9 +95,9 @@ class PatternFaults:
                 other = self._shots[min(shot.index + step, len(self._shots) - 1)]
                 return self._other(self._images(self._plan, other), frame, timeout_ms), True
             case "torn":
-                other = self._other(before, frame, timeout_ms)
+                late = self._other(before, frame, timeout_ms)
                 row = int(fault.tear * frame.pixels.shape[0])
-                pixels = np.concatenate([frame.pixels[:row], other.pixels[row:]])
+                pixels = np.concatenate([frame.pixels[:row], late.pixels[row:]])
                 return replace(frame, pixels=pixels), True
             case "half" | "half from":
                 self._camera.configure(frame.exposure_ms / 2)

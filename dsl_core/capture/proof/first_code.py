@@ -169,6 +169,8 @@ class FirstCode:
         contrast = white.astype(np.float32) - black.astype(np.float32)
         sigma = np.sqrt(self._noise.variance(white) + self._noise.variance(black))
         sound = (column >= 0) & (contrast > 12 * sigma) & (margin > LEAST_MARGIN * contrast)
+        # Where white saturates, nobody knows how bright a line and the blur beside it will be.
+        sound &= white < self._noise.sensor.full_scale_dn
         index = np.flatnonzero(sound)
         if index.size < _FEWEST_LIT:
             return None

@@ -65,8 +65,8 @@ def contest_of_lines(seen: Counts, lit: Lit, wanted: Floats, rival: Floats) -> C
 def brightness_of_lines(seen: Counts, lit: Lit, wanted: Floats, noise: Noise) -> float | None:
     """Light of a picture over that expected where it should be brightest; None where too little is lit."""
     chosen = np.flatnonzero((wanted > 0.1)[lit.key])
+    chosen = chosen[seen[lit.index[chosen]] < noise.sensor.full_scale_dn]
     counts = seen[lit.index[chosen]]
-    chosen, counts = (each[counts < noise.sensor.full_scale_dn] for each in (chosen, counts))
     light = lit.contrast[chosen] * wanted[lit.key[chosen]]
     return _ratio(counts - lit.black[chosen], light, lit.sigma[chosen] ** 2)
 
@@ -109,9 +109,9 @@ def contest_of_pictures(
     if found.is_told:
         return found
     share = np.float32(1 / raster.pooled)
-    coarse = [Expected(raster.pool(e.counts), raster.pool(e.variance) * share) for e in (wanted, rival)]
     variance = raster.pool(noise.variance(seen)) * share
-    return _contest(raster.pool(seen), variance, *coarse, raster.pool(black))
+    one, other = (Expected(raster.pool(e.counts), raster.pool(e.variance) * share) for e in (wanted, rival))
+    return _contest(raster.pool(seen), variance, one, other, raster.pool(black))
 
 
 def _contest(seen: Floats, variance: Floats, wanted: Expected, rival: Expected, black: Floats) -> Contest:

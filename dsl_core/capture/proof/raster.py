@@ -47,7 +47,7 @@ class Raster:
         whole = values.reshape(self.shape)[: rows * down, : columns * across]
         sums = np.add.reduceat(whole, np.arange(0, rows * down, down), axis=0, dtype=np.float32)
         sums = np.add.reduceat(sums, np.arange(0, columns * across, across), axis=1)
-        return np.asarray(sums / np.float32(down * across)).ravel()
+        return np.asarray(sums.ravel() / np.float32(down * across), np.float32)
 
     @property
     def pooled(self) -> int:

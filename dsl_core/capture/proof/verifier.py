@@ -176,8 +176,8 @@ class FrameProof:
         if found is None:
             return None
         pattern = line_profile(self._plan, found)
-        is_lit = pattern is not None and float(mean[(pattern > 0.5) & (count > 0)].mean()) > LEAST_LIGHT
-        return found if is_lit else None
+        light = np.zeros(0) if pattern is None else mean[(pattern > 0.5) & (count > 0)]
+        return found if light.size and float(light.mean()) > LEAST_LIGHT else None
 
     # Later settings: the same pictures were taken before ------------------------------------------------
 
@@ -264,7 +264,11 @@ class FrameProof:
     # What it all says -------------------------------------------------------------------------------------
 
     def _decide(
-        self, shot: Shot, contests: dict[Verdict, Contest], share: float | None, name: Callable[[], Shot | None]
+        self,
+        shot: Shot,
+        contests: dict[Verdict, Contest],
+        share: float | None,
+        name: Callable[[], Shot | None],
     ) -> Finding:
         told = {verdict: contest for verdict, contest in contests.items() if contest.is_told}
         lost = {verdict: contest for verdict, contest in told.items() if contest.is_lost}

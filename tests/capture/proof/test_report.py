@@ -38,7 +38,9 @@ def test_pictures_in_the_places_of_others_are_named(scene: RenderedScene, frames
     report = prove(_with(frames, {7: 6, 26: 27, 27: 26}), scene.calibration)
     named = [shot.index for finding in report.wrong for shot in finding.again]
     assert named == [6, 7, 26, 27]
-    assert report.sentences[0].startswith(f"{describe_shot(shots[6]).capitalize()} or {describe_shot(shots[7])}")
+    assert report.sentences[0].startswith(
+        f"{describe_shot(shots[6]).capitalize()} or {describe_shot(shots[7])}"
+    )
 
 
 def test_one_wrong_pair_leaves_the_lines_to_be_judged(scene: RenderedScene, frames: MemorySink) -> None:

@@ -39,9 +39,7 @@ def _judge_with(scene: RenderedScene, wrong: dict[int, Counts]) -> list[Finding]
 
 
 def _shot(scene: RenderedScene, role: str, pattern: int, setting: int) -> Shot:
-    return next(
-        s for s in scene.plan.shots() if (s.role, s.pattern, s.setting) == (role, pattern, setting)
-    )
+    return next(s for s in scene.plan.shots() if (s.role, s.pattern, s.setting) == (role, pattern, setting))
 
 
 def test_nothing_is_wrong_with_right_pictures_and_most_can_be_told(scene: RenderedScene) -> None:
