@@ -45,7 +45,8 @@ def test_a_wrong_picture_is_taken_again_and_noted(scene: RenderedScene, kind: st
     runner, spoiled = _run(scene, sink, PatternFault(kind, at))
     status = runner.run()
     assert status.state is State.FINISHED
-    assert spoiled.wrong and _wrong(sink, spoiled) == []
+    assert spoiled.wrong
+    assert _wrong(sink, spoiled) == []
     assert status.corrected > 0
     assert "captured again, because a picture did not show its pattern" in status.message
     assert sink.frames[at].corrected
@@ -98,6 +99,8 @@ def test_a_resumed_scan_learns_from_saved_frames_and_takes_wrong_ones_again(scen
         sink.frames[index] = replace(whole.frames[24 if index == 25 else index], frame_id=-1)
     runner, spoiled = _run(scene, sink, PatternFault("late", 30))
     assert runner.run().corrected == 2
-    assert spoiled.wrong and _wrong(sink, spoiled) == []
-    assert sink.frames[25].corrected and sink.frames[30].corrected
+    assert spoiled.wrong
+    assert _wrong(sink, spoiled) == []
+    assert sink.frames[25].corrected
+    assert sink.frames[30].corrected
     assert sink.frames[26].frame_id == -1

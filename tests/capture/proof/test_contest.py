@@ -12,7 +12,9 @@ WANTED, RIVAL = np.full(400, 900, np.float32), np.full(400, 100, np.float32)
 def test_a_picture_as_predicted_wins_and_the_rival_loses() -> None:
     won, lost = vote(WANTED, WANTED, RIVAL), vote(RIVAL, WANTED, RIVAL)
     assert (won.mean, lost.mean) == (1.0, -1.0)
-    assert won.is_told and not won.is_lost and not won.is_torn
+    assert won.is_told
+    assert not won.is_lost
+    assert not won.is_torn
     assert lost.is_lost
 
 
@@ -24,7 +26,8 @@ def test_half_way_between_is_no_vote_and_beyond_counts_no_more() -> None:
 def test_a_tear_is_found_at_either_end() -> None:
     for torn in (np.r_[WANTED[:360], RIVAL[360:]], np.r_[RIVAL[:40], WANTED[40:]]):
         found = vote(torn, WANTED, RIVAL)
-        assert found.is_torn and not found.is_lost
+        assert found.is_torn
+        assert not found.is_lost
         assert found.worst_end == -40.0
 
 

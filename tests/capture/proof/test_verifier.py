@@ -1,4 +1,4 @@
-"""Pictures of a small scene are judged one by one: right ones pass, wrong ones are named for what they are."""
+"""Pictures of a small scene are judged one by one: right ones pass, wrong ones are named."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _take(rig: DeviceRig, scene: RenderedScene, shot: Shot, shown: Shot | None =
 
 
 def _judge_with(scene: RenderedScene, wrong: dict[int, Counts]) -> list[Finding]:
-    """All that is found wrong when some pictures are replaced, and taken again where that is found at once."""
+    """All that is found wrong when some pictures are replaced; what is wrong is taken again."""
     rig, proof = scene.open(3), FrameProof(scene.plan, scene.calibration)
     found = []
     enough = max(_shot(scene, "black", 0, 0).index, *wrong) + 1
@@ -53,8 +53,8 @@ def test_nothing_is_wrong_with_right_pictures_and_most_can_be_told(scene: Render
 @pytest.mark.parametrize(
     ("role", "pattern", "setting"),
     [
-        ("code", 6, 0), ("code", 1, 0), ("white", 0, 0), ("black", 0, 0), ("spectral", 0, 0), ("spectral", 9, 0),
-        ("code", 6, 1), ("black", 0, 1), ("spectral", 9, 1),
+        ("code", 6, 0), ("code", 1, 0), ("white", 0, 0), ("black", 0, 0), ("spectral", 0, 0),
+        ("spectral", 9, 0), ("code", 6, 1), ("black", 0, 1), ("spectral", 9, 1),
     ],
 )  # fmt: skip
 def test_a_late_picture_is_found_whatever_its_shot(
