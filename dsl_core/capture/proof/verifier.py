@@ -242,6 +242,8 @@ class FrameProof:
         taken = self._kept.get(own) if own != shot.index else None
         if taken is not None:
             return taken.astype(np.float32)
+        if self._calibration is None:  # nobody knows how much of it is light
+            return old_black.astype(np.float32)
         level = np.float32(self._noise.sensor.black_level_dn)
         first = self._plan.settings[self._first]
         ratio = np.float32(shot.exposure_ms / first.exposure_ms)

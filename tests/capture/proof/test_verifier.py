@@ -42,8 +42,11 @@ def _shot(scene: RenderedScene, role: str, pattern: int, setting: int) -> Shot:
     return next(s for s in scene.plan.shots() if (s.role, s.pattern, s.setting) == (role, pattern, setting))
 
 
-def test_nothing_is_wrong_with_right_pictures_and_most_can_be_told(scene: RenderedScene) -> None:
-    rig, proof = scene.open(1), FrameProof(scene.plan, scene.calibration)
+@pytest.mark.parametrize("is_calibrated", [True, False])
+def test_nothing_is_wrong_with_right_pictures_and_most_can_be_told(
+    scene: RenderedScene, is_calibrated: bool
+) -> None:
+    rig, proof = scene.open(1), FrameProof(scene.plan, scene.calibration if is_calibrated else None)
     verdicts = [proof.judge(shot, _take(rig, scene, shot)).verdict for shot in scene.plan.shots()]
     assert set(verdicts) == {Verdict.RIGHT, Verdict.UNTOLD}
     # Of a code, patterns are judged with their inverse; nothing is known at the first.
