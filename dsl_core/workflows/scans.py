@@ -50,8 +50,11 @@ def reopen_rig(folder: Path) -> DeviceRig:
 def resume(
     rig: DeviceRig, folder: Path, progress: Progress | None = None, check_drift: bool = True
 ) -> Status:
-    """Resume a scan after a check whether anything moved; raises `DriftError` if it did."""
-    return scan(*prepare_resume(rig, folder, check_drift), folder, progress)
+    """Resume a scan after a check whether anything moved; raises `DriftError` if it did.
+
+    Without that check, pictures are not judged either: they may well show another scene.
+    """
+    return scan(*prepare_resume(rig, folder, check_drift), folder, progress, prove=check_drift)
 
 
 def prepare_resume(rig: DeviceRig, folder: Path, check_drift: bool = True) -> tuple[DeviceRig, CapturePlan]:

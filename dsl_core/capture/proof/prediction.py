@@ -99,26 +99,36 @@ def rescaled(picture: Counts, old_black: Counts, new_black: Floats, scale: float
 
 
 def contest_of_pictures(
-    seen: Counts, wanted: Expected, rival: Expected, black: Floats, noise: Noise, raster: Raster
+    seen: Counts,
+    wanted: Expected,
+    rival: Expected,
+    black: Floats,
+    least: Floats,
+    noise: Noise,
+    raster: Raster,
 ) -> Contest:
     """Which of two predicted pictures a picture is; ``black`` is the one without any light of the pattern.
 
+    Pixels that the predictions tell apart by less than ``least`` are not asked.
+
     Where pixels are too noisy to tell, means over blocks are asked.
     """
-    found = _contest(seen.astype(np.float32), noise.variance(seen), wanted, rival, black)
+    found = _contest(seen.astype(np.float32), noise.variance(seen), wanted, rival, black, least)
     if found.is_told:
         return found
     share = np.float32(1 / raster.pooled)
     variance = raster.pool(noise.variance(seen)) * share
     one, other = (Expected(raster.pool(e.counts), raster.pool(e.variance) * share) for e in (wanted, rival))
-    return _contest(raster.pool(seen), variance, one, other, raster.pool(black))
+    return _contest(raster.pool(seen), variance, one, other, raster.pool(black), raster.pool(least))
 
 
-def _contest(seen: Floats, variance: Floats, wanted: Expected, rival: Expected, black: Floats) -> Contest:
+def _contest(
+    seen: Floats, variance: Floats, wanted: Expected, rival: Expected, black: Floats, least: Floats
+) -> Contest:
     apart = np.abs(wanted.counts - rival.counts)
     light = np.maximum(wanted.counts, rival.counts) - black
     sigma = np.sqrt(variance + wanted.variance + rival.variance)
-    chosen = np.flatnonzero((apart > APART * light) & (apart > SIGMAS * sigma))
+    chosen = np.flatnonzero((apart > np.maximum(APART * light, least)) & (apart > SIGMAS * sigma))
     return vote(seen[chosen], wanted.counts[chosen], rival.counts[chosen])
 
 

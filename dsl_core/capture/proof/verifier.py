@@ -13,6 +13,7 @@ from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.prediction import (
+    APART,
     Expected,
     brightness_of_lines,
     brightness_of_picture,
@@ -29,6 +30,8 @@ from dsl_core.model.rig import Rig
 SAME_EXPOSURE = (0.68, 1.5)
 #: The same for the first shot of a setting, where only the calibration says how bright it should be.
 FIRST_EXPOSURE = (0.55, 1.8)
+#: How much brighter than expected a line may be.
+MOST_LIGHT = 3.0
 #: With less light than this, as a share of what is expected, a pattern counts as missing.
 LEAST_LIGHT = 0.2
 #: Light of a line relative to what it adds to white: a film sends the rest elsewhere.
@@ -191,15 +194,19 @@ class FrameProof:
             return Finding(shot, Verdict.UNTOLD)
         black = self._black(shot, old_black)
         white = rescaled(old_white, old_black, black, self._scale_of(shot), self._noise)
+        # Before its own black is there, only what is bright can be relied on.
+        has_black = shot.role != "black" and self._blacks[shot.setting] in self._kept
+        least = np.float32(0 if has_black else APART) * (white.counts - black)
         dark = Expected(black, self._noise.variance(old_black))
         rivals = [(verdict, self._expected(rival, shot)) for verdict, rival in self._rivals(shot)]
         rivals += [(Verdict.DARK, dark), (Verdict.OTHER, white)]
         contests = {
-            verdict: contest_of_pictures(seen, wanted, rival, black, self._noise, self._raster)
+            verdict: contest_of_pictures(seen, wanted, rival, black, least, self._noise, self._raster)
             for verdict, rival in rivals
             if rival is not None
         }
-        share = None if shot.role == "black" else brightness_of_picture(seen, wanted, black, self._noise)
+        is_judged = has_black or (self._calibration is not None and shot.role != "black")
+        share = None if not is_judged else brightness_of_picture(seen, wanted, black, self._noise)
         first_of_role = (shot.role, shot.setting) not in self._light
         found = self._decide(shot, contests, share, lambda: None)
         if found.is_wrong:
@@ -300,7 +307,7 @@ class FrameProof:
         """Light of the pictures before relative to their prediction; at first, what a film usually leaves."""
         known = self._light.get((shot.role, shot.setting))
         if known:
-            return float(np.median(known))
+            return min(float(np.median(known)), 1.0)
         return FILM_SHARE if shot.setting == self._first else 1.0
 
     def _judge_exposure(self, shot: Shot, share: float | None) -> Finding:
@@ -308,6 +315,8 @@ class FrameProof:
             return Finding(shot, Verdict.RIGHT)
         known = self._light.setdefault((shot.role, shot.setting), deque(maxlen=_REMEMBERED))
         low, high = SAME_EXPOSURE if known else FIRST_EXPOSURE
+        if shot.setting == self._first:
+            high = MOST_LIGHT  # beside a line is light that its model leaves out
         ratio = share / self._usual(shot)
         if not low < ratio < high and (known or self._calibration is not None):
             return Finding(shot, Verdict.EXPOSURE, (shot,), f"{ratio:.2g} times what was expected")
