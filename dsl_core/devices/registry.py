@@ -68,6 +68,11 @@ def rig_names() -> list[str]:
     return sorted({point.name for point in _points()})
 
 
+def is_built_in(name: str) -> bool:
+    """Whether a rig comes with this program, and so controls no devices."""
+    return any(point.name == name for point in BUILT_IN)
+
+
 def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     """Open the devices of a rig.
 

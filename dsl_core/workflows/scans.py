@@ -13,14 +13,14 @@ from dsl_core.capture.proof.report import WatchedSource, prove
 from dsl_core.capture.runner import Status
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import conditions_of
-from dsl_core.devices.registry import open_rig
+from dsl_core.devices.registry import is_built_in, open_rig
 from dsl_core.errors import CalibrationError, DecodeError, DriftError, StoreError
 from dsl_core.evaluation.cost import StageTimer
 from dsl_core.evaluation.summary import Truth
 from dsl_core.io.scan.check import require_complete
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.manifest import Manifest, read_manifest
-from dsl_core.io.scan.origin import model_notes, rig_of_notes
+from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_notes
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
@@ -38,11 +38,20 @@ DOUBTS = "frames_in_doubt"
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
-    """The rig that a scan was started with; raises `StoreError` when the scan does not say which."""
-    origin = rig_of_notes(read_manifest(folder).notes)
+    """The rig that a scan was started with; raises `StoreError` when the scan does not say which.
+
+    A scan from another computer opens the twin or a replay only: no devices because a file names them.
+    """
+    notes = read_manifest(folder).notes
+    origin = rig_of_notes(notes)
     if origin is None:
         raise StoreError(
             f"{folder} does not say with which rig it was captured. Name it with --rig and --option."
+        )
+    if not is_built_in(origin[0]) and not is_of_this_computer(notes):
+        raise StoreError(
+            f"{folder} was captured on another computer with the rig {origin[0]!r}, which is not opened only"
+            " because a file names it. If you mean that rig, name it with --rig and --option."
         )
     return open_rig(*origin)
 
@@ -173,14 +182,21 @@ def truth_of(
             "The result does not say with which rig it was captured, so there is no truth to compare with."
             " Name a twin of the scene with --truth-rig twin and --option."
         )
+    # A result from elsewhere must not open whatever it names; none but the twin has a truth.
+    if rig_name is None and not is_built_in(origin[0]):
+        raise DecodeError(_no_truth(origin[0]))
     with open_rig(*origin) as rig:
         truth = twin_truth(rig, _grid_of(result))
     if truth is None:
-        raise DecodeError(
-            f"The rig {origin[0]!r} has no ground truth of its scene."
-            " Name a twin of it with --truth-rig twin and --option."
-        )
+        raise DecodeError(_no_truth(origin[0]))
     return truth
+
+
+def _no_truth(rig_name: str) -> str:
+    return (
+        f"The rig {rig_name!r} has no ground truth of its scene."
+        " Name a twin of it with --truth-rig twin and --option."
+    )
 
 
 def _grid_of(result: xr.Dataset) -> WavelengthGrid:

@@ -9,13 +9,16 @@ import pytest
 
 from dsl_core.capture.movement import pick_reference_shots
 from dsl_core.devices.replay import replay_rig
-from dsl_core.errors import DeviceError
+from dsl_core.errors import DecodeError, DeviceError, StoreError
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
+from dsl_core.io.scan.origin import rig_notes
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.patterns.images import pattern_image
-from dsl_core.workflows.scans import prepare_resume, resume
+from dsl_core.workflows import scans
+from dsl_core.workflows.scans import prepare_resume, reopen_rig, resume, truth_of
 from tests.cases.memory_sink import MemorySink
+from tests.cases.small_result import small_result
 from tests.cases.small_rig import small_rig
 
 PLAN = CapturePlan(
@@ -87,3 +90,22 @@ def test_a_resumed_scan_has_its_own_calibration_and_the_rig_of_the_caller_stays(
 def test_a_whole_scan_is_left_as_it_is(folder: Path) -> None:
     resume(replay_rig(_taken(2)), folder)
     assert ScanReader(folder).sound() == set(range(PLAN.shot_count))
+
+
+@pytest.mark.parametrize("on", ["", "another computer"])
+def test_a_scan_from_elsewhere_does_not_open_devices(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, on: str
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(scans, "open_rig", lambda name, options: opened.append(name))
+    own = rig_notes("laboratory", {"port": "/dev/ttyS0"})
+    received = {key: value for key, value in own.items() if value != own["scanned_on"]}
+    ScanWriter.create(tmp_path / "a.dsl", PLAN, None, received | ({"scanned_on": on} if on else {})).close()
+    with pytest.raises(StoreError, match=r"captured on another computer with the rig 'laboratory'.*--rig"):
+        reopen_rig(tmp_path / "a.dsl")
+    with pytest.raises(DecodeError, match="'laboratory' has no ground truth"):
+        truth_of(small_result().assign_attrs(received))
+    assert opened == []
+    ScanWriter.create(tmp_path / "b.dsl", PLAN, None, own).close()
+    reopen_rig(tmp_path / "b.dsl")
+    assert opened == ["laboratory"]

@@ -224,5 +224,5 @@ def _calibration(note: CalibrationNote, accepted: AcceptedCalibration | None) ->
         own = (f"{key} {value}" for key, value in accepted.settings.items() if key != "rig")
         text = escape("; ".join(own))
         lines += [f"<i>{text}</i>"] if text else []
-    head = f"<b>{escape(note.title)}</b>, {short_date(note.accepted)}"
+    head = f"<b>{escape(note.title)}</b>, {escape(short_date(note.accepted))}"
     return f"<p>{head}<br>{'<br>'.join(lines)}</p>"

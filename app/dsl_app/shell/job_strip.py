@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from PySide6.QtWidgets import QLabel, QMenu, QProgressBar, QWidget
+from PySide6.QtWidgets import QMenu, QProgressBar, QWidget
 
 from dsl_app.shared.jobs.base import Job
 from dsl_app.shared.jobs.qt_runner import QtRunner
 from dsl_app.shared.notify import describe_seconds
-from dsl_app.shared.widgets.forms import named, push_button
+from dsl_app.shared.widgets.forms import label, named, push_button
 from dsl_app.shared.widgets.layouts import row_of
 
 
@@ -22,7 +22,7 @@ class JobStrip(QWidget):
         super().__init__(parent)
         self._runner = runner
         self._shown: Job[Any] | None = None
-        self._text = named(QLabel(), "Running job")
+        self._text = label("", name="Running job")
         self._bar = named(QProgressBar(), "Progress of the running job")
         self._bar.setFixedWidth(180)
         self._cancel = push_button("Cancel", "Stop this job at the next safe point; finished parts are kept")

@@ -36,7 +36,6 @@ class Toast(QFrame):
         self.setAccessibleName(f"{level}: {text}")
         self.level, self.text = level, text
         words = label(text, wraps=True, can_be_copied=True)
-        words.setTextFormat(Qt.TextFormat.PlainText)
         buttons = QVBoxLayout()
         row_of((words, 1), buttons, on=self, margins=(12, 8, 8, 8))
         for name, do in (offers or {}).items():
@@ -62,6 +61,7 @@ class Toast(QFrame):
 
     def _show(self, text: str, details: str) -> None:
         box = QMessageBox(QMessageBox.Icon.Information, "Details", text, parent=self.window())
+        box.setTextFormat(Qt.TextFormat.PlainText)
         box.setDetailedText(details)
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         box.open()

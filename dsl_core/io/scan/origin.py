@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import platform
 from collections.abc import Mapping
 from pathlib import Path
 
 from dsl_core.model.rig import Rig
 
-_RIG, _OPTIONS = "scanned_with", "scanned_with_options"
+_RIG, _OPTIONS, _COMPUTER = "scanned_with", "scanned_with_options", "scanned_on"
 _CALIBRATION, _CORRESPONDENCE = "calibration_digest", "correspondence"
 
 
@@ -17,7 +18,17 @@ def rig_notes(name: str, options: Mapping[str, str]) -> dict[str, str]:
     """Notes of a scan from which its rig can be opened again; paths are made absolute."""
     # A path is relative to where the scan was started, and a resume may start elsewhere.
     fixed = {key: str(Path(v).absolute()) if key == "session" else v for key, v in options.items()}
-    return {_RIG: name, _OPTIONS: json.dumps(fixed, sort_keys=True)}
+    return {_RIG: name, _OPTIONS: json.dumps(fixed, sort_keys=True), _COMPUTER: _this_computer()}
+
+
+def is_of_this_computer(notes: Mapping[str, object]) -> bool:
+    """Whether the notes were written on this computer, by this user."""
+    return notes.get(_COMPUTER) == _this_computer()
+
+
+def _this_computer() -> str:
+    """A digest, so that a scan that is handed on names neither computer nor user."""
+    return hashlib.sha256(f"{platform.node()}\n{Path.home()}".encode()).hexdigest()[:16]
 
 
 def rig_of_notes(notes: Mapping[str, object]) -> tuple[str, dict[str, str]] | None:

@@ -126,9 +126,12 @@ def label(
 ) -> QLabel:
     """A label in a role of the style sheet (muted, title, heading, good, warn, bad); may break its lines.
 
-    Screen readers tell the ``name`` before the text.
+    Screen readers tell the ``name`` before the text. The text is never read as markup: it may come from a
+    file of a stranger.
     """
-    made = QLabel(text)
+    made = QLabel()
+    made.setTextFormat(Qt.TextFormat.PlainText)
+    made.setText(text)
     made.setWordWrap(wraps)
     made.setAccessibleName(name)
     if can_be_copied:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, named, push_button, quiet
+from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, check_box, label, named, push_button, quiet
 from dsl_app.shared.widgets.read_table import RIGHT, ReadTable, cell
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
@@ -80,3 +80,13 @@ def test_a_table_to_read_shows_whole_cells_and_is_left_by_tab(qtbot: QtBot) -> N
     assert {index.column() for index in table.selectedIndexes()} == {0, 1}
     QTest.keyClick(table, Qt.Key.Key_Tab)
     assert after.hasFocus()
+
+
+def test_a_label_never_reads_its_text_as_markup(qtbot: QtBot) -> None:
+    words = label("<b>bold</b><img src='http://example.org/x.png'>")
+    qtbot.addWidget(words)
+    assert words.textFormat() is Qt.TextFormat.PlainText
+    words.setText("<h1>large</h1>")
+    plain = label("x" * 14)
+    qtbot.addWidget(plain)
+    assert words.sizeHint().height() == plain.sizeHint().height()
