@@ -16,7 +16,7 @@ from dsl_core.optics.spectra import ORDERS
 from dsl_core.reconstruction.spectral.film_motion import FIELDS, FilmMotion, fit_motion, with_film
 from dsl_core.reconstruction.spectral.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe, ProbedScan
-from dsl_core.reconstruction.spectral.probed_pixels import cell_of, sample_pixels
+from dsl_core.reconstruction.spectral.probed_pixels import CELLS, cell_of, sample_pixels
 from dsl_core.reconstruction.spectral.solver import Prior
 from dsl_core.reconstruction.spectral.spectra import model_of_plan
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
@@ -97,10 +97,11 @@ def test_lines_that_are_not_symmetric_are_no_motion(scan: ProbedScan) -> None:
     assert fit_motion(scan, probed({"shift +1": both, "shift -1": both})) is None
 
 
-def test_displacement_of_one_cell_is_no_motion_of_the_film(scan: ProbedScan) -> None:
+def test_displacement_of_a_corner_is_no_motion_of_the_film(scan: ProbedScan) -> None:
     pixel = sample_pixels(np.ones(SHAPE, bool), 8)
-    cell = cell_of(*np.divmod(pixel, SHAPE[1]), SHAPE)
-    assert fit_motion(scan, probed({"shift +1": np.where(cell == 20, 1.5, 0.0)})) is None
+    down, across = np.divmod(cell_of(*np.divmod(pixel, SHAPE[1]), SHAPE), CELLS[1])
+    corner = np.where((down < 2) & (across < 2), 1.0, 0.0)
+    assert fit_motion(scan, probed({"shift +1": corner, "shift -1": corner})) is None
 
 
 def test_a_small_piece_of_one_colour_tells_nothing(scan: ProbedScan) -> None:
