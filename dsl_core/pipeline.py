@@ -96,10 +96,10 @@ def reconstruct(
         own_lateral_colour,
     )
     from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
-    from dsl_core.reconstruction.fit.spread import spread_findings
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
+    from dsl_core.reconstruction.spread_findings import spread_findings
 
     options, progress, timer = options or Options(), progress or NoProgress(), timer or StageTimer()
     plan = check_source(source, rig)

@@ -27,6 +27,9 @@ Part = Literal[
     "lateral colour",
 ]
 
+#: How many deviations of its own a figure must be away from zero.
+SIGMAS = 3.0
+
 #: The parts as a sentence names them.
 PARTS: dict[Part, str] = {
     "profile": "the profile of the lines",
@@ -41,6 +44,11 @@ PARTS: dict[Part, str] = {
     "geometry": "the geometry",
     "lateral colour": "the lateral colour of the lenses",
 }
+
+
+def matters(value: float, std: float, limit: float) -> bool:
+    """Whether a figure is above its limit, and too far from zero for chance."""
+    return bool(abs(value) > max(limit, SIGMAS * std))
 
 
 class FitFinding(Record):
@@ -60,6 +68,31 @@ class FitFinding(Record):
     significant: bool
     sentence: str
     advice: str = ""
+
+    @classmethod
+    def judged(
+        cls,
+        part: Part,
+        name: str,
+        found: float | tuple[float, float],
+        unit: str,
+        limit: float,
+        sentence: str,
+        advice: str,
+    ) -> FitFinding:
+        """A finding of a value, or a value and its deviation, that is significant where it `matters`."""
+        value, std = found if isinstance(found, tuple) else (found, None)
+        return cls(
+            part=part,
+            name=name,
+            value=value,
+            std=std,
+            unit=unit,
+            limit=limit,
+            significant=matters(value, std or 0.0, limit),
+            sentence=sentence,
+            advice=advice,
+        )
 
     @property
     def severity(self) -> float:

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from dsl_core import __version__
 from dsl_core.model.calibration.accepted import missed_attributes
-from dsl_core.model.fit import ATTRIBUTE, Fit, FitFinding
+from dsl_core.model.fit import ATTRIBUTE, FitFinding
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.result import SPECTRUM_INVALID, Flag, build_result
 from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
-from dsl_core.reconstruction.fit.findings import fit_of
+from dsl_core.reconstruction.fit_findings import fit_of
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
@@ -81,7 +81,7 @@ def assemble(
         )
     arrays["flags"] = flags
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
-    fit = Fit.of([*findings, *fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra).findings])
+    fit = fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra, findings)
     attributes[ATTRIBUTE] = fit.model_dump_json()
     attributes |= missed_attributes(rig.calibrations)
     return build_result(arrays, grid.centres_nm, attributes)

@@ -44,6 +44,15 @@ def test_the_part_of_the_model_in_the_deviations_is_told_where_it_matters() -> N
     assert Fit.of([finding("orders", 0.5, False)], error).words == "The model fits this rig and scene."
 
 
+@pytest.mark.parametrize(
+    ("found", "significant"), [(0.3, True), (0.1, False), ((-0.3, 0.05), True), ((0.3, 0.11), False)]
+)
+def test_a_finding_matters_beyond_its_limit_and_chance(
+    found: float | tuple[float, float], significant: bool
+) -> None:
+    assert FitFinding.judged("light", "drift", found, "1", 0.2, "Drift.", "Wait.").significant == significant
+
+
 def test_it_travels_in_a_saved_result(tmp_path: Path) -> None:
     fit = Fit.of([finding("orders", 1.5, True), finding("mixed pixels", 0.25, False)], (((0.01,),),))
     arrays: dict[str, NDArray[np.generic]] = {"depth_mm": np.ones((2, 3), np.float32)}

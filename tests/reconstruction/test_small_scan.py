@@ -13,6 +13,7 @@ from dsl_core.calibration.film.correspondence import fit_grid
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import Cancelled, PlanError
 from dsl_core.evaluation.summary import Evaluation
+from dsl_core.model.fit import Fit
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines
 from dsl_core.model.result import Reach, build_result
 from dsl_core.model.rig import Rig
@@ -66,6 +67,8 @@ def test_both_correspondence_models_give_the_same_spectra(scanned: tuple[DeviceR
     assert np.isfinite(difference).mean() > 0.5
     assert np.nanmedian(difference) < 0.01
     assert np.nanmax(difference) > 0
+    fits = [Fit.read({str(name): value for name, value in result.attrs.items()}) for result in of.values()]
+    assert all(fit is not None and 0 < fit.model_share < 0.2 for fit in fits)
 
 
 def test_a_cancel_while_columns_are_refined_leaves_the_other_chunks(

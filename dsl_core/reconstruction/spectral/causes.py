@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.model.fit import matters
 from dsl_core.reconstruction.spectral.pooled import pool
 from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, PRIOR_STD, Probe
 
@@ -14,15 +15,8 @@ Floats = NDArray[np.float64]
 
 #: What matters of the place of the orders (px) and of their gains.
 MOST_SHIFT_PX, MOST_GAIN = 0.035, 0.015
-#: How many deviations of its own a figure must be away from zero.
-SIGMAS = 3.0
 #: Terms of the shift of an order over the picture: up to second degree.
 _TERMS = 6
-
-
-def matters(value: float, std: float, limit: float) -> bool:
-    """Whether a figure is above its limit, and too far from zero for chance."""
-    return bool(abs(value) > max(limit, SIGMAS * std))
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from dsl_core.model.fit import SIGMAS
 from dsl_core.model.rig import Rig
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.causes import SIGMAS
 from dsl_core.reconstruction.spectral.pooled import pool
 from dsl_core.reconstruction.spectral.probe import LEADING, PARAMETERS, Probe, ProbedScan
 from dsl_core.reconstruction.spectral.probe import PRIOR_STD as PARAMETER_STD

@@ -66,18 +66,15 @@ def _curve_finding(calibrated: ProjectorResponse, found: SpreadFit) -> FitFindin
     elsewhere = 0.5 * float(np.abs(curves[1] - curves[0]).sum()) * GRID_PX
     far = np.abs(places) > TAIL_PX
     tails = [float(curve[far].sum()) * GRID_PX for curve in curves]
-    return FitFinding(
-        part="profile",
-        name="line spread",
-        value=100 * elsewhere,
-        unit="% of the light of a line elsewhere than calibrated",
-        limit=100 * MOST_ELSEWHERE,
-        significant=elsewhere > MOST_ELSEWHERE,
-        sentence=(
-            f"The projector spreads light over {own.blur_px:.3f} ± {found.rms_std_px:.3f} px (rms), by its"
-            f" calibration over {calibrated.blur_px:.3f} px; {elsewhere:.1%} of it falls elsewhere, and"
-            f" {tails[1]:.1%} instead of {tails[0]:.1%} farther than {TAIL_PX:g} px away. The own spread"
-            " of the scan was used."
-        ),
-        advice="Focus the projector as for its calibration, or calibrate again.",
+    return FitFinding.judged(
+        "profile",
+        "line spread",
+        100 * elsewhere,
+        "% of the light of a line elsewhere than calibrated",
+        100 * MOST_ELSEWHERE,
+        f"The projector spreads light over {own.blur_px:.3f} ± {found.rms_std_px:.3f} px (rms), by its"
+        f" calibration over {calibrated.blur_px:.3f} px; {elsewhere:.1%} of it falls elsewhere, and"
+        f" {tails[1]:.1%} instead of {tails[0]:.1%} farther than {TAIL_PX:g} px away. The own spread"
+        " of the scan was used.",
+        "Focus the projector as for its calibration, or calibrate again.",
     )

@@ -1,1 +1,0 @@
-"""What a scan says by itself about how well its model fits."""

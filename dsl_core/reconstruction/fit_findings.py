@@ -1,0 +1,295 @@
+"""Everything that is found about the fit of a result: by its flags, its bands and its scan's probed pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import SIGMAS, Fit, FitFinding, Part
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.result import DEPTH_INVALID, Flag, Reach
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.optics.correspondence import GratingModel
+from dsl_core.optics.line_set import LineSet
+from dsl_core.optics.spectra import ORDERS
+from dsl_core.reconstruction.spectral.causes import MOST_GAIN, MOST_SHIFT_PX, Causes, fit_causes
+from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion
+from dsl_core.reconstruction.spectral.line_probe import PROFILE
+from dsl_core.reconstruction.spectral.probe import Probe
+
+if TYPE_CHECKING:
+    from dsl_core.reconstruction.spectral.spectra import SpectralMaps
+
+#: Shares of pixels above which a scan is not what the twin's scenes lead to expect.
+MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED = 0.4, 0.1, 0.1, 0.5
+#: Bands wider than this many lines leave structure in the data that straight pieces cannot follow.
+WIDEST_BAND = 1.25
+#: Fewer pixels say nothing.
+FEWEST = 50
+#: What matters of blur and tail of the lines, and of the light over the scan.
+MOST_BLUR, MOST_TAIL, MOST_DRIFT = 0.03, 0.004, 0.014
+#: Chi-square of most pixels above which no cause explains the frames.
+MOST_CHI_SQUARE = 1.5
+#: Said of what spectra already follow.
+CORRECTED = " The spectra of this result are corrected for it."
+#: Words, decimals and unit of the numbers of a film, as in `FIELDS`.
+_MOTIONS = (
+    ("tilted about the horizontal", 2, "°"),
+    ("tilted about the vertical", 2, "°"),
+    ("turned in its plane", 2, "°"),
+    ("bent", 5, "/mm"),
+    ("away from the projector", 2, " mm"),
+)
+_CALIBRATE = "Run the drift check; calibrate again the part that it names."
+
+
+def fit_of(
+    rig: Rig,
+    plan: CapturePlan,
+    grid: WavelengthGrid,
+    depth_mm: NDArray[np.floating],
+    flags: NDArray[np.integer],
+    spectra: SpectralMaps | None,
+    earlier: Iterable[FitFinding] = (),
+) -> Fit:
+    """The verdict on a result with these depths and flags (rows, columns), and what was found on the way."""
+    findings = [*earlier, *share_findings(flags, spectra is not None)]
+    width_nm = line_width_nm(rig, plan, grid, depth_mm)
+    if spectra is not None and width_nm is not None:
+        findings += band_findings(grid.step_nm, width_nm, spectra.data_share, spectra.reach)
+    if spectra is not None and spectra.followed is not None:
+        followed = spectra.followed
+        findings += cause_findings(followed.probe, followed.balanced, followed.motion)
+    error = None if spectra is None else spectra.error
+    return Fit.of(findings, () if error is None else np.round(error.relative, 4).tolist())
+
+
+def line_width_nm(
+    rig: Rig, plan: CapturePlan, grid: WavelengthGrid, depth_mm: NDArray[np.floating]
+) -> float | None:
+    """Width of a projected line over wavelength at the median depth of the picture's middle.
+
+    None where patterns are no lines or no order reaches the middle.
+    """
+    import torch
+
+    lines = LineSet.of(plan)
+    known = depth_mm[np.isfinite(depth_mm)]
+    if lines is None or known.size == 0:
+        return None
+    height, width = depth_mm.shape
+    pixel = torch.tensor([height // 2 * width + width // 2])
+    depth = torch.tensor([float(np.median(known))], dtype=torch.float64)
+    ends = np.array([grid.start_nm, grid.stop_nm], np.float64)
+    slopes = []
+    for order in ORDERS:
+        columns = GratingModel(rig).trace(pixel, depth, order, ends).columns
+        slopes.append(float((columns[1] - columns[0]).abs().max()) / float(ends[1] - ends[0]))
+    dispersion = max((slope for slope in slopes if np.isfinite(slope)), default=0.0)
+    return lines.width_px / dispersion if dispersion > 0 else None
+
+
+def share_findings(flags: NDArray[np.integer], has_spectra: bool) -> Iterator[FitFinding]:
+    """Findings from the flags (rows, columns) of a result."""
+    bits = flags.astype(np.int64)
+    lit = (bits & int(Flag.NO_LIGHT)) == 0
+    measured = lit & ((bits & int(DEPTH_INVALID)) == 0)
+    if np.count_nonzero(lit) >= FEWEST:
+        yield _share(
+            "coverage",
+            "lit pixels without a depth",
+            lit,
+            ~measured,
+            MOST_LOST,
+            "Light reaches {0} of the pixels that have no depth.",
+            "See the flags: codes that disagree or a depth out of range tell of motion, of surfaces that"
+            " light each other, or of another rig's calibration.",
+        )
+    if not has_spectra or np.count_nonzero(measured) < FEWEST:
+        return
+    yield _share(
+        "mixed pixels",
+        "poor fit",
+        measured,
+        (bits & int(Flag.POOR_FIT)) != 0,
+        MOST_POOR,
+        "No spectrum explains the line frames of {0} of the pixels.",
+        "Look at a picture of the flags: along edges a pixel sees two materials, and more pixels help.",
+    )
+    yield _share(
+        "light",
+        "at a bound",
+        measured,
+        (bits & int(Flag.AT_BOUND)) != 0,
+        MOST_AT_BOUND,
+        "The spectra of {0} of the pixels touch 0 or 1.5.",
+        "Look for highlights and for light that the scan's black frames do not have.",
+    )
+
+
+def _share(
+    part: Part,
+    name: str,
+    among: NDArray[np.bool_],
+    where: NDArray[np.bool_],
+    limit: float,
+    sentence: str,
+    advice: str,
+) -> FitFinding:
+    share = float(np.mean(where[among]))
+    return FitFinding.judged(part, name, share, "share", limit, sentence.format(f"{share:.0%}"), advice)
+
+
+def band_findings(
+    step_nm: float, line_nm: float, data_share: NDArray[np.floating], reach: NDArray[np.integer]
+) -> Iterator[FitFinding]:
+    """Whether bands of ``step_nm`` suit lines that are ``line_nm`` wide, and what data there are.
+
+    ``data_share`` and ``reach`` (bands, rows, columns) are those of a result, NaN and 0 where there is none.
+    """
+    wide = step_nm / line_nm
+    yield FitFinding.judged(
+        "bands",
+        "width of a band in lines",
+        wide,
+        "1",
+        WIDEST_BAND,
+        f"Bands of {step_nm:g} nm are coarse for lines that are {line_nm:.0f} nm wide.",
+        f"Reconstruct with bands of at most {line_nm:.0f} nm.",
+    )
+    reached = (reach & int(Reach.PLUS_ONE | Reach.MINUS_ONE) != 0) & np.isfinite(data_share)
+    if np.count_nonzero(reached) < FEWEST:
+        return
+    undecided = float(np.mean(data_share[reached] < 0.5))
+    yield FitFinding.judged(
+        "bands",
+        "bands that lines reach and the prior decides",
+        undecided,
+        "share",
+        MOST_UNDECIDED,
+        f"Bands of {step_nm:g} nm are too fine for the data, which leave {undecided:.0%} open.",
+        "Reconstruct with wider bands, or expose longer.",
+    )
+
+
+def cause_findings(
+    probe: Probe, corrected: bool | None = None, motion: FilmMotion | None = None
+) -> Iterator[FitFinding]:
+    """What the probed pixels of a scan say about each part of the model.
+
+    ``corrected`` results follow what was found of the orders' light; where that was tried and did not make
+    the frames fit better (False), it is not a finding. ``motion`` is that of the film, which the model of
+    the probe follows already.
+    """
+    causes = fit_causes(probe)
+    if motion is not None:
+        yield _motion(motion, probe)
+    place = _film(causes, probe)
+    yield place.model_copy(update={"significant": place.significant and probe.places})
+    for finding in _gains(causes, bool(corrected)):
+        refuted = corrected is False and finding.part == "orders"
+        yield finding.model_copy(update={"significant": finding.significant and not refuted})
+    for index, (value, std) in enumerate(zip(probe.lines.values, probe.lines.std, strict=True)):
+        yield _profile(PROFILE[index], float(value), float(std))
+    yield FitFinding.judged(
+        "light",
+        "change of the light over the scan",
+        (causes.drift, causes.drift_std),
+        "1",
+        MOST_DRIFT,
+        f"The light has changed by {causes.drift:+.1%} from the first line to the last.",
+        "Let the projector warm up for longer.",
+    )
+    usual = float(np.median(probe.chi_square))
+    yield FitFinding.judged(
+        "profile",
+        "chi-square of most pixels",
+        usual,
+        "1",
+        MOST_CHI_SQUARE,
+        f"Frames of most pixels differ from the model by {np.sqrt(usual):.1f} times their noise.",
+        _CALIBRATE,
+    )
+
+
+def _motion(motion: FilmMotion, probe: Probe) -> FitFinding:
+    surely = np.abs(motion.values) > SIGMAS * motion.std
+    clauses = [
+        f"{words} by {value:+.{digits}f} ± {std:.{digits}f}{unit}"
+        for (words, digits, unit), value, std, sure in zip(
+            _MOTIONS, motion.values, motion.std, surely, strict=True
+        )
+        if sure
+    ]
+    return FitFinding(
+        part="film",
+        name="movement of the film",
+        value=motion.shift_px,
+        std=motion.shift_std_px,
+        unit="px",
+        limit=LEAST_MOTION_PX,
+        significant=True,
+        sentence=f"The film has moved since the calibration: {', '.join(clauses)}. This displaces wavelengths"
+        f" by {motion.shift_px * probe.nm_per_px:.2f} nm." + CORRECTED,
+        advice="Fix the film so that it cannot slip; if it moves further, repeat the depth-stage calibration."
+        " The level of the light may have changed, too, which no scan can tell: the drift check with the"
+        " Spectralon does.",
+    )
+
+
+def _film(causes: Causes, probe: Probe) -> FitFinding:
+    plus, minus = causes.shift_px[probe.sound].mean(0)
+    return FitFinding.judged(
+        "film",
+        "place of the first orders",
+        (causes.rms_px, causes.rms_std_px),
+        "px",
+        MOST_SHIFT_PX,
+        f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
+        f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent otherwise.",
+        "Run the drift check, and calibrate the depth stage again.",
+    )
+
+
+def _gains(causes: Causes, corrected: bool) -> Iterator[FitFinding]:
+    plus, minus = causes.gain
+    common = causes.common_gain
+    yield FitFinding.judged(
+        "orders",
+        "difference between the gains of the orders",
+        (float(plus - minus), causes.difference_std),
+        "1",
+        MOST_GAIN,
+        f"Order +1 is {plus:+.1%} and order -1 {minus:+.1%} brighter than the zero order lets expect."
+        + CORRECTED * corrected,
+        "Calibrate the efficiency of the orders again with the bandpass filters.",
+    )
+    yield FitFinding.judged(
+        "response",
+        "gain of both orders against the zero order",
+        (common, causes.common_std),
+        "1",
+        MOST_GAIN,
+        f"Both first orders are {common:+.1%} brighter than the zero order lets expect: the response to level"
+        " or exposure is not as calibrated.",
+        "Repeat the self-test.",
+    )
+
+
+def _profile(name: str, value: float, std: float) -> FitFinding:
+    blur = name == "blur"
+    return FitFinding.judged(
+        "profile",
+        f"{name} of the lines",
+        (value, std),
+        "1",
+        MOST_BLUR if blur else MOST_TAIL,
+        f"Lines are {value:+.1%} more blurred than the calibration says."
+        if blur
+        else f"{abs(value):.1%} of the light of a line lies {'' if value > 0 else 'less '}in its tails.",
+        "Repeat the self-test with the projector in focus.",
+    )
