@@ -22,13 +22,13 @@ from dsl_core.campaign.assembly import (
     require_same_devices,
 )
 from dsl_core.campaign.common.captures import (
+    NOTE_NAME,
     CaptureNote,
     other_conditions,
     read_note,
     recover,
     replacing,
     scan_settings,
-    write_note,
 )
 from dsl_core.campaign.common.recipe import AnyRecipe, Bench, Step
 from dsl_core.campaign.recipes import campaign_recipes
@@ -36,6 +36,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError, StoreError
 from dsl_core.io.campaign_folder import CampaignFolder, now
+from dsl_core.io.records import replace_record
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.figure import Figure
@@ -148,19 +149,19 @@ class CalibrationSession:
     def _capture(self, step: Step, progress: Progress) -> None:
         folder = self._folder(step)
         note = read_note(folder) or CaptureNote(conditions=current_conditions(self.devices), started=now())
-        write_note(folder, note)
+        replace_record(folder / NOTE_NAME, note)
         self.campaign.discard(self.recipe.name)
         self._place_again(step)
         try:
             self.recipe.capture(self.bench, step, progress)
         except CalibrationError as error:
-            write_note(folder, note.model_copy(update={"refused": str(error)}))
+            replace_record(folder / NOTE_NAME, note.model_copy(update={"refused": str(error)}))
             raise
         if not self.recipe.is_captured(self.bench, step):
             raise CalibrationError(
                 f"The step {step.title!r} is not complete yet. Capture it again to continue."
             )
-        write_note(folder, note.model_copy(update={"finished": now(), "refused": ""}))
+        replace_record(folder / NOTE_NAME, note.model_copy(update={"finished": now(), "refused": ""}))
 
     def fit(self, progress: Progress | None = None) -> AcceptedCalibration:
         """Calibrate from the captures of all steps; the outcome waits on disk to be accepted.

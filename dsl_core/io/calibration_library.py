@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Literal
 
 from dsl_core.errors import DslError, StoreError
-from dsl_core.io.atomic import make_folder, write_atomic
+from dsl_core.io.atomic import write_atomic
 from dsl_core.io.campaign_folder import now
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.io.rig_file import load_rig
@@ -102,9 +102,7 @@ class CalibrationLibrary:
         """Add a version of a name and make it the current one; raises `StoreError`."""
         check_name(name)
         entry = LibraryEntry(name=name, stored=now(), rig=rig, accepted=accepted, history=history)
-        folder = self.home / name / "versions"
-        make_folder(folder)
-        replace_record(folder / f"{entry.stamp}.json", entry)
+        replace_record(self.home / name / "versions" / f"{entry.stamp}.json", entry)
         self._set_current(name, entry.stamp)
         return entry
 

@@ -24,7 +24,6 @@ from pydantic import Field
 
 from dsl_core.errors import StoreError
 from dsl_core.io import CAMPAIGN_NAME
-from dsl_core.io.atomic import make_folder
 from dsl_core.io.records import read_record, replace_record
 from dsl_core.model.base import Record
 from dsl_core.model.calibration.accepted import AcceptedCalibration
@@ -97,7 +96,6 @@ class CampaignFolder:
 
     def save(self) -> None:
         """Write what the campaign was begun with; raises `StoreError`."""
-        make_folder(self.path)
         replace_record(self.path / CAMPAIGN_NAME, self.info)
 
     def with_settings(self, name: str, values: Mapping[str, str]) -> Self:
@@ -126,9 +124,7 @@ class CampaignFolder:
 
     def propose(self, fitted: AcceptedCalibration) -> None:
         """Keep a fit until it is accepted or discarded."""
-        path = self._candidate_path(fitted.name)
-        make_folder(path.parent)
-        replace_record(path, fitted)
+        replace_record(self._candidate_path(fitted.name), fitted)
 
     def accept(self, name: str) -> AcceptedCalibration:
         """Accept the candidate; the one it replaces goes into the history.
@@ -140,9 +136,7 @@ class CampaignFolder:
             raise StoreError(f"There is no fit of {name} in {self.path} to be accepted. Fit it first.")
         old = self.accepted(name)
         if old is not None:
-            folder = self.path / "history" / name
-            make_folder(folder)
-            replace_record(folder / f"{_as_name(old.accepted)}.json", old)
+            replace_record(self.path / "history" / name / f"{_as_name(old.accepted)}.json", old)
         fresh = candidate.model_copy(update={"accepted": now()})
         replace_record(self.path / f"{name}.json", fresh)
         self.discard(name)

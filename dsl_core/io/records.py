@@ -8,7 +8,7 @@ from typing import TypeVar
 from pydantic import ValidationError
 
 from dsl_core.errors import DslError, StoreError
-from dsl_core.io.atomic import write_atomic
+from dsl_core.io.atomic import make_folder, write_atomic
 from dsl_core.io.reading import read_bounded
 from dsl_core.io.sealed import SealError, seal, unseal
 from dsl_core.io.staging import write_text
@@ -26,7 +26,11 @@ def write_record(path: Path, record: Record, *, overwrite: bool = False) -> Path
 
 
 def replace_record(path: Path, record: Record) -> None:
-    """Write a record with its checksum in place of an older one; raises `StoreError`."""
+    """Write a record with its checksum in place of an older one, in a folder that is made if need be.
+
+    Raises `StoreError`.
+    """
+    make_folder(path.parent)
     write_atomic(path, seal(record.model_dump_json(indent=1)))
 
 

@@ -58,6 +58,11 @@ def _decimals(step: float) -> int:
     return 0 if step <= 0 else min(max(1 - math.floor(math.log10(step)), 0), 9)
 
 
+def doubts(name: str, sentences: tuple[str, ...], between: str = ". ") -> Figure:
+    """How many doubts there are, of which there should be none; the advice is what they say."""
+    return Figure(name=name, value=float(len(sentences)), unit="", high=0.0, advice=between.join(sentences))
+
+
 def failures(figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
     """The figures outside their limits."""
     return tuple(figure for figure in figures if not figure.passed)

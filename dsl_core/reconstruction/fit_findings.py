@@ -1,4 +1,4 @@
-"""Everything that is found about the fit of a result: by its flags, its bands and its scan's probed pixels."""
+"""Everything found about the fit of a result: by its flags, its bands and its scan's probed pixels."""
 
 from __future__ import annotations
 

@@ -75,11 +75,11 @@ def line_fit(design: Floats, values: Floats, std: Floats) -> tuple[Floats, Float
     return found, covariance * max(1.0, chi2 / spare if spare > 0 else 1.0)
 
 
-def joined(first: Readings, second: Readings) -> Readings:
-    """The rows of both."""
+def joined(*parts: Readings) -> Readings:
+    """The rows of all, one after the other."""
     return Readings(
         **{
-            each.name: np.concatenate([getattr(first, each.name), getattr(second, each.name)])
-            for each in fields(first)
+            each.name: np.concatenate([getattr(part, each.name) for part in parts])
+            for each in fields(Readings)
         }
     )

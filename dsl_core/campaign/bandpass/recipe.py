@@ -32,7 +32,7 @@ from dsl_core.campaign.common.white_shot import (
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, apply_bandpass
-from dsl_core.model.figure import Figure
+from dsl_core.model.figure import Figure, doubts
 from dsl_core.model.placement import Placement
 from dsl_core.model.plan import CapturePlan, GrayCode, NoCode, ScanLines, Setting
 from dsl_core.model.rig import Rig
@@ -239,13 +239,7 @@ def bandpass_figures(record: BandpassCalibration, done: Collection[str] = ()) ->
             high=2.0,
             advice="Focus the projector on the target.",
         ),
-        Figure(
-            name="filters in doubt",
-            value=float(len(record.warnings)),
-            unit="",
-            high=0.0,
-            advice=". ".join(record.warnings),
-        ),
+        doubts("filters in doubt", record.warnings),
     ]
     return tuple(figures)
 

@@ -17,7 +17,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder, sync_folder
 from dsl_core.io.reading import read_json
-from dsl_core.io.records import read_record, replace_record
+from dsl_core.io.records import read_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import CaptureConditions, differences
 
@@ -41,12 +41,6 @@ def read_note(folder: Path) -> CaptureNote | None:
     """The note of a step, None where nothing has been started; raises `StoreError` when it is damaged."""
     path = folder / NOTE_NAME
     return read_record(path, CaptureNote) if path.exists() else None
-
-
-def write_note(folder: Path, note: CaptureNote) -> None:
-    """Write the note of a step; raises `StoreError`."""
-    make_folder(folder)
-    replace_record(folder / NOTE_NAME, note)
 
 
 def other_conditions(folder: Path, now: CaptureConditions) -> tuple[str, ...]:

@@ -84,9 +84,7 @@ class Bench:
 
     def keep(self, step: Step, name: str, record: Record) -> None:
         """Write a record into a step's folder; raises `StoreError`."""
-        folder = self.step_folder(step)
-        make_folder(folder)
-        replace_record(folder / name, record)
+        replace_record(self.step_folder(step) / name, record)
 
     def kept(self, step: Step, name: str, kind: type[RecordT]) -> RecordT:
         """A record that `keep` wrote; raises `StoreError`."""

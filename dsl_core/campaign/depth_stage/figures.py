@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dsl_core.model.calibration.chain import ChainCorrection
 from dsl_core.model.calibration.depth_stage import DepthStageCalibration, StagePosition
-from dsl_core.model.figure import Figure
+from dsl_core.model.figure import Figure, doubts
 
 #: Error of a stage's step, mm; error of columns that a fit never saw, px.
 MAX_STEP_MM, MAX_HELD_OUT_PX = 0.1, 0.3
@@ -77,13 +77,7 @@ def depth_stage_figures(record: DepthStageCalibration) -> tuple[Figure, ...]:
         *film,
         *_filter_index(record),
         *_chain(record.chain),
-        Figure(
-            name="captures in doubt",
-            value=float(len(record.warnings)),
-            unit="",
-            high=0.0,
-            advice=". ".join(record.warnings),
-        ),
+        doubts("captures in doubt", record.warnings),
     )
 
 

@@ -10,7 +10,7 @@ from dsl_core.campaign.common.white_shot import WhiteLevel, other_light
 from dsl_core.model.board import Board, corner_positions_mm
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from dsl_core.model.calibration.pose_frames import PoseFrames
-from dsl_core.model.figure import Figure
+from dsl_core.model.figure import Figure, doubts
 from dsl_core.model.rig import Rig
 
 #: A board of fewer corners than this share in view says too little.
@@ -115,11 +115,5 @@ def geometry_figures(record: GeometryCalibration) -> tuple[Figure, ...]:
             advice=more,
         ),
         Figure(name="picture covered, projector", value=100 * record.projector_coverage, unit="%"),
-        Figure(
-            name="doubts about poses and print",
-            value=float(len(record.warnings)),
-            unit="",
-            high=0.0,
-            advice=" ".join(record.warnings),
-        ),
+        doubts("doubts about poses and print", record.warnings, " "),
     )

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.calibration.selftest.readings import Readings
+from dsl_core.calibration.selftest.readings import Readings, joined
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
@@ -42,22 +42,6 @@ class Region:
     beside: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
 
 
-@dataclass(frozen=True)
-class _Row:
-    """One row of `Readings`."""
-
-    exposure_ms: float
-    timestamp_s: float
-    gap_ms: float
-    since_show: int
-    drive: Drive
-    mean_dn: list[float]
-    beside_dn: list[float]
-    clipped: list[float]
-    pair_variance_dn2: list[float]
-    is_pair: bool
-
-
 @dataclass
 class Recorder:
     """Records readings with camera and projector together.
@@ -78,7 +62,7 @@ class Recorder:
     _drive: Drive = BLACK
     _since_show: int = 0
     _exposure_ms: float = 0.0
-    _rows: list[_Row] = field(default_factory=list)
+    _rows: list[Readings] = field(default_factory=list)
     _last: list[NDArray[np.uint16]] = field(default_factory=list)
 
     @property
@@ -89,7 +73,7 @@ class Recorder:
     @property
     def last_mean_dn(self) -> float:
         """Mean of the strongest channel of the last reading."""
-        return max(self._rows[-1].mean_dn)
+        return float(self._rows[-1].mean_dn.max())
 
     @property
     def duration_s(self) -> float:
@@ -153,20 +137,19 @@ class Recorder:
         flat = frame.pixels.ravel()
         values = [flat[where] for where in self.region.lit]
         limit = CLIPPED_FROM * self.full_scale_dn
+        pairs = zip(self._last, values, strict=True) if pair else ()
         self._rows.append(
-            _Row(
-                exposure_ms=frame.exposure_ms,
-                timestamp_s=frame.timestamp_s,
-                gap_ms=gap_ms,
-                since_show=self._since_show,
-                drive=self._drive,
-                mean_dn=[float(each.mean()) for each in values],
-                beside_dn=[float(flat[w].mean()) if len(w) else 0.0 for w in self.region.beside],
-                clipped=[float((each > limit).mean()) for each in values],
-                pair_variance_dn2=[_half_variance(*two) for two in zip(self._last, values, strict=True)]
-                if pair
-                else [0.0, 0.0, 0.0],
-                is_pair=pair,
+            Readings(
+                exposure_ms=np.array([frame.exposure_ms]),
+                timestamp_s=np.array([frame.timestamp_s]),
+                gap_ms=np.array([gap_ms], float),
+                since_show=np.array([self._since_show], np.int64),
+                drive=np.array([self._drive], np.int64),
+                mean_dn=np.array([[each.mean() for each in values]]),
+                beside_dn=np.array([[flat[w].mean() if len(w) else 0.0 for w in self.region.beside]]),
+                clipped=np.array([[(each > limit).mean() for each in values]]),
+                pair_variance_dn2=np.array([[_half_variance(*two) for two in pairs] or [0.0, 0.0, 0.0]]),
+                is_pair=np.array([pair]),
             )
         )
         self._last = values
@@ -176,15 +159,7 @@ class Recorder:
     def collect(self) -> Readings:
         """The readings since the last call."""
         rows, self._rows = self._rows, []
-        return Readings(
-            **{
-                each.name: np.array([getattr(row, each.name) for row in rows], _TYPES.get(each.name, float))
-                for each in fields(Readings)
-            }
-        )
-
-
-_TYPES: dict[str, type] = {"since_show": np.int64, "drive": np.int64, "is_pair": np.bool_}
+        return joined(*rows)
 
 
 def _half_variance(first: NDArray[np.uint16], second: NDArray[np.uint16]) -> float:

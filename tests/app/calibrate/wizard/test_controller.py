@@ -176,7 +176,7 @@ def test_a_full_disk_costs_nothing_captured(bench: CalibrateBench, monkeypatch: 
         def no_room(*_: object) -> None:
             raise StoreError("The disk is full: free some space and resume.")
 
-        full.setattr("dsl_core.campaign.session.write_note", no_room)
+        full.setattr("dsl_core.campaign.session.replace_record", no_room)
         control.capture()
     assert "The disk is full" in state.trouble.value
     assert not state.can_reconnect.value
