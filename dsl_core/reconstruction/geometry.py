@@ -19,9 +19,9 @@ from dsl_core.optics.pinhole import pixel_rays
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import Progress
 from dsl_core.reconstruction.columns.code_dispute import Settled, has_peak, is_dark, settle
+from dsl_core.reconstruction.columns.line_spread import wave_std_px
 from dsl_core.reconstruction.columns.maps import WHOLE_PX_STD, ColumnFinder, ColumnMaps
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles
-from dsl_core.reconstruction.columns.waves import wave_std_px
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
 from dsl_core.reconstruction.surface import Surface, reconstruct_surface

@@ -1,10 +1,14 @@
-"""The projector's line spread as a scan itself shows it, where that is not what the calibration says.
+"""The projector's line spread as a scan itself shows it, and what it leaves in the columns.
 
 Focus changes from day to day, and with the distance of what is scanned. A spread that is off by a tenth moves
 columns by as much as it moves them between two lines, so that surfaces get waves.
+A spread that varies over the field is not the one curve that all pixels share. Where it differs, columns over
+smooth surfaces have waves; how large these are is an error that no pixel's own fit can know of.
 """
 
 from __future__ import annotations
+
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -15,6 +19,7 @@ from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spread.equations import Peaks
 from dsl_core.optics.spread.field import places_of
 from dsl_core.optics.spread.fit import REACH_PX, SpreadFit, fit_spread
+from dsl_core.optics.spread.wave import column_wave
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.reconstruction.hdr import MergedFrame
 from dsl_core.reconstruction.merge import LineStack
@@ -26,6 +31,10 @@ PIXELS, RUN = 4000, 10
 DARKER = 0.3
 #: Pixels whose decoded column is so many times the usual step from a neighbour's are at an edge.
 EDGE_STEPS = 4.0
+#: Regions of the picture, down and across, in which waves are looked for.
+REGIONS = (4, 6)
+#: Runs of a region, at least and at most, and how often they are asked: each time most of a wave is found.
+FEWEST, MOST, ASKED = 30, 400, 3
 
 
 def own_spread(
@@ -87,3 +96,42 @@ def _peaks(stack: LineStack, lines: LineSet, pixels: NDArray[np.intp], column: t
         lines.step_px,
         RUN,
     )
+
+
+def wave_std_px(
+    column_px: NDArray[np.floating], refined: NDArray[np.bool_], lines: LineSet | None
+) -> NDArray[np.float32]:
+    """Rms of the waves around each pixel (rows, columns), px; 0 where there are none or nobody can tell.
+
+    ``column_px`` and ``refined`` (rows, columns) are the columns of all pixels and where lines refined them.
+    """
+    std = np.zeros(column_px.shape, np.float32)
+    if lines is None or not lines.single:
+        return std
+    rows, columns = (
+        np.linspace(0, size, parts + 1).astype(int)
+        for size, parts in zip(column_px.shape, REGIONS, strict=True)
+    )
+    for top, bottom in pairwise(rows):
+        for left, right in pairwise(columns):
+            where = np.s_[top:bottom, left:right]
+            std[where] = _rms(column_px[where], refined[where], lines.step_px)
+    return std
+
+
+def _rms(column_px: NDArray[np.floating], refined: NDArray[np.bool_], period_px: float) -> float:
+    """Rms of the wave of a region, px."""
+    width = column_px.shape[1] // RUN * RUN
+    used = refined[:, :width].reshape(-1, RUN)
+    whole = np.flatnonzero(used.all(1))
+    whole = whole[:: max(len(whole) // MOST, 1)]
+    if len(whole) < FEWEST:
+        return 0.0
+    runs = torch.as_tensor(column_px[:, :width].reshape(-1, RUN)[whole].astype(np.float64))
+    straight = runs
+    for _ in range(ASKED):
+        wave = column_wave(straight, torch.ones_like(runs, dtype=torch.bool), period_px)
+        if int(wave.smooth.sum()) < FEWEST:
+            return 0.0
+        straight = straight - wave.px
+    return float((runs - straight)[wave.smooth].square().mean().sqrt())

@@ -18,9 +18,8 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
-from dsl_core.simulation.foreign.filter_angle import centre_ratio
 from dsl_core.simulation.foreign.free_pattern import free_pattern_light
-from dsl_core.simulation.foreign.lenses import camera_of_colour
+from dsl_core.simulation.foreign.lenses import camera_of_colour, centre_ratio
 from dsl_core.simulation.foreign.light_sources import FINE_NM, Sources, trace
 from dsl_core.simulation.foreign.rig_changes import led_radiance
 from dsl_core.simulation.foreign.spread import Spread
