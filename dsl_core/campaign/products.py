@@ -55,7 +55,10 @@ def write_products(
     path = save_rig(rig, campaign.path / RIG_NAME, overwrite=True)
     report = write_calibration_report(campaign.path / REPORT_NAME, rig, accepted, history, costs)
     if library_name is not None:
-        _store(library or CalibrationLibrary(), library_name, rig, accepted, history)
+        shelf, same = library or CalibrationLibrary(), {"provenance": rig.provenance}
+        known = shelf.find(library_name).rig if library_name in shelf.names() else None
+        if known is None or known.model_copy(update=same) != rig:
+            shelf.store(library_name, rig, accepted, history)
     return Products(path, report, library_name)
 
 
@@ -67,23 +70,9 @@ def write_calibration_report(
     costs: Sequence[StageCost] = (),
 ) -> Path:
     """Write the page, replacing an existing one, whole or not at all; raises `StoreError`."""
-    from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
+    from dsl_core.evaluation.report.calibration_report import render_calibration_report
 
-    content = CalibrationContent(rig, accepted, history, costs)
-    return write_text(path, lambda: render_calibration_report(content), overwrite=True)
-
-
-def _store(
-    library: CalibrationLibrary,
-    name: str,
-    rig: Rig,
-    accepted: tuple[AcceptedCalibration, ...],
-    history: tuple[AcceptedCalibration, ...],
-) -> None:
-    same = {"provenance": rig.provenance}
-    if name in library.names() and library.find(name).rig.model_copy(update=same) == rig:
-        return
-    library.store(name, rig, accepted, history)
+    return write_text(path, lambda: render_calibration_report(rig, accepted, history, costs), overwrite=True)
 
 
 def export_entry(entry: LibraryEntry, target: Path, form: str, overwrite: bool = False) -> list[Path]:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.guidance import ConsoleGuide, Guided, figures_json, opened_campaign, resumed_by
+from dsl_core.cli.guidance import ConsoleGuide, figures_json, opened_campaign, resumed_by, run_guided
 from dsl_core.cli.options import Force, Json, RigOptions, parse_options
 from dsl_core.cli.output import Output
-from dsl_core.cli.pictures import BoardOptions, PictureOptions, calibrate_pictures
+from dsl_core.cli.pictures import board_of, calibrate_pictures
 from dsl_core.errors import CalibrationError
 from dsl_core.evaluation.cost import StageCost, StageTimer
 
@@ -63,7 +63,7 @@ def selftest(
     """Test the camera and projector first: each figure passes or says what to do."""
     with tempfile.TemporaryDirectory(prefix="dsl-selftest-") as spare:
         folder = campaign or Path(spare) / "campaign"
-        Guided("selftest", folder, rig, option, set_, yes, json, again=True).run()
+        run_guided("selftest", folder, rig, option, set_, yes, json, again=True)
 
 
 @calibrate.command()
@@ -101,16 +101,18 @@ def geometry(
     json: Json = False,
 ) -> None:
     """Find the lenses and the pose of camera and projector from a board under Gray code, film off."""
-    printed = BoardOptions(board, square_mm, marker_mm, dictionary)
     if pictures:
-        options = PictureOptions(projector, binning, bayer, baseline_mm, target, xml, force)
-        calibrate_pictures(Output(json), folder, printed, options)
+        printed = board_of(board, square_mm, marker_mm, dictionary)
+        files = (target, xml)
+        calibrate_pictures(
+            Output(json), folder, printed, projector, binning, bayer, baseline_mm, files, force
+        )
         return
     if target is not None or xml is not None:
         raise CalibrationError("--output and --xml need --pictures; 'calibrate all' writes the rig.")
-    found = printed.build()
+    found = board_of(board, square_mm, marker_mm, dictionary)
     own = [] if found is None else [f"board={found.model_dump_json()}"]
-    Guided("geometry", folder, rig, option, [*own, *set_], yes, json, redo, accept_failed).run()
+    run_guided("geometry", folder, rig, option, [*own, *set_], yes, json, redo, accept_failed)
 
 
 def _command(name: str) -> Callable[..., None]:
@@ -126,7 +128,7 @@ def _command(name: str) -> Callable[..., None]:
         accept_failed: AcceptFailed = False,
         json: Json = False,
     ) -> None:
-        Guided(name, campaign, rig, option, set_, yes, json, redo, accept_failed).run()
+        run_guided(name, campaign, rig, option, set_, yes, json, redo, accept_failed)
 
     return command
 

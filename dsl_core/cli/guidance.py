@@ -131,62 +131,48 @@ def answer(output: Output, question: str) -> str:
     return line
 
 
-@dataclass(frozen=True)
-class Guided:
-    """One calibration as the command line describes it.
+def run_guided(
+    name: str,
+    campaign: Path,
+    rig: str | None,
+    option: Sequence[str],
+    set_: Sequence[str],
+    yes: bool,
+    json: bool,
+    redo: Sequence[str] = (),
+    accept_failed: bool = False,
+    again: bool = False,
+) -> None:
+    """Go through the steps of a calibration that lack captures, fit, and accept; print the figures.
 
     ``redo`` names steps to capture again; ``again`` repeats every step that was captured before.
     """
+    from dsl_core.campaign.guide import run_calibration
+    from dsl_core.campaign.recipes import load_recipe
+    from dsl_core.campaign.session import CalibrationSession
 
-    name: str
-    campaign: Path
-    rig: str | None
-    option: Sequence[str]
-    settings: Sequence[str]
-    unattended: bool
-    json: bool
-    redo: Sequence[str] = ()
-    tolerant: bool = False
-    again: bool = False
-
-    def run(self) -> None:
-        """Go through the steps that lack captures, fit, and accept; print the figures."""
-        from dsl_core.campaign.guide import run_calibration
-        from dsl_core.campaign.recipes import load_recipe
-        from dsl_core.campaign.session import CalibrationSession
-
-        output = Output(self.json)
-        command = f"dsl-scan {self._verb} {self.campaign}"
-        settings = {self.name: parse_options(self.settings)}
-        load_recipe(self.name, settings[self.name])  # wrong settings are reported before anything is written
-        with (
-            resumed_by(command),
-            opened_campaign(self.campaign, self.rig, parse_options(self.option), settings) as (
-                campaign,
-                devices,
-            ),
-        ):
-            recipe = load_recipe(self.name, campaign.info.settings.get(self.name))
-            session = CalibrationSession(recipe, devices, campaign)
-            before = session.accepted()
-            redo = self._captured(session) if self.again else self.redo
-            guide = ConsoleGuide(output, self.unattended, self.tolerant)
-            with output.progress() as progress:
-                accepted = run_calibration(session, guide, progress, redo)
-        if accepted == before:
-            output.say(
-                f"{accepted.title} was accepted before ({accepted.accepted[:16]}); --redo STEP captures a"
-                " step again."
-            )
-        else:
-            output.say(f"{accepted.title} is accepted.")
-        output.put(name=accepted.name, accepted=accepted.accepted, figures=figures_json(accepted.figures))
-        output.put(campaign=self.campaign)
-        output.finish()
-
-    @property
-    def _verb(self) -> str:
-        return self.name if self.name == "selftest" else f"calibrate {self.name}"
-
-    def _captured(self, session: CalibrationSession) -> tuple[str, ...]:
-        return tuple(each.step.key for each in session.statuses() if each.state == "captured")
+    output, settings = Output(json), {name: parse_options(set_)}
+    command = f"dsl-scan {name if name == 'selftest' else f'calibrate {name}'} {campaign}"
+    load_recipe(name, settings[name])  # wrong settings are reported before anything is written
+    with (
+        resumed_by(command),
+        opened_campaign(campaign, rig, parse_options(option), settings) as (folder, devices),
+    ):
+        recipe = load_recipe(name, folder.info.settings.get(name))
+        session = CalibrationSession(recipe, devices, folder)
+        before = session.accepted()
+        if again:
+            redo = [each.step.key for each in session.statuses() if each.state == "captured"]
+        guide = ConsoleGuide(output, yes, accept_failed)
+        with output.progress() as progress:
+            accepted = run_calibration(session, guide, progress, redo)
+    if accepted == before:
+        output.say(
+            f"{accepted.title} was accepted before ({accepted.accepted[:16]}); --redo STEP captures a"
+            " step again."
+        )
+    else:
+        output.say(f"{accepted.title} is accepted.")
+    output.put(name=accepted.name, accepted=accepted.accepted, figures=figures_json(accepted.figures))
+    output.put(campaign=campaign)
+    output.finish()

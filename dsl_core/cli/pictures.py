@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,70 +16,18 @@ if TYPE_CHECKING:
     from dsl_core.model.rig import BayerPattern
 
 
-@dataclass(frozen=True)
-class BoardOptions:
-    """The printed board that the options describe."""
-
-    board: str | None
-    square_mm: float | None
-    marker_mm: float | None
-    dictionary: str
-
-    def build(self) -> Checkerboard | Charuco | None:
-        """The board, None without these options; raises `CalibrationError` when it is impossible."""
-        if self.board is None and self.square_mm is None and self.marker_mm is None:
-            return None
-        if self.board is None or self.square_mm is None:
-            raise CalibrationError("A board needs both --board COLUMNSxROWS and --square-mm. Give both.")
-        return _board(self.board, self.square_mm, self.marker_mm, self.dictionary)
-
-
-@dataclass(frozen=True)
-class PictureOptions:
-    """The pictures that the options describe, and where to write the outcome."""
-
-    projector: str
-    binning: float
-    bayer: str | None
-    baseline_mm: float | None
-    target: Path | None
-    xml: Path | None
-    force: bool
-
-
-def calibrate_pictures(output: Output, folder: Path, board: BoardOptions, options: PictureOptions) -> None:
-    """Calibrate from a folder of pose folders, print what was found and write the files requested."""
-    from dsl_core.io.published.stereo import save_stereo, stereo_of
-    from dsl_core.io.records import write_record
-    from dsl_core.workflows.pictures import calibrate_geometry
-
-    files = [path for path in (options.target, options.xml) if path is not None]
-    check_targets(files, overwrite=options.force)
-    printed = board.build()
-    if printed is None:
-        raise CalibrationError("Pictures need --board COLUMNSxROWS and --square-mm of the printed board.")
-    size, mosaic = parse_size("--projector", options.projector), _bayer(options.bayer)
-    with output.progress() as progress:
-        found = calibrate_geometry(
-            folder, printed, size, mosaic, options.binning, options.baseline_mm, progress
-        )
-    if options.target is not None:
-        write_record(options.target, found, overwrite=options.force)
-    if options.xml is not None:
-        save_stereo(stereo_of(found), options.xml, overwrite=options.force)
-    print_geometry(output, found)
-    output.say(
-        f"Written: {', '.join(map(str, files))}" if files else "Nothing was written: --output is not given."
-    )
-    output.put(calibration=found.model_dump(mode="json"), files=[str(path) for path in files])
-    output.finish()
-
-
-def _board(text: str, square_mm: float, marker_mm: float | None, dictionary: str) -> Checkerboard | Charuco:
+def board_of(
+    text: str | None, square_mm: float | None, marker_mm: float | None, dictionary: str
+) -> Checkerboard | Charuco | None:
+    """The printed board that options describe, None without them; raises `CalibrationError`."""
     from pydantic import ValidationError
 
     from dsl_core.model.board import Charuco, Checkerboard
 
+    if text is None and square_mm is None and marker_mm is None:
+        return None
+    if text is None or square_mm is None:
+        raise CalibrationError("A board needs both --board COLUMNSxROWS and --square-mm. Give both.")
     columns, rows = parse_size("--board", text)
     try:
         if marker_mm is None:
@@ -92,6 +39,45 @@ def _board(text: str, square_mm: float, marker_mm: float | None, dictionary: str
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "board"
         raise CalibrationError(f"The board is impossible: {where}: {first['msg']}. Correct it.") from error
+
+
+def calibrate_pictures(
+    output: Output,
+    folder: Path,
+    board: Checkerboard | Charuco | None,
+    projector: str,
+    binning: float,
+    bayer: str | None,
+    baseline_mm: float | None,
+    targets: tuple[Path | None, Path | None],
+    force: bool,
+) -> None:
+    """Calibrate from a folder of pose folders, print what was found and write the files requested.
+
+    ``targets`` are those of the record and of the published XML or YAML.
+    """
+    from dsl_core.io.published.stereo import save_stereo, stereo_of
+    from dsl_core.io.records import write_record
+    from dsl_core.workflows.pictures import calibrate_geometry
+
+    record, xml = targets
+    files = [path for path in targets if path is not None]
+    check_targets(files, overwrite=force)
+    if board is None:
+        raise CalibrationError("Pictures need --board COLUMNSxROWS and --square-mm of the printed board.")
+    size, mosaic = parse_size("--projector", projector), _bayer(bayer)
+    with output.progress() as progress:
+        found = calibrate_geometry(folder, board, size, mosaic, binning, baseline_mm, progress)
+    if record is not None:
+        write_record(record, found, overwrite=force)
+    if xml is not None:
+        save_stereo(stereo_of(found), xml, overwrite=force)
+    print_geometry(output, found)
+    output.say(
+        f"Written: {', '.join(map(str, files))}" if files else "Nothing was written: --output is not given."
+    )
+    output.put(calibration=found.model_dump(mode="json"), files=[str(path) for path in files])
+    output.finish()
 
 
 def _bayer(text: str | None) -> BayerPattern | None:

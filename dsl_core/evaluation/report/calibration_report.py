@@ -28,16 +28,6 @@ _ORDERS = {-2: "#aa3377", -1: "#4477aa", 1: "#ee7733", 2: "#228833"}
 
 
 @dataclass(frozen=True)
-class CalibrationContent:
-    """What the page is made of: the rig, its calibrations in order, those they replaced, and what it cost."""
-
-    rig: Rig
-    accepted: Sequence[AcceptedCalibration]
-    history: Sequence[AcceptedCalibration] = ()
-    costs: Sequence[StageCost] = ()
-
-
-@dataclass(frozen=True)
 class _Section:
     """One calibration on the page."""
 
@@ -48,10 +38,17 @@ class _Section:
     is_good: bool
 
 
-def render_calibration_report(content: CalibrationContent) -> str:
-    """The page, without references to other files; raises `StoreError` when its template is missing."""
-    rig = content.rig
-    sections = [_section(each) for each in content.accepted]
+def render_calibration_report(
+    rig: Rig,
+    accepted: Sequence[AcceptedCalibration],
+    history: Sequence[AcceptedCalibration] = (),
+    costs: Sequence[StageCost] = (),
+) -> str:
+    """The page, without references to other files: the calibrations in order, and those they replaced.
+
+    Raises `StoreError` when its template is missing.
+    """
+    sections = [_section(each) for each in accepted]
     return render_page(
         "calibration.html.j2",
         rig=rig,
@@ -62,9 +59,9 @@ def render_calibration_report(content: CalibrationContent) -> str:
         film=_film(rig),
         geometry=_geometry(rig),
         conditions=_conditions(rig.conditions),
-        history=[(old.title, old.accepted, old.figures) for old in content.history],
-        costs=content.costs,
-        total_seconds=sum(cost.seconds for cost in content.costs),
+        history=[(old.title, old.accepted, old.figures) for old in history],
+        costs=costs,
+        total_seconds=sum(cost.seconds for cost in costs),
         width=WIDTH,
         height=HEIGHT,
     )

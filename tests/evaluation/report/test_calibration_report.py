@@ -9,7 +9,7 @@ import numpy as np
 
 from dsl_core.campaign.products import write_calibration_report
 from dsl_core.evaluation.cost import StageCost
-from dsl_core.evaluation.report.calibration_report import CalibrationContent, render_calibration_report
+from dsl_core.evaluation.report.calibration_report import render_calibration_report
 from dsl_core.evaluation.report.curves import HEIGHT
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.conditions import CameraConditions, CaptureConditions, ProjectorConditions
@@ -46,13 +46,12 @@ def accepted(name: str, *figures: Figure, when: str = "2026-03-01T10:20:30.5+00:
 
 
 def test_it_holds_figures_limits_conditions_and_history() -> None:
-    content = CalibrationContent(
+    page = render_calibration_report(
         calibrated(),
         [accepted("selftest", GOOD), accepted("depth-stage", BAD)],
         [accepted("selftest", GOOD, when="2025-01-02T03:04:05+00:00")],
         [StageCost("Self-test", 12.0, 10**9, 0)],
     )
-    page = render_calibration_report(content)
     assert "2.2100 ± 0.0040" in page
     assert "1.8 to 2.6" in page
     assert "at most 0.3" in page
@@ -65,7 +64,7 @@ def test_it_holds_figures_limits_conditions_and_history() -> None:
 
 
 def test_bands_show_the_standard_deviation() -> None:
-    page = render_calibration_report(CalibrationContent(calibrated(), [accepted("bandpass", GOOD)]))
+    page = render_calibration_report(calibrated(), [accepted("bandpass", GOOD)])
     (band,) = re.findall(r'class="shade" points="([^"]+)"', page)
     points = np.array([[float(v) for v in pair.split(",")] for pair in band.split()])
     upper, lower = points[:3, 1], points[3:, 1][::-1]
@@ -82,7 +81,7 @@ def test_maps_show_evenness_and_what_the_grating_leaves() -> None:
         coefficients_px=((0.5, 0.0), (0.25, 0.1)),
     )  # fmt: skip
     rig = calibrated().model_copy(update={"flat_field": even, "residual": left})
-    page = render_calibration_report(CalibrationContent(rig, [accepted("geometry", GOOD)]))
+    page = render_calibration_report(rig, [accepted("geometry", GOOD)])
     assert page.count("data:image/png;base64,") == 3
     for words in ("Flat field", "Residual of order +1", "at 545 nm and 667 mm", "-0.49"):
         assert words in page, words
