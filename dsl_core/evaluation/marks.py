@@ -129,21 +129,10 @@ def undecided_ranges(wavelengths_nm: NDArray[np.float64], data_share: NDArray[np
     with np.errstate(invalid="ignore"):
         undecided = np.asarray(data_share) < DECIDED_FROM
     parts = []
-    for first, last in _runs(undecided.tolist()):
-        low, high = wavelengths_nm[first], wavelengths_nm[last]
-        parts.append(f"{low:g} nm" if first == last else f"{low:g}–{high:g} nm")
+    for _, first, count in runs_of(undecided[None]):
+        low, high = wavelengths_nm[first], wavelengths_nm[first + count - 1]
+        parts.append(f"{low:g} nm" if count == 1 else f"{low:g}–{high:g} nm")
     return ", ".join(parts)
-
-
-def _runs(marks: Sequence[bool]) -> list[tuple[int, int]]:
-    """First and last index of each stretch of marks."""
-    runs: list[tuple[int, int]] = []
-    for i, mark in enumerate(marks):
-        if mark and runs and runs[-1][1] == i - 1:
-            runs[-1] = (runs[-1][0], i)
-        elif mark:
-            runs.append((i, i))
-    return runs
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsl_core.model.plan import BinaryCode, EnsembleCode, GrayCode, XorCode
+from dsl_core.model.plan import BinaryCode
 from dsl_core.patterns.ensemble_code import EnsembleDecoder, ensemble_image
 from dsl_core.patterns.gray_code import DecodedCode, GrayDecoder, code_image
 from dsl_core.patterns.xor_code import XorDecoder, xor_image
@@ -23,23 +24,19 @@ class CodeDecoder(Protocol):
         """Columns and rows of all pixels; see `GrayDecoder.finish`."""
 
 
+#: How each kind of code is drawn, and what decodes it.
+_KINDS: dict[str, tuple[Callable[..., NDArray[np.uint8]], Callable[..., CodeDecoder]]] = {
+    "gray": (code_image, GrayDecoder),
+    "xor": (xor_image, XorDecoder),
+    "ensemble": (ensemble_image, EnsembleDecoder),
+}
+
+
 def binary_image(code: BinaryCode, size_px: tuple[int, int], index: int) -> NDArray[np.uint8]:
     """Frame ``index`` of a code, shape (height, width), 0 or 255; raises `PlanError` outside the code."""
-    match code:
-        case GrayCode():
-            return code_image(code, size_px, index)
-        case XorCode():
-            return xor_image(code, size_px, index)
-        case EnsembleCode():
-            return ensemble_image(code, size_px, index)
+    return _KINDS[code.kind][0](code, size_px, index)
 
 
 def decoder_of(code: BinaryCode, size_px: tuple[int, int]) -> CodeDecoder:
     """A fresh decoder for a code on a projector of ``size_px`` = (width, height); raises `PlanError`."""
-    match code:
-        case GrayCode():
-            return GrayDecoder(code, size_px)
-        case XorCode():
-            return XorDecoder(code, size_px)
-        case EnsembleCode():
-            return EnsembleDecoder(code, size_px)
+    return _KINDS[code.kind][1](code, size_px)

@@ -25,7 +25,7 @@ from dsl_core.calibration.orders.filter_check import (
     verdict,
 )
 from dsl_core.calibration.orders.order_light import FilterLight
-from dsl_core.calibration.orders.order_place import MIN_PIXELS, PlanePixels, by_cell
+from dsl_core.calibration.orders.order_place import PlanePixels, of_colours
 from dsl_core.calibration.orders.response import BandSample, fit_response
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.bandpass import BandpassCalibration, FilterSample, OrderSample
@@ -215,17 +215,12 @@ def _white(rig: Rig, scan: LineScan, profile: ZeroOrderFit) -> tuple[Floats, Flo
     """
     pixels = plane_pixels(rig, scan, 550.0)
     relative = profile.amplitude / scan.shading
-    value, std = np.zeros(3), np.zeros(3)
-    for colour in range(3):
-        masks = by_cell(pixels, (pixels.colour == colour) & profile.good)
-        masks = [mask for mask in masks if mask.sum() >= MIN_PIXELS]
-        cells = np.array([float(np.median(relative[mask])) for mask in masks])
-        if len(cells) < 2:
-            raise CalibrationError(
-                "The scan without a filter shows too little of the target. Fill the picture with a flat"
-                " white target and capture the step again."
-            )
-        value[colour], std[colour] = cells.mean(), cells.std() / np.sqrt(len(cells) - 1)
+    value, std = of_colours(pixels, relative, profile.good, np.median)
+    if np.isnan(value).any():
+        raise CalibrationError(
+            "The scan without a filter shows too little of the target. Fill the picture with a flat white"
+            " target and capture the step again."
+        )
     return value, std
 
 

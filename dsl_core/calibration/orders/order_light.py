@@ -25,6 +25,7 @@ from dsl_core.calibration.orders.order_place import (
     find_order,
     find_second,
     line_graph,
+    of_colours,
 )
 from dsl_core.model.plan import ScanLines
 from dsl_core.model.rig import ProjectorResponse
@@ -93,7 +94,8 @@ def filter_light(
     graph, shift = line_graph(
         lines, chosen, signal, error, centres[:, None] - chosen.column_px, response, unlit_px, frame_px
     )
-    zero, zero_std = _zero_signals(graph)
+    relative, everywhere = graph.amplitude / chosen.shading, np.ones(len(graph.amplitude), bool)
+    zero, zero_std = of_colours(chosen, relative, everywhere, np.mean)
     orders: dict[int, OrderLight] = {}
     for sign in (1, -1):
         first = find_order(graph, sign, reach_px)
@@ -101,22 +103,6 @@ def filter_light(
         orders[2 * sign] = _light(graph, 2 * sign, find_second(graph, sign, first), SECOND_HALF_PX)
     share = float(saturated[inside].mean()) if inside.any() else 1.0
     return FilterLight(zero, zero_std, orders, shift, share)
-
-
-def _zero_signals(graph: LineGraph) -> tuple[Floats, Floats]:
-    """Mean zero order of each colour at unit shading, and its deviation by the cells' scatter."""
-    value, spread = np.full(3, np.nan), np.full(3, np.inf)
-    relative = graph.amplitude / graph.pixels.shading
-    for colour in range(3):
-        cells = [
-            float(relative[which].mean())
-            for which in by_cell(graph.pixels, graph.pixels.colour == colour)
-            if which.sum() >= MIN_PIXELS
-        ]
-        if len(cells) > 1:
-            value[colour] = np.mean(cells)
-            spread[colour] = np.std(cells) / np.sqrt(len(cells) - 1)
-    return value, spread
 
 
 def _light(graph: LineGraph, order: int, place: OrderPlace | None, half_px: float) -> OrderLight:

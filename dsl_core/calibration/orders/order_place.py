@@ -7,7 +7,9 @@ is fitted to the cells and refined with signals lined up by the fit itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -134,6 +136,22 @@ def by_cell(pixels: PlanePixels, which: NDArray[np.bool_]) -> list[NDArray[np.bo
     """Masks of the chosen pixels of each cell, empty ones included."""
     cells = pixels.cell
     return [which & (cells == cell) for cell in range(CELLS[0] * CELLS[1])]
+
+
+def of_colours(
+    pixels: PlanePixels, values: Floats, use: NDArray[np.bool_], middle: Callable[[Floats], np.floating[Any]]
+) -> tuple[Floats, Floats]:
+    """Mean of cells for each colour, (3,), and its deviation by their scatter; NaN, infinite for too few.
+
+    ``middle`` is what stands for the values (P,) of a cell.
+    """
+    mean, std = np.full(3, np.nan), np.full(3, np.inf)
+    for colour in range(3):
+        masks = by_cell(pixels, use & (pixels.colour == colour))
+        cells = [float(middle(values[mask])) for mask in masks if mask.sum() >= MIN_PIXELS]
+        if len(cells) > 1:
+            mean[colour], std[colour] = np.mean(cells), np.std(cells) / np.sqrt(len(cells) - 1)
+    return mean, std
 
 
 @dataclass(frozen=True)
