@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dsl_core.evaluation.report.pages import render_page
-from dsl_core.evaluation.report.pictures import figure_uri
+from dsl_core.evaluation.report.series_page import over_seconds
 from dsl_core.io.staging import write_text
 from dsl_core.planning.choice import Weighed, pareto
 from dsl_core.solve.front import front
 
-#: Width and height of the plot, inches at 100 dots.
-SIZE_IN = (8.0, 4.6)
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 COLOURS = {"plan": "#4477aa", "front": "#cc3311", "chosen": "#228833"}
 
 
@@ -29,17 +32,13 @@ def write_tradeoff_report(
         rows=sorted(weighed, key=lambda each: each.expected.seconds),
         front={each.plan.name for each in best},
         chosen=chosen,
-        plot=plot_uri(weighed, chosen),
+        plot=over_seconds(partial(_plot, weighed, chosen), "reflectance error of a pixel (RMSE)"),
     )
     return write_text(path, page, overwrite=overwrite)
 
 
-def plot_uri(weighed: Sequence[Weighed], chosen: Weighed) -> str:
-    """Error of a pixel over seconds of capture, both logarithmic, as a PNG data URI."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(SIZE_IN, dpi=100, layout="constrained")
-    axes = figure.subplots()
+def _plot(weighed: Sequence[Weighed], chosen: Weighed, axes: Axes) -> None:
+    """Error of a pixel over seconds of capture."""
     points = [(each.expected.seconds, each.expected.pixel_rmse) for each in weighed]
     seconds, errors = zip(*points, strict=True)
     axes.scatter(seconds, errors, s=12, color=COLOURS["plan"], label="predicted")
@@ -47,7 +46,3 @@ def plot_uri(weighed: Sequence[Weighed], chosen: Weighed) -> str:
     axes.plot(*zip(*line, strict=True), color=COLOURS["front"], label="none is better in both")
     mark = chosen.expected
     axes.scatter([mark.seconds], [mark.pixel_rmse], s=80, marker="*", color=COLOURS["chosen"], label="chosen")
-    axes.set(xscale="log", yscale="log", xlabel="capture, s", ylabel="reflectance error of a pixel (RMSE)")
-    axes.legend()
-    axes.grid(alpha=0.3)
-    return figure_uri(figure)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,11 +13,11 @@ from dsl_core.evaluation.report.pages import render_page
 from dsl_core.evaluation.report.pictures import ReportPicture, figure_uri, value_picture
 from dsl_core.evaluation.seen_target import SeenTarget
 from dsl_core.evaluation.stage_test import StageTest, stage_table
-from dsl_core.evaluation.time_sweep import FIGURES, SweepPoint, best_points
+from dsl_core.evaluation.time_sweep import FIGURES, SweepFigure, SweepPoint, best_points
 from dsl_core.evaluation.uncertainty import BAND_95
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes
 
 #: Width and height of a plot, inches at 100 dots.
 _SIZE_IN = (8.0, 4.2)
@@ -43,12 +44,14 @@ def stage_page(names: Sequence[str], targets: Sequence[SeenTarget], found: Stage
         _residual(name, position, target)
         for name, position, target in zip(names, found.positions_mm, targets, strict=True)
     ]
+    labels = {"xlabel": "position of the stage, mm", "ylabel": "distance minus line, mm"}
+    deviations = plot_uri(partial(_stage_plot, found), **labels)
     return render_page(
         "series.html.j2",
         title="Depth test over positions of a stage",
         note=_STAGE_NOTE,
         verdicts=stage_table(found),
-        plots=[("Deviation from the line", _stage_plot(found))],
+        plots=[("Deviation from the line", deviations)],
         table=stage_rows(names, targets, found),
         pictures=sorted(pictures, key=lambda picture: picture.title),
     )
@@ -57,8 +60,11 @@ def stage_page(names: Sequence[str], targets: Sequence[SeenTarget], found: Stage
 def sweep_page(points: Sequence[SweepPoint], reference: str) -> str:
     """The sweep; raises `StoreError` when the page's template is not installed."""
     plots = [
-        (figure.words, _sweep_plot(points, i))
-        for i, figure in enumerate(FIGURES)
+        (
+            figure.words,
+            over_seconds(partial(_sweep_plot, points, figure), _with_unit(figure)),
+        )
+        for figure in FIGURES
         if any(point.error(figure) is not None for point in points)
     ]
     return render_page(
@@ -104,7 +110,7 @@ def stage_rows(names: Sequence[str], targets: Sequence[SeenTarget], found: Stage
 
 def sweep_rows(points: Sequence[SweepPoint]) -> Table:
     """A row for each scan, from quick to slow; a star marks errors that no quicker scan beats."""
-    heads = ("Result", "Seconds", *(f"{each.words}{each.unit and ', ' + each.unit}" for each in FIGURES))
+    heads = ("Result", "Seconds", *map(_with_unit, FIGURES))
     best = [set(best_points(points, figure)) for figure in FIGURES]
     rows = []
     for i in sorted(range(len(points)), key=lambda i: points[i].seconds):
@@ -116,21 +122,35 @@ def sweep_rows(points: Sequence[SweepPoint]) -> Table:
     return Table(heads, tuple(rows))
 
 
+def _with_unit(figure: SweepFigure) -> str:
+    return f"{figure.words}{figure.unit and ', ' + figure.unit}"
+
+
 def _residual(name: str, position_mm: float, target: SeenTarget) -> ReportPicture:
     caption = f"{name}: distance of each pixel behind the plane, RMS {target.plane.rms_mm:.3f} mm"
     title = f"{position_mm:7.1f} mm"
     return value_picture(target.residual_mm, title, caption, "mm", "RdBu_r", symmetric=True)
 
 
-def _blank() -> Figure:
+def plot_uri(draw: Callable[[Axes], object], **axes_are: str) -> str:
+    """A plot with grid and legend as a PNG data URI, drawn on axes with labels and scales as given."""
     from matplotlib.figure import Figure
 
-    return Figure(_SIZE_IN, dpi=100, layout="constrained")
-
-
-def _stage_plot(found: StageTest) -> str:
-    figure = _blank()
+    figure = Figure(_SIZE_IN, dpi=100, layout="constrained")
     axes = figure.subplots()
+    draw(axes)
+    axes.set(**axes_are)
+    axes.legend()
+    axes.grid(alpha=0.3)
+    return figure_uri(figure)
+
+
+def over_seconds(draw: Callable[[Axes], object], error: str) -> str:
+    """A plot of an error over seconds of capture, both in decades, as a PNG data URI."""
+    return plot_uri(draw, xscale="log", yscale="log", xlabel="capture, s", ylabel=error)
+
+
+def _stage_plot(found: StageTest, axes: Axes) -> None:
     order = np.argsort(found.positions_mm)
     at, half = np.array(found.positions_mm)[order], BAND_95 * np.array(found.std_mm)[order]
     for line, key, words in (
@@ -140,16 +160,9 @@ def _stage_plot(found: StageTest) -> str:
         off = np.array(line.deviations_mm)[order]
         axes.errorbar(at, off, half, fmt="o-", ms=4, lw=0.8, capsize=2, color=_COLOURS[key], label=words)
     axes.axhline(0.0, color="gray", lw=0.8)
-    axes.set(xlabel="position of the stage, mm", ylabel="distance minus line, mm")
-    axes.legend()
-    axes.grid(alpha=0.3)
-    return figure_uri(figure)
 
 
-def _sweep_plot(points: Sequence[SweepPoint], i: int) -> str:
-    shown = FIGURES[i]
-    figure = _blank()
-    axes = figure.subplots()
+def _sweep_plot(points: Sequence[SweepPoint], shown: SweepFigure, axes: Axes) -> None:
     for point in points:
         error = point.error(shown)
         if error is None:
@@ -161,8 +174,3 @@ def _sweep_plot(points: Sequence[SweepPoint], i: int) -> str:
         axes.annotate(point.name, (point.seconds, error), (4, 4), textcoords="offset points", fontsize=8)
     front = [(points[k].seconds, points[k].error(shown)) for k in best_points(points, shown)]
     axes.plot(*zip(*front, strict=True), color=_COLOURS["best"], lw=1, label="none is better in both")
-    unit = f", {shown.unit}" if shown.unit else ""
-    axes.set(xscale="log", yscale="log", xlabel="capture, s", ylabel=f"{shown.words}{unit}")
-    axes.legend()
-    axes.grid(alpha=0.3)
-    return figure_uri(figure)
