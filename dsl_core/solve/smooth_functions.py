@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.solve.determinant import log_determinant
-
 Floats = NDArray[np.float64]
 
 #: Lengths (units of the nodes) and amplitudes that are tried where nothing else is asked for.
@@ -139,3 +137,14 @@ def _prior(
     return np.asarray(
         block_diag(*blocks, np.diag(np.square(others_std)) if len(others_std) else np.empty((0, 0)))
     )
+
+
+def log_determinant(matrix: NDArray[np.float64]) -> float:
+    """Natural logarithm of the size of the determinant of a matrix (n, n).
+
+    numpy's holds Python's lock while it computes, which stops a window that lives in the same program.
+    """
+    from scipy.linalg.lapack import dgetrf
+
+    triangles, _, _ = dgetrf(matrix)
+    return float(np.log(np.abs(np.diag(triangles))).sum())

@@ -13,6 +13,7 @@ from dsl_core.solve.smooth_functions import (
     SmoothPrior,
     SmoothSolution,
     hat_functions,
+    log_determinant,
     matern,
     solve_given,
     solve_smooth,
@@ -156,3 +157,12 @@ def test_level_and_rise_are_as_unsure_as_stated() -> None:
     middle = np.zeros(len(NODES))
     middle[[0, -1]] = 0.5
     assert middle @ covariance @ middle == pytest.approx(0.5**2)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 40])
+def test_the_determinant_is_that_of_numpy_whatever_the_sign_and_the_matrix_left_as_it_was(size: int) -> None:
+    matrix = np.random.default_rng(size).normal(size=(size, size))
+    before = matrix.copy()
+    assert log_determinant(matrix) == pytest.approx(np.linalg.slogdet(matrix)[1], abs=1e-9)
+    assert log_determinant(-matrix) == pytest.approx(np.linalg.slogdet(matrix)[1], abs=1e-9)
+    assert np.array_equal(matrix, before)

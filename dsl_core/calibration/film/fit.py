@@ -2,7 +2,7 @@
 
 All six numbers of `Film` are fitted to all samples; where samples cannot tell them apart (distance and
 bend, or period and distance over few depths) the values of the mounting decide, as a prior. On request the
-shift of filters with the angle of view is fitted as well (`filter_angle`).
+shift of filters with the angle of view is fitted as well (`FilterAngle`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from dsl_core.calibration.film.filter_angle import NO_SHIFT, FilterAngle, shift_terms
-from dsl_core.calibration.film.filter_angle import PRIOR_STD as ANGLE_STD
 from dsl_core.calibration.film.order_columns import TileColumns
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film, Rig
@@ -48,6 +46,11 @@ HUBER_SIGMAS, FLOOR_PX = 2.5, 0.003
 #: either direction (seven drawn rigs, whose films are then within 1.0 of their deviations, rms).
 COMMON_PX = 0.0015
 MIN_SAMPLES = 100
+#: Deviations of a filter's c, a and b before anything is seen: any index, or no such filter; tilts of some
+#: degrees.
+ANGLE_STD = np.array([0.3, 0.03, 0.03])
+#: The shift is that of filters only where c is so many deviations above nothing.
+SIGNIFICANT = 5.0
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,38 @@ class OrderSamples:
 
 
 @dataclass(frozen=True)
+class FilterAngle:
+    """How a bandpass filter passes shorter wavelengths the more askew light goes through it.
+
+    The centre of an interference filter is at ``centre * sqrt(1 - (sin(angle) / index)^2)``, the angle being
+    that to the filter's normal and ``index`` the effective one of its layers, 1.5 to 2.2 (Macleod, Thin-Film
+    Optical Filters). With the direction (x, y, z) of a pixel and a filter tilted by small angles, the
+    relative shift is a constant, which nobody can tell from the film's line density, and
+    ``-c (x^2 + y^2) / 2 + a x + b y`` with ``c = 1 / index^2``: ``values`` and ``std`` are of c, a and b.
+    """
+
+    values: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    std: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the light seen is shifted as by filters, beyond doubt."""
+        return self.values[0] > SIGNIFICANT * self.std[0]
+
+    @property
+    def index(self) -> tuple[float, float] | None:
+        """Effective index with its deviation; None where no shift is seen."""
+        if not self.is_significant:
+            return None
+        value = self.values[0] ** -0.5
+        return value, 0.5 * value**3 * self.std[0]
+
+
+#: Filters that shift nothing.
+NO_SHIFT = FilterAngle()
+
+
+@dataclass(frozen=True)
 class FilmFit:
     """The film, the covariance of `FIELDS`, and the robust scatter of the residuals (px).
 
@@ -130,6 +165,13 @@ def columns_per_share(rig: Rig, samples: OrderSamples) -> Floats:
     """By how many columns samples move when their wavelengths are all longer by a share, divided by it."""
     longer = replace(samples, wavelength_nm=samples.wavelength_nm * (1 + SHARE_STEP))
     return (grating_columns(rig, longer) - grating_columns(rig, samples)) / SHARE_STEP
+
+
+def shift_terms(rig: Rig, pixels: NDArray[np.int64]) -> Floats:
+    """What ``c``, ``a`` and ``b`` do to the relative wavelength at flat pixel indices (n,), shape (n, 3)."""
+    rays = pixel_rays(rig.camera).reshape(3, -1)[:, pixels]
+    x, y, _ = rays / np.linalg.norm(rays, axis=0)
+    return np.stack([-0.5 * (x**2 + y**2), x, y], 1)
 
 
 def seen_straight(rig: Rig, samples: OrderSamples, angle: FilterAngle) -> OrderSamples:

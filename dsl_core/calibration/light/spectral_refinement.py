@@ -22,8 +22,7 @@ from dsl_core.calibration.common.spectral_nodes import NODES_NM
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.progress import NoProgress, Progress
-from dsl_core.solve.determinant import log_determinant
-from dsl_core.solve.smooth_functions import hat_functions
+from dsl_core.solve.smooth_functions import hat_functions, log_determinant
 
 Floats = NDArray[np.float64]
 

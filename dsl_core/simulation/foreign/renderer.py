@@ -18,17 +18,20 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.sensor import bayer_channels
 from dsl_core.optics.spectra import chain_response
-from dsl_core.simulation.foreign.free_pattern import free_pattern_light
 from dsl_core.simulation.foreign.lenses import camera_of_colour, centre_ratio
 from dsl_core.simulation.foreign.light_sources import FINE_NM, Sources, trace
 from dsl_core.simulation.foreign.rig_changes import led_radiance
-from dsl_core.simulation.foreign.spread import Spread
+from dsl_core.simulation.foreign.spread import FINE, Spread
 from dsl_core.simulation.foreign.transport import Axis, Brought, Frame, sampled
 from dsl_core.simulation.foreign.variants import Foreign
 from dsl_core.simulation.rendering.renderer import ORDERS, surface_shading
 from dsl_core.simulation.scenes.truth import Scene, SceneTruth
 
+Floats = NDArray[np.float64]
 ALL_LEDS = (0, 1, 2)
+#: Samples a pixel of the spread picture of a pattern that varies both ways, and of the sampled wavelengths
+#: one in so many is looked up.
+COARSE, EVERY = 4, 4
 #: Wavelengths through which a filter passes less than this are not followed.
 DARK = 1e-6
 
@@ -65,13 +68,13 @@ class ForeignRenderer:
         spread = Spread(rig.projector_response.blur_px, foreign)
         self._frame = Frame(size, rig.projector_response, spread, film)
         self._orders = (0, *(orders if film else ()))
-        self._filter: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._filter: tuple[Floats, Floats] | None = None
         self._mosaic = bayer_channels(rig.sensor.bayer, *self.shape)
         self._colours: dict[int, _Parts] = {}
         self._tables: dict[tuple[int | None, Axis, tuple[int, ...]], Tensor] = {}
         self._whites: dict[int, Tensor] = {}
         self._scene, self._shaded = scene, shaded
-        self._reflectance: NDArray[np.float64] = scene.materials.at(FINE_NM)
+        self._reflectance: Floats = scene.materials.at(FINE_NM)
 
     def through(self, transmission: SpectralCurve | None) -> ForeignRenderer:
         """See `PatternView`; the geometry is shared."""
@@ -109,9 +112,7 @@ class ForeignRenderer:
     def _seen(self, channel: int | None) -> tuple[int, ...]:
         return (0, 1, 2) if channel is None else (channel,)
 
-    def _light(
-        self, colour: int, channel: int | None, image: NDArray[np.uint8], levels: NDArray[np.float64]
-    ) -> Tensor:
+    def _light(self, colour: int, channel: int | None, image: NDArray[np.uint8], levels: Floats) -> Tensor:
         """Light of a pattern on the parts of a colour, (parts,), at unit shading and without black."""
         axis: Axis
         if (image == image[:1]).all():
@@ -121,7 +122,7 @@ class ForeignRenderer:
         else:
             return self._free(colour, channel, image, levels)
         radiance = np.stack([levels[led][line[:, led]] for led in ALL_LEDS])
-        groups: list[tuple[tuple[int, ...], NDArray[np.float64]]] = [((k,), radiance[k]) for k in ALL_LEDS]
+        groups: list[tuple[tuple[int, ...], Floats]] = [((k,), radiance[k]) for k in ALL_LEDS]
         if (radiance == radiance[:1]).all():
             groups = [(ALL_LEDS, radiance[0])]
         total = torch.zeros(len(self._parts(colour, channel).pixel), device=self.device)
@@ -133,9 +134,7 @@ class ForeignRenderer:
                 total += weights @ table[torch.as_tensor(lit, device=self.device)]
         return total
 
-    def _free(
-        self, colour: int, channel: int | None, image: NDArray[np.uint8], levels: NDArray[np.float64]
-    ) -> Tensor:
+    def _free(self, colour: int, channel: int | None, image: NDArray[np.uint8], levels: Floats) -> Tensor:
         """Light of a pattern that varies both ways."""
         parts = self._parts(colour, channel)
         radiance = np.stack([levels[led][image[..., led]] for led in ALL_LEDS])
@@ -143,7 +142,7 @@ class ForeignRenderer:
         for led in ALL_LEDS:
             for sources in parts.sources:
                 brought = self._brought(colour, channel, sources.order, (led,), self._wavelengths())
-                total[sources.active] += free_pattern_light(
+                total[sources.active] += _free_pattern(
                     self._frame, radiance[led], sources, brought, self._wavelengths()
                 )
         return total
@@ -177,7 +176,7 @@ class ForeignRenderer:
             sources,
         )
 
-    def _wavelengths(self) -> NDArray[np.float64]:
+    def _wavelengths(self) -> Floats:
         """Wavelengths that are followed: all, or those that the filter passes at any angle."""
         if self._filter is None:
             return FINE_NM
@@ -193,7 +192,7 @@ class ForeignRenderer:
         channel: int | None,
         order: int,
         leds: tuple[int, ...],
-        wavelengths_nm: NDArray[np.float64],
+        wavelengths_nm: Floats,
     ) -> Brought:
         parts = self._parts(colour, channel)
         chain = chain_response(self.rig, order, FINE_NM)[:, list(leds)].sum(1)
@@ -226,3 +225,47 @@ class ForeignRenderer:
                 self._frame.add(table, axis, sources, brought, nm)
             self._tables[key] = table.T.contiguous()
         return self._tables[key]
+
+
+def _free_pattern(
+    frame: Frame, radiance: Floats, sources: Sources, brought: Brought, wavelengths_nm: Floats
+) -> Tensor:
+    """Light on an order's active parts, (active,), of a radiance image (height, width) that varies both ways.
+
+    It is looked up in a spread picture of the pattern. The spread is the usual one all over the frame,
+    whatever it is in the corners.
+    """
+    picture = _spread_picture(frame, radiance, halo=sources.order == 0)
+    height, width = picture.shape
+    source = torch.as_tensor(picture, dtype=torch.float32)[None, None]
+    light = brought.of(sources.active, wavelengths_nm)
+    every = EVERY if len(wavelengths_nm) > 100 else 1
+    total = torch.zeros(len(sources.active))
+    for i in range(0, len(wavelengths_nm), every):
+        some = slice(i, i + every)
+        columns, rows = (q.float() for q in sources.at(wavelengths_nm[some].mean(keepdims=True)))
+        x = (columns[0] + 0.5) * COARSE - 0.5
+        y = (rows[0] + 0.5) * COARSE - 0.5
+        grid = torch.stack([2 * x / (width - 1) - 1, 2 * y / (height - 1) - 1], -1)[None, None]
+        seen = torch.nn.functional.grid_sample(source, grid, align_corners=True)[0, 0, 0]
+        total += seen * light[:, some].sum(1)
+    return total
+
+
+def _spread_picture(frame: Frame, radiance: Floats, halo: bool) -> Floats:
+    """The image with `COARSE` samples a pixel, spread, (height * COARSE, width * COARSE)."""
+    height, width = radiance.shape
+    across = _samples(frame, width)
+    if halo:
+        at = (np.arange(width * COARSE) + 0.5) / COARSE - 0.5
+        across = across + frame.halo(torch.as_tensor(at[:, None] - np.arange(width))).numpy()
+    return np.asarray(_samples(frame, height) @ radiance @ across.T)
+
+
+def _samples(frame: Frame, pixels: int) -> Floats:
+    """Matrix from pixels to samples of the spread light, (pixels * COARSE, pixels)."""
+    at = (np.arange(pixels * COARSE) + 0.5) / COARSE - 0.5
+    weights, reach = frame.spread.pixel(), frame.spread.reach
+    index = np.rint((at[:, None] - np.arange(pixels)) * FINE).astype(int) + reach
+    inside = (index >= 0) & (index < len(weights))
+    return np.asarray(np.where(inside, weights[index.clip(0, len(weights) - 1)], 0.0))

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.film.filter_angle import shift_terms
 from dsl_core.calibration.film.fit import (
     COMMON_PX,
     FIELDS,
@@ -16,6 +15,7 @@ from dsl_core.calibration.film.fit import (
     grating_columns,
     require_plausible,
     seen_straight,
+    shift_terms,
 )
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Film
