@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,42 +13,31 @@ from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.colour import delta_e_2000, reflectance_to_lab
 
 Floats = NDArray[np.float64]
+Value = TypeVar("Value", float, Floats)
 
 
 @dataclass(frozen=True)
-class SpectrumErrors:
-    """Errors of one spectrum; ``scaled`` errors are those left after a free scale.
+class SpectralErrors(Generic[Value]):
+    """Errors of spectra, a number for one or an array (n,) for n; ``scaled`` are left after a free scale.
 
     ``rmse`` over bands on the reflectance scale; ``angle_rad`` does not depend on scale; ``delta_e`` is
     CIEDE2000 under D65; ``scale`` is the factor that brings the measurement closest to the truth.
     """
 
-    rmse: float
-    angle_rad: float
-    delta_e: float
-    scale: float
-    rmse_scaled: float
-    delta_e_scaled: float
+    rmse: Value
+    angle_rad: Value
+    delta_e: Value
+    scale: Value
+    rmse_scaled: Value
+    delta_e_scaled: Value
 
 
-@dataclass(frozen=True)
-class SpectralErrors:
-    """Errors of n spectra as those of `SpectrumErrors`, each array of shape (n,)."""
-
-    rmse: Floats
-    angle_rad: Floats
-    delta_e: Floats
-    scale: Floats
-    rmse_scaled: Floats
-    delta_e_scaled: Floats
-
-    @property
-    def first(self) -> dict[str, float]:
-        """Those of the first spectrum, by name."""
-        return {name: float(values[0]) for name, values in vars(self).items()}
+def first_of(errors: SpectralErrors[Floats]) -> dict[str, float]:
+    """Those of the first spectrum, by name."""
+    return {name: float(values[0]) for name, values in vars(errors).items()}
 
 
-def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> SpectralErrors:
+def spectral_errors(measured: Floats, truth: Floats, wavelengths_nm: Floats) -> SpectralErrors[Floats]:
     """Compare spectra (bands, n) with truth (bands, n) or (bands, 1).
 
     Raises `DecodeError` for shapes that do not fit or values that are not finite.
@@ -133,7 +123,7 @@ MIN_BANDS = 5
 
 
 @dataclass(frozen=True)
-class SpectrumComparison(SpectrumErrors):
+class SpectrumComparison(SpectralErrors[float]):
     """How a spectrum differs from a reference over the bands they share."""
 
     bands: int
@@ -158,4 +148,4 @@ def compare(
     bands = np.asarray(wavelengths_nm[shared], np.float64)
     wanted = np.interp(bands, nm, np.asarray(reference.values))
     found = spectral_errors(np.asarray(spectrum[shared], np.float64)[:, None], wanted[:, None], bands)
-    return SpectrumComparison(**found.first, bands=count, range_nm=(float(bands[0]), float(bands[-1])))
+    return SpectrumComparison(**first_of(found), bands=count, range_nm=(float(bands[0]), float(bands[-1])))
