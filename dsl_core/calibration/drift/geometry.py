@@ -7,8 +7,6 @@ leave residuals in projector pixels; what varies smoothly over the image is drif
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -27,14 +25,6 @@ LIMIT_PX = 0.1
 #: Terms of the smooth part: 1, x, y, x², x y, y².
 _TERMS = 6
 _MIN_TILES = 3 * _TERMS
-
-
-@dataclass(frozen=True)
-class SmoothPart:
-    """What of a residual varies smoothly over the image: its rms, with the deviation noise leaves in it."""
-
-    rms: float
-    std: float
 
 
 def geometry_drift(
@@ -63,8 +53,8 @@ def geometry_drift(
     ]
 
 
-def smooth_part(residual: Floats, known: NDArray[np.bool_]) -> SmoothPart:
-    """The smooth part of the residuals (n,) of the ``known`` pixels (rows, columns).
+def smooth_part(residual: Floats, known: NDArray[np.bool_]) -> tuple[float, float]:
+    """Rms, with its deviation, of what varies smoothly of residuals (n,) of ``known`` pixels (rows, columns).
 
     A quadratic through the means of tiles; the scatter of the tiles about it says what noise alone leaves.
     Raises `CalibrationError` when fewer than 18 tiles are known.
@@ -91,7 +81,7 @@ def smooth_part(residual: Floats, known: NDArray[np.bool_]) -> SmoothPart:
     # The noise of six fitted terms adds to the square of the smooth part; it is taken out again.
     noise = _TERMS * scatter / len(value)
     rms = max(float(np.mean(smooth**2)) - noise, 0.0) ** 0.5
-    return SmoothPart(rms, noise**0.5)
+    return rms, noise**0.5
 
 
 def _projected(rig: Rig, depth_mm: Floats, known: NDArray[np.bool_]) -> tuple[Floats, Floats]:
@@ -101,5 +91,6 @@ def _projected(rig: Rig, depth_mm: Floats, known: NDArray[np.bool_]) -> tuple[Fl
     return column.numpy(), row.numpy()
 
 
-def _figure(name: str, found: SmoothPart, advice: str) -> Figure:
-    return Figure(name=name, value=found.rms, std=found.std, unit="px", high=LIMIT_PX, advice=advice)
+def _figure(name: str, found: tuple[float, float], advice: str) -> Figure:
+    rms, std = found
+    return Figure(name=name, value=rms, std=std, unit="px", high=LIMIT_PX, advice=advice)

@@ -112,7 +112,7 @@ def fit_bandpass(
         BandSample(each.light.zero, each.light.zero_std, light * reflectance, each.measured_curve)
         for each, light in zip(filters, lights, strict=True)
     ]
-    response = fit_response(rig, bands, white, white_std, reflectance)
+    refined = fit_response(rig, bands, white, white_std, reflectance)
     efficiency = {order: fit.curve for order, fit in fits.items()}
     if np.isfinite(share_std):
         for order in ORDERS:
@@ -125,9 +125,9 @@ def fit_bandpass(
         second_order_share=share,
         second_order_share_std=share_std if np.isfinite(share_std) else 1.0,
         misfit={order: fit.misfit for order, fit in fits.items()},
-        response=response.response,
-        white_scale=response.white_scale,
-        white_scale_rel_std=response.white_scale_rel_std,
+        response=refined.response,
+        white_scale=refined.white_scale,
+        white_scale_rel_std=refined.white_scale_rel_std,
         blur_px=profile.response.blur_px,
         blur_std_px=profile.std[0],
         halo_peak_per_px=profile.response.halo_peak_per_px,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.calibration.common.spectral_nodes import NODES_NM, SMOOTHNESS
-from dsl_core.model.rig import Rgb, Rig
+from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM
 from dsl_core.optics.spectra import chain_response
@@ -53,19 +53,13 @@ class BandSample:
     measured_curve: bool
 
 
-@dataclass(frozen=True)
-class ResponseFit:
-    """Response with deviation, and white scale with its relative deviation."""
-
-    response: Rgb
-    white_scale: float
-    white_scale_rel_std: float
-
-
 def fit_response(
     rig: Rig, samples: Sequence[BandSample], white: Floats, white_std: Floats, reflectance: float
-) -> ResponseFit:
-    """Refine the response; ``white`` (3,) is the zero order of white at unit shading, DN per ms."""
+) -> Rig:
+    """The rig with its response and white scale refined, and their deviations.
+
+    ``white`` (3,) is the zero order of white at unit shading, DN per ms.
+    """
     nm = FINE_NM
     hats = hat_functions(nm, NODES_NM)
     in_white = chain_response(rig, 0, nm).sum(1) * reflectance
@@ -123,7 +117,7 @@ def _place(row: Floats, colour: int, filters: int, index: int | None) -> Floats:
     return full
 
 
-def _result(rig: Rig, solution: SmoothSolution, green: Floats) -> ResponseFit:
+def _result(rig: Rig, solution: SmoothSolution, green: Floats) -> Rig:
     """Fix the scale: what white light makes green see stays, and the white scale takes the rest."""
     n, count = len(NODES_NM), len(solution.values)
     mean = np.zeros(count)
@@ -133,12 +127,13 @@ def _result(rig: Rig, solution: SmoothSolution, green: Floats) -> ResponseFit:
     shift[-1] += mean
     values, covariance = shift @ solution.values, shift @ solution.covariance @ shift.T
     std = np.sqrt(np.diag(covariance).clip(min=0))
-    curves = [
+    response = tuple(
         _refined(curve, values[c * n : (c + 1) * n], std[c * n : (c + 1) * n])
         for c, curve in enumerate(rig.response)
-    ]
-    return ResponseFit(
-        (curves[0], curves[1], curves[2]), rig.white_scale * float(np.exp(values[-1])), float(std[-1])
+    )
+    scale = rig.white_scale * float(np.exp(values[-1]))
+    return rig.model_copy(
+        update={"response": response, "white_scale": scale, "white_scale_rel_std": float(std[-1])}
     )
 
 

@@ -47,10 +47,12 @@ _MEASURED_OF_BASE = {
 
 @dataclass(frozen=True)
 class PublishedCalibration:
-    """Everything the published files hold; the film's shape and the absolute scale are not in them."""
+    """Everything the published files hold; the film's shape and the scale of the curves are not in them."""
 
     stereo: Stereo
-    tables: PublishedTables
+    response: Rgb
+    emission: Rgb
+    efficiency: dict[int, SpectralCurve]
 
     def rig(self, base: Rig) -> Rig:
         """A rig with these lenses, pose and curves; film, sensor and scales are those of ``base``.
@@ -67,9 +69,9 @@ class PublishedCalibration:
                 "camera": self.stereo.camera,
                 "projector": self.stereo.projector,
                 "pose": self.stereo.pose,
-                "response": self.tables.response,
-                "emission": self.tables.emission,
-                "efficiency": self.tables.efficiency,
+                "response": self.response,
+                "emission": self.emission,
+                "efficiency": self.efficiency,
                 "correspondence": None,
                 "conditions": None,
                 "calibrations": (),
@@ -85,10 +87,8 @@ def load_calibration(
     root: Path, projector_size_px: Size = (640, 360), camera_size_px: Size | None = None
 ) -> PublishedCalibration:
     """Read lenses, pose and spectral tables below ``root``; raises `CalibrationError`."""
-    return PublishedCalibration(
-        stereo=load_stereo(root / STEREO_NAME, projector_size_px, camera_size_px),
-        tables=load_tables(root / TABLE_FOLDER),
-    )
+    stereo = load_stereo(root / STEREO_NAME, projector_size_px, camera_size_px)
+    return PublishedCalibration(stereo, *load_tables(root / TABLE_FOLDER))
 
 
 def export_calibration(rig: Rig, root: Path, *, overwrite: bool = False) -> list[Path]:
@@ -152,25 +152,16 @@ _GRIDS = {
 }
 
 
-@dataclass(frozen=True)
-class PublishedTables:
-    """Relative curves as published; their common scale is not calibrated."""
-
-    response: Rgb
-    emission: Rgb
-    efficiency: dict[int, SpectralCurve]
-
-
-def load_tables(folder: Path) -> PublishedTables:
-    """Read the three tables, whose numbers of bands must be published ones.
+def load_tables(folder: Path) -> tuple[Rgb, Rgb, dict[int, SpectralCurve]]:
+    """Read response, emission and efficiency of the orders, whose numbers of bands must be published ones.
 
     Raises `CalibrationError` that names the file and the shape it should have.
     """
     response, emission, efficiency = (_load(folder, name) for name in TABLE_NAMES)
-    return PublishedTables(
-        response=(response[0], response[1], response[2]),
-        emission=(emission[0], emission[1], emission[2]),
-        efficiency=dict(zip(ORDERS, efficiency, strict=True)),
+    return (
+        (response[0], response[1], response[2]),
+        (emission[0], emission[1], emission[2]),
+        dict(zip(ORDERS, efficiency, strict=True)),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.orders.response import BandSample, ResponseFit, fit_response
+from dsl_core.calibration.orders.response import BandSample, fit_response
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
@@ -30,7 +30,7 @@ def true_rig() -> Rig:
     return rig.model_copy(update={"response": response, "white_scale": 1.08 * rig.white_scale})
 
 
-def fitted(measured: bool, factor: float = 1.0) -> ResponseFit:
+def fitted(measured: bool, factor: float = 1.0) -> Rig:
     """Through filters that pass ``factor`` times what their curves say; noise of a thousandth."""
     known, truth, rng = published_rig(), true_rig(), np.random.default_rng(0)
     samples = []

@@ -91,7 +91,7 @@ def test_the_number_of_bands_tells_the_wavelengths(tmp_path: Path, bands: int, f
     # Names of earlier versions, for a change.
     for name, shape in (("CRF_cam", (bands, 3)), ("CRF_proj", (bands, 3)), ("intensity_dg", (3, bands))):
         np.save(tmp_path / f"{name}.npy", np.ones(shape))
-    curve = load_tables(tmp_path).efficiency[1]
+    curve = load_tables(tmp_path)[2][1]
     assert (curve.wavelengths_nm[0], curve.wavelengths_nm[-1], len(curve.values)) == (first, last, bands)
 
 
