@@ -62,7 +62,6 @@ class Outcome:
     unbiased: NDArray[np.float64]
     std: NDArray[np.float64]
     data_share: NDArray[np.float64]
-    column_error_px: NDArray[np.float64]
     depth_error_mm: NDArray[np.float64]
     lit: NDArray[np.bool_]
 
@@ -112,10 +111,8 @@ class VirtualPixels:
         grid: WavelengthGrid,
         view: SamplePixels,
         *,
-        prior: Prior | None = None,
         surface_window_px: int | None = None,
         scatter: float = SCATTER,
-        seed: int = 0,
         dtype: torch.dtype = torch.float32,
     ) -> None:
         """``scatter`` is the share of the granted model error that differs from pixel to pixel.
@@ -124,7 +121,7 @@ class VirtualPixels:
         """
         self.scatter = scatter
         self.rig, self.view = rig, view
-        self.prior, self.seed = prior or Prior().at_step(grid.step_nm), seed
+        self.prior = Prior().at_step(grid.step_nm)
         self.shading = torch.as_tensor(view.shading, dtype=dtype)
         self.window_px = surface_window_px or default_window_px(rig)
         self.bracket, self.direct_error = Bracket.of(rig, plan), zero_order_error(rig, plan)
@@ -215,11 +212,11 @@ class VirtualPixels:
         truth = np.moveaxis(spectra[..., self.bands.reported], 2, 0)
         return Outcome(
             truth, of(found.mean) * scale.numpy(), of(calm.mean), of(found.std), of(found.data_share),
-            error_px.double().numpy(), depth_error.numpy(), lit.numpy(),
+            depth_error.numpy(), lit.numpy(),
         )  # fmt: skip
 
     def _draw(self, spectra: NDArray[np.float64], first: Tensor, zero: Tensor) -> Draw:
-        random = torch.Generator().manual_seed(self.seed)
+        random = torch.Generator().manual_seed(0)
         nodes, clean = like(spectra, self.shading), first + zero
         fraction = self.rig.projector_response.black_fraction
         black = fraction * self._white(nodes, (0, *ORDERS))[..., None]

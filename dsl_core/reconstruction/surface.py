@@ -37,10 +37,9 @@ MIXED_REL_STD = (0.5 / 12) ** 0.5
 
 @dataclass(frozen=True)
 class Surface:
-    """Normals (3, rows, columns), their deviation (rad), shading with relative deviation, and depth edges."""
+    """Normals (3, rows, columns), shading with relative deviation, and depth edges."""
 
     normals: Map
-    normal_std_rad: Map
     shading: Map
     shading_rel_std: Map
     edge: NDArray[np.bool_]
@@ -85,7 +84,7 @@ def reconstruct_surface(rig: Rig, depth_mm: Map, depth_std_mm: Map, window_px: i
     shading, incidence_tan = _shading(rig, rays * np.where(valid, depth_mm, np.nan), normal)
     relative = np.hypot(incidence_tan * spread, 2 * np.where(valid, depth_std_mm * inverse, np.nan))
     relative = np.where(edge, np.hypot(relative, MIXED_REL_STD), relative)
-    return Surface(normal, spread, shading, relative, edge)
+    return Surface(normal, shading, relative, edge)
 
 
 def _box(values: Map, window: int) -> Map:

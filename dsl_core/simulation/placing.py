@@ -60,7 +60,7 @@ class TwinHand:
                 scene_at(position)
                 self.world.place(scene_at, position)
                 self._standing = asked
-            self.world.move_to(position)
+            self.world.position_mm = position
         self.world.insert(placement.film, curve)
         self.world.noise_key = (zlib.crc32(placement.model_dump_json().encode()),)
         self._placement = placement

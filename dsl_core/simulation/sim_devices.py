@@ -137,7 +137,7 @@ class SimStage(Stage):
                 f"A position of {position_mm:g} mm was requested; the stage travels from {low:g} to"
                 f" {high:g} mm."
             )
-        self.world.move_to(float(position_mm))
+        self.world.position_mm = float(position_mm)
         return self.world.position_mm
 
 

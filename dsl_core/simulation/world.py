@@ -113,11 +113,6 @@ class World:
         """Change what the projector shows."""
         self.image = image.copy()
 
-    def move_to(self, position_mm: float) -> None:
-        """Move the stage; the scene changes with it."""
-        if position_mm != self.position_mm:
-            self.position_mm = position_mm
-
     def place(self, scene_at: Callable[[float], Scene], position_mm: float) -> None:
         """Put another scene in front of the camera."""
         self.scene_at, self.position_mm = scene_at, position_mm

@@ -68,12 +68,7 @@ class Equations:
         )
 
     def __sub__(self, other: Equations) -> Equations:
-        return Equations(
-            self.normal - other.normal,
-            self.right - other.right,
-            self.square - other.square,
-            self.count - other.count,
-        )
+        return self + Equations(-other.normal, -other.right, -other.square, -other.count)
 
 
 @dataclass(frozen=True)

@@ -137,7 +137,8 @@ def memory_of(stage: Stage, path: Path) -> tuple[float, float]:
     stage.idle()
     stage.settle()
     assert state.result.value is not None
-    return (process.memory_info().rss - before) / 1e6, state.result.value.bytes / 1e6
+    arrays = state.result.value.arrays.values()
+    return (process.memory_info().rss - before) / 1e6, sum(values.nbytes for values in arrays) / 1e6
 
 
 def _timed(acts: list[Callable[[], object]]) -> tuple[float, float]:

@@ -57,7 +57,7 @@ def test_only_what_changed_is_made_again() -> None:
     here.insert(False, None)
     assert here.renderer is not bare
     assert here.truth is truth
-    here.move_to(710.0)
+    here.position_mm = 710.0
     assert here.truth is not truth
 
 

@@ -138,9 +138,7 @@ def project(lens: Floats, points: Floats) -> tuple[Floats, Floats, Floats]:
     return np.asarray(pixels, np.float64).reshape(-1, 2), jacobian[:, :, 6:15], jacobian[:, :, 3:6]
 
 
-def adjust(
-    poses: Sequence[PoseObservation], start: Floats, outlier_sigmas: float = OUTLIER_SIGMAS
-) -> Adjustment:
+def adjust(poses: Sequence[PoseObservation], start: Floats) -> Adjustment:
     """Minimise the weighted squares of all corners, first with robust weights, then without the outliers.
 
     Camera and projector are weighted by their own noise, estimated from the residuals. Raises
@@ -154,7 +152,7 @@ def adjust(
     used = np.ones(len(problem.pose_of), bool)
     for _ in range(MAX_ROUNDS):
         sigmas = _noises(problem, parameters, used)
-        weights = _weights(problem, parameters, used, outlier_sigmas)
+        weights = _weights(problem, parameters, used)
         before, used = used, weights > 0
         if 4 * used.sum() <= len(parameters):
             raise CalibrationError(
@@ -172,7 +170,7 @@ def refit(poses: Sequence[PoseObservation], start: Floats) -> Floats:
     problem = Problem(poses)
     everything = np.ones(len(problem.pose_of), bool)
     sigmas = _noises(problem, start, everything)
-    return _solve(problem, start, sigmas, _weights(problem, start, everything, OUTLIER_SIGMAS))
+    return _solve(problem, start, sigmas, _weights(problem, start, everything))
 
 
 def _solve(problem: Problem, start: Floats, sigmas: tuple[Floats, Floats], weights: Floats) -> Floats:
@@ -220,11 +218,11 @@ def _farthest(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> 
     return np.asarray(np.maximum(*sigmas)), np.asarray(np.maximum(*pixels))
 
 
-def _weights(problem: Problem, parameters: Floats, used: NDArray[np.bool_], limit_sigmas: float) -> Floats:
+def _weights(problem: Problem, parameters: Floats, used: NDArray[np.bool_]) -> Floats:
     """Weights of the corners: zero for outliers, less than one beyond the limit where that is harmless."""
     sigmas, pixels = _farthest(problem, parameters, used)
-    kept = (sigmas <= limit_sigmas) | (pixels <= HARMLESS_PX)
-    return np.where(kept, np.minimum(1.0, limit_sigmas / np.maximum(sigmas, 1e-12)), 0.0)
+    kept = (sigmas <= OUTLIER_SIGMAS) | (pixels <= HARMLESS_PX)
+    return np.where(kept, np.minimum(1.0, OUTLIER_SIGMAS / np.maximum(sigmas, 1e-12)), 0.0)
 
 
 def _summary(

@@ -83,15 +83,11 @@ class _Solved:
 
 
 def chain_correction(
-    rig: Rig,
-    scans: Sequence[LineScan],
-    *,
-    model: Correspondence | None = None,
-    reflectance: float | SpectralCurve = 0.99,
+    rig: Rig, scans: Sequence[LineScan], *, reflectance: float | SpectralCurve = 0.99
 ) -> ChainCorrection:
     """Smooth factors from one or more scans of a diffuser; raises `CalibrationError` without good pixels."""
     # Where the light goes depends on film and lenses alone, so that the model outlives the rig's curves.
-    model = model or correspondence(rig)
+    model = correspondence(rig)
     target = (
         reflectance if isinstance(reflectance, SpectralCurve) else SpectralCurve.of([550.0], [reflectance])
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import torch
@@ -77,17 +78,9 @@ class LineScan:
 
     def at(self, which: NDArray[np.int64] | NDArray[np.bool_]) -> LineScan:
         """The same scan at some of its pixels, given by position."""
-        return replace(
-            self,
-            pixels=self.pixels[which],
-            depth_mm=self.depth_mm[which],
-            shading=self.shading[which],
-            column_px=self.column_px[which],
-            amplitude=self.amplitude[which],
-            offset=self.offset[which],
-            radiance=self.radiance[:, which],
-            std=self.std[:, which],
-        )
+        arrays = {name: each for name, each in vars(self).items() if isinstance(each, np.ndarray)}
+        some: dict[str, Any] = {name: each[..., which] for name, each in arrays.items()}
+        return replace(self, **some)
 
 
 @dataclass(frozen=True)

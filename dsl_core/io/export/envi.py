@@ -22,12 +22,7 @@ IGNORE_VALUE = -9999.0
 
 
 def export_envi(
-    result: xr.Dataset,
-    path: Path,
-    *,
-    overwrite: bool = False,
-    with_std: bool = True,
-    check: Check = never,
+    result: xr.Dataset, path: Path, *, overwrite: bool = False, check: Check = never
 ) -> list[Path]:
     """Write ``NAME.hdr`` with its data ``NAME.img``, and ``NAME_std.*`` where the result has a deviation.
 
@@ -36,7 +31,7 @@ def export_envi(
     require_suffix(path, ".hdr")
     require(result, "An ENVI cube", "reflectance", "wavelength_nm")
     cubes = {"reflectance": path}
-    if with_std and "reflectance_std" in result:
+    if "reflectance_std" in result:
         cubes["reflectance_std"] = path.with_name(f"{path.stem}_std.hdr")
     targets = [target for header in cubes.values() for target in (header, header.with_suffix(".img"))]
     with staged(targets, overwrite=overwrite) as drafts:

@@ -35,11 +35,6 @@ class ResultArrays:
         """Whether reflectance is there, and not only depth."""
         return "reflectance" in self.arrays
 
-    @property
-    def bytes(self) -> int:
-        """Memory that the arrays take."""
-        return sum(values.nbytes for values in self.arrays.values())
-
     def __getitem__(self, name: str) -> NDArray[Any]:
         """The array of a name; raises ``KeyError``."""
         return self.arrays[name]

@@ -143,9 +143,9 @@ def test_a_moved_stage_and_a_brighter_exposure_are_decided_again() -> None:
     world = world_of("plane", request=EffectRequest(Choice.of("auto")), noise=False)
     world.scene_at = lambda position_mm: world_of("box" if position_mm > 750 else "plane").scene
     assert world.path.extra("interreflection") is None
-    world.move_to(760.0)
+    world.position_mm = 760.0
     assert world.path.extra("interreflection") is not None
-    world.move_to(740.0)
+    world.position_mm = 740.0
     assert world.path.ambient_dn_per_ms == 0
     world.show(np.zeros((HEIGHT, WIDTH), np.uint8))
     world.expose(300.0, 0)
