@@ -25,17 +25,12 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 from dsl_core.io.atomic import make_folder, remove_partials
+from dsl_core.io.records import replace_record
 from dsl_core.io.scan.capture_log import CaptureLog, LogEntry, read_log
 from dsl_core.io.scan.estimate import check_space
 from dsl_core.io.scan.frame_store import ChunkError, FrameStore, checksum
 from dsl_core.io.scan.lock import FolderLock
-from dsl_core.io.scan.manifest import (
-    Manifest,
-    describe_scan,
-    read_manifest,
-    refuse_other_scan,
-    write_manifest,
-)
+from dsl_core.io.scan.manifest import Manifest, describe_scan, read_manifest, refuse_other_scan
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.model.rig import Rig
@@ -161,7 +156,7 @@ class ScanWriter:
             manifest = describe_scan(plan, rig, notes)
             store_of(folder, plan).create()
             # The manifest comes last: a folder without one never held a frame and may be started again.
-            write_manifest(folder, manifest)
+            replace_record(folder / MANIFEST_NAME, manifest)
             return cls(folder, manifest, lock)
         except BaseException:
             lock.release()
@@ -261,7 +256,7 @@ class ScanWriter:
                 return False
         except StoreError:
             pass
-        write_manifest(self.folder, self.manifest)
+        replace_record(self.folder / MANIFEST_NAME, self.manifest)
         return True
 
     def _restore_metadata(self) -> bool:

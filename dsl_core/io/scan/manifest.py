@@ -15,7 +15,7 @@ from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
-from dsl_core.io.records import read_record, replace_record
+from dsl_core.io.records import read_record
 from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
@@ -54,11 +54,6 @@ def describe_scan(plan: CapturePlan, rig: DeviceRig | None, notes: dict[str, str
         calibration=rig.calibration if rig else None,
         notes={**rig.notes, **own} if rig else own,
     )
-
-
-def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Store the manifest atomically; raises `StoreError`."""
-    replace_record(folder / MANIFEST_NAME, manifest)
 
 
 def read_manifest(folder: Path) -> Manifest:
