@@ -42,7 +42,7 @@ def compare(
         first=first,
         second=second,
         figures={
-            each.words: {"value": each.value, "std": each.std, "unit": each.unit} for each in figures(found)
+            words: {"value": value, "std": std, "unit": unit} for words, value, std, unit, _ in figures(found)
         },
     )
     output.finish()

@@ -14,6 +14,8 @@ from dsl_core.evaluation.verdict import Verdict, estimate_row
 from dsl_core.progress import NoProgress, Progress
 
 Floats = NDArray[np.floating[Any]]
+#: A figure in words, its value, standard deviation (None: counted, not estimated), unit and format.
+Row = tuple[str, float, float | None, str, str]
 #: Bands of two results this close are the same, nm.
 SAME_BAND_NM = 0.01
 #: Field, that of its deviation, words, unit and format of every row, in the order of the table.
@@ -135,31 +137,18 @@ def _with_spectra(
     )
 
 
-@dataclass(frozen=True)
-class DifferenceFigure:
-    """A figure of a difference in words, with its standard deviation (None: counted, not estimated)."""
-
-    words: str
-    value: float
-    std: float | None
-    unit: str
-    form: str
-
-
-def figures(found: ResultDifference) -> tuple[DifferenceFigure, ...]:
+def figures(found: ResultDifference) -> tuple[Row, ...]:
     """All figures that there are, in the order of the table."""
-    rows = [DifferenceFigure("Pixels that both have", 100 * found.share, None, "%", ".2f")]
+    rows: list[Row] = [("Pixels that both have", 100 * found.share, None, "%", ".2f")]
     for field, std_field, words, unit, form in _FIGURES:
         value = getattr(found, field)
         if value is not None:
-            rows.append(DifferenceFigure(words, value, getattr(found, std_field), unit, form))
+            rows.append((words, value, getattr(found, std_field), unit, form))
     if found.bands:
-        rows.append(DifferenceFigure("Common bands", found.bands, None, "", ".0f"))
+        rows.append(("Common bands", found.bands, None, "", ".0f"))
     return tuple(rows)
 
 
 def difference_table(found: ResultDifference) -> tuple[Verdict, ...]:
     """The figures as rows of a table."""
-    return tuple(
-        estimate_row(each.words, each.value, each.std, each.unit, each.form) for each in figures(found)
-    )
+    return tuple(estimate_row(*each) for each in figures(found))
