@@ -25,6 +25,7 @@ Part = Literal[
     "coverage",
     "geometry",
     "lateral colour",
+    "curves",
 ]
 
 #: How many deviations of its own a figure must be away from zero.
@@ -43,6 +44,7 @@ PARTS: dict[Part, str] = {
     "coverage": "the part of the picture that was measured",
     "geometry": "the geometry",
     "lateral colour": "the lateral colour of the lenses",
+    "curves": "the curves of camera and projector",
 }
 
 

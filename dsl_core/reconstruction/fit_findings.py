@@ -16,7 +16,14 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import GratingModel
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import ORDERS
-from dsl_core.reconstruction.spectral.causes import MOST_GAIN, MOST_SHIFT_PX, Causes, fit_causes
+from dsl_core.reconstruction.spectral.causes import (
+    MOST_CURVES,
+    MOST_DRIFT,
+    MOST_GAIN,
+    MOST_SHIFT_PX,
+    Causes,
+    fit_causes,
+)
 from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion
 from dsl_core.reconstruction.spectral.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.probe import Probe
@@ -30,8 +37,8 @@ MOST_POOR, MOST_AT_BOUND, MOST_LOST, MOST_UNDECIDED = 0.4, 0.1, 0.1, 0.5
 WIDEST_BAND = 1.25
 #: Fewer pixels say nothing.
 FEWEST = 50
-#: What matters of blur and tail of the lines, and of the light over the scan.
-MOST_BLUR, MOST_TAIL, MOST_DRIFT = 0.03, 0.004, 0.014
+#: What matters of blur and tail of the lines.
+MOST_BLUR, MOST_TAIL = 0.03, 0.004
 #: Chi-square of most pixels above which no cause explains the frames.
 MOST_CHI_SQUARE = 1.5
 #: Said of what spectra already follow.
@@ -204,6 +211,17 @@ def cause_findings(
         f"The light has changed by {causes.drift:+.1%} from the first line to the last.",
         "Let the projector warm up for longer.",
     )
+    if probe.curves is not None:
+        yield FitFinding.judged(
+            "curves",
+            "disagreement of the colours",
+            (probe.curves.rms, probe.curves.std),
+            "1",
+            MOST_CURVES,
+            "The colours of the camera disagree about the same light: curves of camera and projector are off"
+            f" by about {probe.curves.rms:.1%}, and so are spectra.",
+            "Calibrate the curves on this rig; those of data sheets are typically off by 5 %.",
+        )
     usual = float(np.median(probe.chi_square))
     yield FitFinding.judged(
         "profile",

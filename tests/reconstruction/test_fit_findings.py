@@ -121,6 +121,20 @@ def other_gamma(rig: Rig) -> Rig:
     )
 
 
+def wavy_curves(rig: Rig) -> Rig:
+    """Curves of the camera as a data sheet might give them."""
+    curves = []
+    for phase, curve in enumerate(rig.response):
+        nm = np.array(curve.wavelengths_nm)
+        curves.append(
+            curve.model_copy(
+                update={"values": tuple(np.array(curve.values) * (1 + 0.05 * np.sin(nm / 11 + 2 * phase)))}
+            )
+        )
+    red, green, blue = curves
+    return rig.model_copy(update={"response": (red, green, blue)})
+
+
 def less_blur(rig: Rig) -> Rig:
     response = rig.projector_response
     return rig.model_copy(
@@ -136,6 +150,7 @@ def less_blur(rig: Rig) -> Rig:
         (bent_film, "film"),
         (one_order_brighter, "orders"),
         (other_gamma, "response"),
+        (wavy_curves, "curves"),
         (less_blur, "profile"),
     ],
 )

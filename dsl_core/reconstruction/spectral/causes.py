@@ -15,6 +15,10 @@ Floats = NDArray[np.float64]
 
 #: What matters of the place of the orders (px) and of their gains.
 MOST_SHIFT_PX, MOST_GAIN = 0.035, 0.015
+#: What matters of the light over the scan, and of curves by which colours disagree.
+MOST_DRIFT, MOST_CURVES = 0.014, 0.015
+#: Rms of a level that changes steadily from that of the start, relative to its change.
+SINCE_START = 3**-0.5
 #: Terms of the shift of an order over the picture: up to second degree.
 _TERMS = 6
 
@@ -38,6 +42,11 @@ class Causes:
     drift_std: float
 
     @property
+    def drifts(self) -> bool:
+        """Whether the light has changed during the scan."""
+        return matters(self.drift, self.drift_std, MOST_DRIFT)
+
+    @property
     def unequal(self) -> bool:
         """Whether one order is brighter or darker against the other than calibrated."""
         plus, minus = self.gain
@@ -52,6 +61,13 @@ class Causes:
         """
         plus, minus = self.gain
         return float(np.sign(plus) * min(abs(plus), abs(minus))) if plus * minus > 0 else 0.0
+
+
+def common_error(probe: Probe, causes: Causes) -> float:
+    """Relative error of all reflectance that no pixel sees by itself: curves, and the level of the light."""
+    curves = probe.curves
+    share = curves.rms if curves is not None and matters(curves.rms, curves.std, MOST_CURVES) else 0.0
+    return float(np.hypot(share, SINCE_START * causes.drift if causes.drifts else 0.0))
 
 
 def fit_causes(probe: Probe) -> Causes:

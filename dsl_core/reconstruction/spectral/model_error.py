@@ -48,8 +48,11 @@ class ModelError:
         return np.asarray(found, np.float64)
 
 
-def model_error(probe: Probe) -> ModelError:
-    """The error of the model in each cell; cells without pixels take their neighbours'."""
+def model_error(probe: Probe, common: float = 0.0) -> ModelError:
+    """The error of the model in each cell; cells without pixels take their neighbours'.
+
+    A ``common`` error of all reflectance is added.
+    """
     from scipy.ndimage import gaussian_filter
 
     cells, bands = CELLS[0] * CELLS[1], probe.reflectance.shape[1]
@@ -70,7 +73,7 @@ def model_error(probe: Probe) -> ModelError:
         gaussian_filter(values.reshape(*CELLS, bands), (0.7, 0.7, 1.0), mode="nearest")
         for values in (squares, level)
     )
-    relative = MARGIN * np.sqrt(np.maximum(error, 0) / np.maximum(light, 1e-6))
+    relative = np.hypot(MARGIN * np.sqrt(np.maximum(error, 0) / np.maximum(light, 1e-6)), common)
     misfit = (probe.chi_square > MISFIT_FROM) & np.isfinite(probe.correlation)
     correlation = float(np.median(probe.correlation[misfit])) if misfit.sum() >= FEW else 1.0
     return ModelError(relative.transpose(2, 0, 1), correlation)

@@ -26,6 +26,13 @@ from dsl_core.optics.line_profile import SAMPLES, ProfileTable, halo_of_line
 from dsl_core.optics.pixel_model import PixelModel
 from dsl_core.optics.spectra import ORDERS
 from dsl_core.optics.spread.field import widths_at
+from dsl_core.reconstruction.spectral.curve_probe import (
+    CurveMisfit,
+    curve_changes,
+    curve_misfit,
+    normal_of_all_curves,
+    of_all_curves,
+)
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
 from dsl_core.reconstruction.spectral.probed_pixels import Indices, cell_of, sample_pixels, samples_of
@@ -91,10 +98,11 @@ class Probe:
     weighted by the noise; ``bias`` (n, b, p) is the error of the stated reflectance for a parameter of one;
     ``reflectance`` (n, b); ``chi_square`` (n,) is reduced; ``correlation`` (n,) is by how much sums of
     neighbouring residuals vary more than independent ones; ``place`` (n, 2) is row and column from -1 to 1,
-    ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``lines`` is what the zero
-    order of the same pixels says, and ``nm_per_px`` how far apart columns of the first orders are. ``places``
-    is whether pixels can tell where the orders are: on a small piece of one colour an error of its spectrum
-    looks like a shift.
+    ``cell`` (n,) the cell of `CELLS`, ``pixel`` (n,) the flat index. ``with_curves`` are ``normal`` and
+    ``score`` of these parameters and of the curves after them, None where nobody asked. ``lines`` is what the
+    zero order of the same pixels says, ``nm_per_px`` how far apart columns of the first orders are,
+    ``step_nm`` bands. ``places`` is whether pixels can tell where the orders are: on a small piece of one
+    colour an error of its spectrum looks like a shift.
     """
 
     normal: Floats
@@ -109,6 +117,8 @@ class Probe:
     lines: LineProbe
     nm_per_px: float
     places: bool = True
+    step_nm: float = 5.0
+    with_curves: tuple[Floats, Floats] | None = None
 
     @property
     def sound(self) -> NDArray[np.bool_]:
@@ -119,6 +129,13 @@ class Probe:
     def weight(self) -> Floats:
         """Weight (n,) of each pixel: less where the frames fit less, nothing where they see two surfaces."""
         return np.where(self.sound, 1 / np.maximum(self.chi_square * self.correlation, 1), 0.0)
+
+    @property
+    def curves(self) -> CurveMisfit | None:
+        """How far curves of camera and projector are off by what colours say; None where they say nothing."""
+        if self.with_curves is None:
+            return None
+        return curve_misfit(*self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm)
 
 
 def probe(scan: ProbedScan) -> Probe | None:
@@ -137,9 +154,15 @@ def probe(scan: ProbedScan) -> Probe | None:
     widths = widths_at(scan.model.rig, torch.as_tensor(targets), column)
     camera = scan.model.rig.camera
     wide = camera.width_px / camera.fx_px > ONE_VIEW
+    whole = together.pop("normal"), together.pop("score")
+    own = len(PARAMETERS)
     return Probe(
         **together,
         places=wide or variety(together["reflectance"]) > ONE_COLOUR,
+        normal=whole[0][:, :own, :own],
+        score=whole[1][:, :own],
+        step_nm=scan.model.bands.step_nm,
+        with_curves=whole,
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
     )
@@ -176,6 +199,10 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     def gather(values: Tensor) -> Tensor:
         return torch.zeros((count, *values.shape[1:]), dtype=values.dtype).index_add_(0, owners, values)
 
+    def of_curves(values: Tensor) -> Tensor:
+        into = torch.zeros((3 * count, *values.shape[1:]), dtype=values.dtype)
+        return into.index_add_(0, 3 * owners + light.colour, values).reshape(count, 3, *values.shape[1:])
+
     lit, weight = shading[owners], light.weight
     rows = light.rows * lit[:, None, None]
     heavy = (rows * weight[..., None]).mT
@@ -184,21 +211,22 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
     nodes = found.nodes.T.contiguous()
     own = nodes[owners]
     residual = light.values - (rows @ own[..., None])[..., 0]
-    changes = light.changes(own) * lit[:, None, None]
-    cross = gather(heavy @ changes)
+    curves = curve_changes(rows, own, scan.model.bands.centres_nm)
+    changes, others = torch.cat([light.changes(own) * lit[:, None, None], curves], 2), len(PARAMETERS)
+    cross = of_all_curves(of_curves(heavy @ changes), others)
     prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
     prior = prior + torch.eye(nodes.shape[1]).to(matrix) * scan.prior.level_std**-2
     bias = torch.linalg.solve(matrix + prior, cross)
     heavy = (changes * weight[..., None]).mT
-    normal = gather(heavy @ changes) - cross.mT @ bias
-    score = gather((heavy @ residual[..., None])[..., 0])
+    normal = normal_of_all_curves(of_curves(heavy @ changes), others) - cross.mT @ bias
+    score = of_all_curves(of_curves((heavy @ residual[..., None])[..., 0]), others)
     freedom = (gather((weight > 0).double().sum(1)) - SPECTRUM).clip(min=1)
     reported = scan.model.bands.reported
     y, x = np.divmod(targets, shape[1])
     return {
         "normal": normal.numpy(),
         "score": score.numpy(),
-        "bias": band_mean(bias.transpose(0, 1))[reported].transpose(0, 1).numpy(),
+        "bias": band_mean(bias[..., :others].transpose(0, 1))[reported].transpose(0, 1).numpy(),
         "reflectance": found.mean[reported].T.numpy(),
         "chi_square": (gather((weight * residual**2).sum(1)) / freedom).numpy(),
         "correlation": _correlation(residual * weight.sqrt(), gather).numpy(),
@@ -271,11 +299,11 @@ class _Light:
         }
         self._place = np.divmod(samples, scan.pixels.valid.shape[1])
         colour = bayer_colours(scan.model.rig.sensor.bayer, *self._place)
-        self._colour = torch.as_tensor(colour)
+        self.colour = torch.as_tensor(colour)
         known = self._known
         traced = scan.model.trace(torch.as_tensor(samples), known["depth_mm"], known["column_px"], ORDERS)
         self._orders = [self._order(order, traced.orders[order]) for order in ORDERS]
-        zero = like(scan.model.bands.moments[0].sum(1), known["shading"])[self._colour][:, None]
+        zero = like(scan.model.bands.moments[0].sum(1), known["shading"])[self.colour][:, None]
         amplitude, std = known["amplitude"][:, None], known["amplitude_std"][:, None]
         weight = 1 / (std**2 + (ZERO_ERROR * amplitude) ** 2)
         self.rows = torch.cat([*(order.rows for order in self._orders), zero], 1)
@@ -299,7 +327,7 @@ class _Light:
         index = first[:, None] + torch.arange(math.ceil((span + 2 * reach) / lines.step_px) + 1)
         used = lines.exists(index) & any_inside[:, None]
         distance = columns.T[:, None] - lines.centre_px(index).to(columns)[..., None]
-        white = like(scan.model.bands.moments[order].sum(1), columns)[self._colour] * inside.T
+        white = like(scan.model.bands.moments[order].sum(1), columns)[self.colour] * inside.T
         at = ((distance + reach) * SAMPLES).add_(0.5).clip_(0, len(table) - 1).int()
         own = table[:, 0].contiguous().index_select(0, at.reshape(-1)).reshape(at.shape) * white[:, None]
         frame = lines.frame(index).numpy()

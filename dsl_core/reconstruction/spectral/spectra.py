@@ -22,6 +22,7 @@ from dsl_core.optics.pixel_model import COLOUR_ERROR, DIRECT_ERROR, PixelModel, 
 from dsl_core.optics.spectra import ORDERS, Bands
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.columns.pattern_column import radiance_profiles, rounding_error
+from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
 from dsl_core.reconstruction.spectral.model_error import ModelError, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.probe import ProbedScan
 from dsl_core.reconstruction.spectral.self_correction import Followed, follow
@@ -129,7 +130,7 @@ class SpectralReconstruction:
             found = follow(self.probed, self._as_calibrated)
             if found is not None:
                 self.model, self.bands = found.model, found.model.bands
-                self._error = model_error(found.left)
+                self._error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
                 list(self._tiles()),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from dsl_core.reconstruction.spectral.causes import common_error, fit_causes
 from dsl_core.reconstruction.spectral.line_probe import LineProbe
 from dsl_core.reconstruction.spectral.model_error import MARGIN, model_error, neighbour_contrast
 from dsl_core.reconstruction.spectral.probe import PARAMETERS, Probe
@@ -44,6 +47,17 @@ def test_an_error_of_part_of_the_picture_is_stated_there_and_noise_nowhere() -> 
     quiet = model_error(made(0.0, noise=True)).relative
     # Each cell knows a gain to 0.0035.
     assert float(np.sqrt(np.mean(quiet**2))) < 0.0025
+
+
+def test_what_all_pixels_share_is_stated_everywhere() -> None:
+    quiet = made(0.0, noise=False)
+    assert model_error(quiet, 0.03).relative == pytest.approx(0.03)
+    drift = np.zeros_like(quiet.score)
+    drift[:, PARAMETERS.index("drift")] = 1e4 * 0.03
+    causes = fit_causes(replace(quiet, score=drift))
+    # From the first line to the last, and the level of the start is taken for all.
+    assert common_error(quiet, causes) == pytest.approx(0.03 / np.sqrt(3), rel=0.01)
+    assert common_error(quiet, fit_causes(replace(quiet, score=drift / 3))) == 0
 
 
 def test_the_error_is_linear_between_cells() -> None:

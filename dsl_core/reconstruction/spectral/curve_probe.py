@@ -1,0 +1,88 @@
+"""What the colours of the camera say of the curves of camera and projector: do they agree about one light?
+
+Where two colours see the same wavelengths, their curves say how much each of them should. A curve that is
+off shows as a difference between colours that no spectrum, film or profile explains. Only such differences
+show: a curve of the projector that is off for all colours looks like another reflectance. But curves from the
+same source are off by about as much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+Floats = NDArray[np.float64]
+
+#: Where each colour's curve may be off by another share, straight lines between, nm.
+KNOTS_NM = np.linspace(430.0, 660.0, 9)
+#: Differences between colours that are known better than this count.
+KNOWN_STD = 0.012
+#: What curves seem to be off that are right, as spectra are straight between bands: of bands of 5 nm, and as
+#: the square of their width.
+FLOOR, FLOOR_NM = 0.014, 5.0
+#: Mean square of straight pieces, relative to that of their ends.
+BETWEEN = 2 / 3
+#: Fewer differences say nothing.
+FEWEST = 6
+
+
+def curve_changes(rows: Tensor, spectra: Tensor, centres_nm: Floats) -> Tensor:
+    """What each share of the curve of a sample's own colour adds to the data, (samples, k, knots).
+
+    ``rows`` of the model are (samples, k, bands), ``spectra`` (samples, bands), ``centres_nm`` (bands,).
+    """
+    hats = np.stack([np.interp(centres_nm, KNOTS_NM, unit) for unit in np.eye(len(KNOTS_NM))], 1)
+    return (rows * spectra[:, None]) @ torch.as_tensor(hats)
+
+
+def of_all_curves(values: Tensor, others: int) -> Tensor:
+    """Values (n, 3 colours, ..., p + knots) as (n, ..., p + 3 knots): what colours share is added up."""
+    return torch.cat([values[..., :others].sum(1), *values[..., others:].unbind(1)], -1)
+
+
+def normal_of_all_curves(values: Tensor, others: int) -> Tensor:
+    """Normal matrices (n, 3 colours, p + knots, p + knots) as (n, p + 3 knots, p + 3 knots)."""
+    top = of_all_curves(values[:, :, :others], others)
+    count, colours, knots = values.shape[0], values.shape[1], values.shape[3] - others
+    corner = values.new_zeros((count, colours, knots, colours, knots))
+    for colour in range(colours):
+        corner[:, colour, :, colour] = values[:, colour, others:, others:]
+    low = torch.cat([top[:, :, others:].mT, corner.flatten(3).flatten(1, 2)], 2)
+    return torch.cat([top, low], 1)
+
+
+@dataclass(frozen=True)
+class CurveMisfit:
+    """Relative deviation of curves (rms) by which colours disagree, with its deviation."""
+
+    rms: float
+    std: float
+
+
+def curve_misfit(
+    normal: Floats, score: Floats, weight: Floats, prior_std: Floats, step_nm: float
+) -> CurveMisfit | None:
+    """How far curves are off, from equations of pixels (n, p + c, p + c) and (n, p + c) without the spectrum.
+
+    First come p other parameters, which may take what they explain; ``prior_std`` (p,) is theirs.
+    ``step_nm`` is the width of bands. None where colours say too little.
+    """
+    used = weight > 0
+    information, asked = np.tensordot(weight[used], normal[used], 1), weight[used] @ score[used]
+    others = len(prior_std)
+    own = information[:others, :others] + np.diag(1 / prior_std**2)
+    taken = np.linalg.solve(own, information[:others, others:]).T
+    curves = information[others:, others:] - taken @ information[:others, others:]
+    values, vectors = np.linalg.eigh(0.5 * (curves + curves.T))
+    known = values > KNOWN_STD**-2
+    if np.count_nonzero(known) < FEWEST:
+        return None
+    found = (vectors[:, known].T @ (asked[others:] - taken @ asked[:others])) / values[known]
+    square = float(np.mean(found**2 - 1 / values[known]))
+    floor = FLOOR * max(step_nm / FLOOR_NM, 1.0) ** 2
+    rms = (BETWEEN * max(square - floor**2, 0.0)) ** 0.5
+    return CurveMisfit(rms, (BETWEEN * max(square, 0.0) / (2 * np.count_nonzero(known))) ** 0.5)

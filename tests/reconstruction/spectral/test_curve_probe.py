@@ -1,0 +1,76 @@
+"""Colours that disagree about the same light say how far curves are off; noise and agreement say nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from dsl_core.reconstruction.spectral.curve_probe import (
+    KNOTS_NM,
+    curve_changes,
+    curve_misfit,
+    normal_of_all_curves,
+    of_all_curves,
+)
+
+PIXELS, OTHERS, LEVEL = 50, 2, 2e3
+
+
+def equations(off: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pixels that know two other parameters, and of curves only what differs from colour to colour."""
+    rng = np.random.default_rng(2)
+    knots = len(KNOTS_NM)
+    contrast = np.kron(np.eye(3) - 1 / 3, np.eye(knots))
+    normal = np.zeros((OTHERS + 3 * knots, OTHERS + 3 * knots))
+    normal[:OTHERS, :OTHERS], normal[OTHERS:, OTHERS:] = np.eye(OTHERS), contrast
+    normal = LEVEL * np.broadcast_to(normal, (PIXELS, *normal.shape))
+    truth = np.r_[np.full(OTHERS, 0.1), off * rng.choice([-1.0, 1.0], 3 * knots)]
+    noise = np.sqrt(LEVEL) * rng.standard_normal((PIXELS, len(truth)))
+    noise[:, OTHERS:] = noise[:, OTHERS:] @ contrast
+    return normal, normal @ truth + noise, np.ones(PIXELS)
+
+
+def test_curves_are_off_by_what_colours_disagree() -> None:
+    prior = np.full(OTHERS, 0.2)
+    found = curve_misfit(*equations(0.04), prior, 5.0)
+    assert found is not None
+    # Straight pieces between knots have two thirds of the mean square of the knots.
+    assert found.rms == pytest.approx(0.04 * (2 / 3) ** 0.5, rel=0.25)
+    assert 0.002 < found.std < found.rms / 3
+    right = curve_misfit(*equations(0.0), prior, 5.0)
+    assert right is not None
+    assert right.rms == 0
+    # Wide bands leave as much of spectra that are not straight.
+    coarse = curve_misfit(*equations(0.04), prior, 10.0)
+    assert coarse is not None
+    assert coarse.rms == 0
+
+
+def test_colours_that_know_too_little_say_nothing() -> None:
+    normal, score, weight = equations(0.04)
+    assert curve_misfit(normal, score, 1e-3 * weight, np.full(OTHERS, 0.2), 5.0) is None
+
+
+def test_changes_of_curves_are_those_of_the_data() -> None:
+    rng = np.random.default_rng(0)
+    nm = np.arange(400.0, 701.0, 10.0)
+    rows, spectra = (torch.as_tensor(rng.random(shape)) for shape in ((4, 6, nm.size), (4, nm.size)))
+    changed = rows * torch.as_tensor(1 + 0.01 * np.interp(nm, KNOTS_NM, np.arange(len(KNOTS_NM))))
+    wanted = ((changed - rows) @ spectra[..., None])[..., 0]
+    found = curve_changes(rows, spectra, nm) @ torch.arange(len(KNOTS_NM)).double() * 0.01
+    assert found.numpy() == pytest.approx(wanted.numpy())
+
+
+def test_each_colour_has_its_own_place_in_the_equations() -> None:
+    rng = np.random.default_rng(1)
+    changes = torch.as_tensor(rng.random((3, 7, 3)))
+    # One other parameter, and two knots of each of three colours.
+    whole = torch.zeros((3, 7, 7), dtype=torch.float64)
+    for colour in range(3):
+        whole[colour, :, 0] = changes[colour, :, 0]
+        whole[colour, :, 1 + 2 * colour : 3 + 2 * colour] = changes[colour, :, 1:]
+    flat = whole.flatten(0, 1)
+    found = normal_of_all_curves((changes.mT @ changes)[None], 1)[0]
+    assert found.numpy() == pytest.approx((flat.T @ flat).numpy())
+    assert of_all_curves(changes.sum(1)[None], 1)[0].numpy() == pytest.approx(flat.sum(0).numpy())
