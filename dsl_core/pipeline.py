@@ -28,7 +28,6 @@ from dsl_core.model.fit import FitFinding
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.result import Flag
 from dsl_core.model.rig import Rig
 from dsl_core.patterns.images import pattern_image
 from dsl_core.progress import CancelToken, NoProgress, Progress
@@ -90,13 +89,9 @@ def reconstruct(
 ) -> xr.Dataset:
     """Frames -> linear radiance -> columns -> depth -> surface -> spectra -> colour -> result."""
     from dsl_core.optics.line_set import LineSet
-    from dsl_core.reconstruction.columns.lateral_colour import (
-        lateral_finding,
-        material_std_px,
-        own_lateral_colour,
-    )
     from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
+    from dsl_core.reconstruction.lenses import follow_lenses
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
     from dsl_core.reconstruction.spread_findings import spread_findings
@@ -131,14 +126,9 @@ def reconstruct(
         )
         require_pixels(geometry.flags)
         if options.refine_columns and not options.as_calibrated:
-            refined = (geometry.flags & int(Flag.NOT_REFINED)) == 0
-            lateral = own_lateral_colour(rig, LineSet.of(plan), geometry.column_px, refined)
-            if lateral is not None:
-                findings.append(lateral_finding(lateral))
-            if lateral is not None and lateral.present:
-                rig = rig.model_copy(update={"lateral_colour": lateral.colour})
-                unsure = material_std_px(rig, geometry.column_px)
-                geometry = geometry.by(rig, unsure, options.surface_window_px)
+            lines, window_px = LineSet.of(plan), options.surface_window_px
+            rig, geometry, found_of_lenses = follow_lenses(rig, lines, geometry, window_px)
+            findings += found_of_lenses
     spectra = None
     if options.spectra:
         with timer.stage("spectra"):

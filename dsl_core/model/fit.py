@@ -26,6 +26,7 @@ Part = Literal[
     "geometry",
     "lateral colour",
     "curves",
+    "flat field",
 ]
 
 #: How many deviations of its own a figure must be away from zero.
@@ -45,6 +46,7 @@ PARTS: dict[Part, str] = {
     "geometry": "the geometry",
     "lateral colour": "the lateral colour of the lenses",
     "curves": "the curves of camera and projector",
+    "flat field": "the flat field of the camera",
 }
 
 
