@@ -34,8 +34,10 @@ PRIOR_STD = np.array([0.3, 0.3, 0.3, 0.0005, 0.3])
 STEPS = np.array([1e-2, 1e-2, 1e-2, 1e-5, 1e-2])
 #: By how much lines that are not symmetric may displace both orders alike, px.
 LOPSIDED_PX = 0.03
-#: Less displacement of the orders than this (px, root mean square) is no motion that matters.
-LEAST_MOTION_PX = 0.02
+#: Less displacement of the orders than this (px, root mean square) is no motion that matters, at bands of
+#: `FINE_NM`. Spectra are taken as linear between bands, and what that leaves in the frames, which looks like
+#: a displacement, grows with the square of their distance.
+LEAST_MOTION_PX, FINE_NM = 0.02, 5.0
 #: Parts that the picture's cells are divided into; each is judged by a fit to the others.
 FOLDS = 4
 #: Fall of chi-square of the pixels held out, over the excess of their scatter, and in deviations over cells.
@@ -85,7 +87,8 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     shift = effect[probe.sound][:, _SHIFT]
     spread = np.einsum("nok,kl,nol->no", shift, covariance, shift)
     shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in ((shift @ values) ** 2, spread))
-    if shift_px < LEAST_MOTION_PX or not _explains(probe, effect):
+    least_px = LEAST_MOTION_PX * max(probe.step_nm / FINE_NM, 1) ** 2
+    if shift_px < least_px or not _explains(probe, effect):
         return None
     return FilmMotion(values, std, shift_px, shift_std_px)
 
