@@ -16,12 +16,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.optics.cie_tables import CIE_1931_XYZ, CIE_D65, CIE_NM
+from dsl_core.resources import resource_path
 
 Floats = NDArray[np.float64]
 #: Colours computed from float32 cubes stay float32.
 AnyFloats = NDArray[np.float32] | NDArray[np.float64]
 
+# CIE 1931 2 degree colour matching functions and illuminant D65 at 5 nm, 380 to 780 nm.
+_TABLE: Floats = np.loadtxt(resource_path("colour/cie_1931_d65.csv"), delimiter=",", unpack=True)
+#: Shape (81,), nm.
+CIE_NM: Floats = _TABLE[0]
+#: Shape (3, 81).
+CIE_1931_XYZ: Floats = _TABLE[1:4]
+#: Shape (81,).
+CIE_D65: Floats = _TABLE[4]
 #: XYZ (D65 white, Y = 1) to linear sRGB, IEC 61966-2-1.
 _XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 _LUT_STEPS = 4096

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.optics import cie_tables
 from dsl_core.optics import colour as ours
 
 GRID = np.arange(430.0, 661.0, 5.0)
@@ -30,8 +29,8 @@ def smooth_spectra(wavelengths: NDArray[np.float64], count: int) -> NDArray[np.f
 def test_tables_equal_colour_science(library: Any) -> None:
     observer = library.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     daylight = library.SDS_ILLUMINANTS["D65"]
-    np.testing.assert_allclose(cie_tables.CIE_1931_XYZ.T, observer[cie_tables.CIE_NM], rtol=1e-5, atol=1e-12)
-    np.testing.assert_allclose(cie_tables.CIE_D65, daylight[cie_tables.CIE_NM], rtol=1e-5)
+    np.testing.assert_allclose(ours.CIE_1931_XYZ.T, observer[ours.CIE_NM], rtol=1e-5, atol=1e-12)
+    np.testing.assert_allclose(ours.CIE_D65, daylight[ours.CIE_NM], rtol=1e-5)
 
 
 @pytest.mark.parametrize("illuminant", ["D65", "A", "D50"])

@@ -20,8 +20,7 @@ from dsl_app.calibrate.wizard.placement_scene import (
 )
 from dsl_app.shared.theme import DARK, Theme
 from dsl_core.model.placement import Placement
-from dsl_core.optics.cie_tables import CIE_1931_XYZ, CIE_NM
-from dsl_core.optics.colour import xyz_to_srgb
+from dsl_core.optics.colour import CIE_1931_XYZ, CIE_NM, xyz_to_srgb
 
 #: The farthest that the view from above shows, mm.
 FARTHEST_MM = 1000.0
