@@ -142,7 +142,11 @@ def resume(
     ] = None,
     option: RigOptions = [],  # noqa: B006
     drift: Annotated[
-        bool, typer.Option("--drift-check/--no-drift-check", help="Compare two old frames before resuming.")
+        bool,
+        typer.Option(
+            "--drift-check/--no-drift-check",
+            help="Compare two old frames before resuming, and check that each picture shows its pattern.",
+        ),
     ] = True,
     json: Json = False,
 ) -> None:
