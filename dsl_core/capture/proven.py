@@ -89,6 +89,6 @@ class ProvenShots:
         if found.is_wrong:
             raise DeviceError(
                 f"{found.names.capitalize()} does not show its pattern after {len(SETTLE_MS) + 1} exposures:"
-                f" {found.seen}. {found.remedy} Frames before it are saved; resume the scan afterwards. If the"
-                " pictures are right, resume it without checking that the scene has not moved."
+                f" {found.seen}. {found.remedy} Frames before it are saved; resume the scan afterwards. If"
+                " the pictures are right, resume it without checking that the scene has not moved."
             )
