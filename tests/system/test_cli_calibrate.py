@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from dsl_core.io.published.stereo import load_stereo
+from dsl_core.io.sealed import unseal
 from dsl_core.model.calibration.geometry import GeometryCalibration
 from tests.cases.board_poses import board_frames
 
@@ -29,7 +30,7 @@ def test_real_captures(give: Give, tmp_path: Path) -> None:
     board = ["--board", "9x7", "--square-mm", 75, "--projector", "1024x768", "--binning", 2]
     ending = give("calibrate", "geometry", REAL, "--pictures", *board, *files, "--json")
     assert ending.code == 0, ending.err
-    found = GeometryCalibration.model_validate_json((tmp_path / "geometry.json").read_bytes())
+    found = GeometryCalibration.model_validate_json(unseal((tmp_path / "geometry.json").read_bytes()))
     assert ending.json["calibration"] == found.model_dump(mode="json")
     assert found.full_resolution_rms_px <= 0.11
     assert found.rms_px <= 0.08
