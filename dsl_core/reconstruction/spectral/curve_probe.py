@@ -24,10 +24,28 @@ KNOWN_STD = 0.012
 #: What curves seem to be off that are right, as spectra are straight between bands: of bands of 5 nm, and as
 #: the square of their width.
 FLOOR, FLOOR_NM = 0.014, 5.0
+#: Variety of spectra from which they are those of many materials, and second differences of straight ones.
+MANY_COLOURS, STRAIGHT = 0.3, 0.05
 #: Mean square of straight pieces, relative to that of their ends.
 BETWEEN = 2 / 3
 #: Fewer differences say nothing.
 FEWEST = 6
+
+
+def tells_of_curves(reflectance: Floats) -> bool:
+    """Whether spectra (n, bands) tell of curves: those of many materials, and nearly straight between bands.
+
+    The error of one material's spectrum looks like one of the curves.
+    """
+    bend = np.diff(reflectance, 2, axis=1)
+    straight = np.sqrt(np.mean(bend**2) / np.mean(reflectance**2)) < STRAIGHT if len(reflectance) else False
+    return bool(straight and variety(reflectance) > MANY_COLOURS)
+
+
+def variety(reflectance: Floats) -> float:
+    """By how much the shapes of spectra (n, bands) differ, as a share of their level: root mean square."""
+    shape = reflectance / np.maximum(reflectance.mean(1, keepdims=True), 0.02)
+    return float(np.sqrt(np.nanmean((shape - np.nanmedian(shape, 0)) ** 2)))
 
 
 def curve_changes(rows: Tensor, spectra: Tensor, centres_nm: Floats) -> Tensor:

@@ -32,6 +32,8 @@ from dsl_core.reconstruction.spectral.curve_probe import (
     curve_misfit,
     normal_of_all_curves,
     of_all_curves,
+    tells_of_curves,
+    variety,
 )
 from dsl_core.reconstruction.spectral.dense_solver import solve_dense
 from dsl_core.reconstruction.spectral.line_probe import LineProbe, probe_lines, sound_pixels
@@ -133,7 +135,7 @@ class Probe:
     @property
     def curves(self) -> CurveMisfit | None:
         """How far curves of camera and projector are off by what colours say; None where they say nothing."""
-        if self.with_curves is None:
+        if self.with_curves is None or not tells_of_curves(self.reflectance[self.sound]):
             return None
         return curve_misfit(*self.with_curves, self.weight, np.array(PRIOR_STD), self.step_nm)
 
@@ -166,12 +168,6 @@ def probe(scan: ProbedScan) -> Probe | None:
         lines=probe_lines(lines, response, scan.pixels, scan.radiance, scan.std, targets, widths),
         nm_per_px=_nm_per_px(scan, targets),
     )
-
-
-def variety(reflectance: Floats) -> float:
-    """By how much the shapes of spectra (n, bands) differ, as a share of their level: root mean square."""
-    shape = reflectance / np.maximum(reflectance.mean(1, keepdims=True), 0.02)
-    return float(np.sqrt(np.nanmean((shape - np.nanmedian(shape, 0)) ** 2)))
 
 
 def along_bands(model: PixelModel) -> Floats:

@@ -12,6 +12,7 @@ from dsl_core.reconstruction.spectral.curve_probe import (
     curve_misfit,
     normal_of_all_curves,
     of_all_curves,
+    tells_of_curves,
 )
 
 PIXELS, OTHERS, LEVEL = 50, 2, 2e3
@@ -50,6 +51,15 @@ def test_curves_are_off_by_what_colours_disagree() -> None:
 def test_colours_that_know_too_little_say_nothing() -> None:
     normal, score, weight = equations(0.04)
     assert curve_misfit(normal, score, 1e-3 * weight, np.full(OTHERS, 0.2), 5.0) is None
+
+
+def test_only_many_smooth_spectra_tell_of_curves() -> None:
+    nm = np.linspace(-1, 1, 40)
+    slopes = np.linspace(-0.9, 0.9, 30)[:, None]
+    assert tells_of_curves(np.exp(2 * slopes * nm) / 8)
+    assert not tells_of_curves(np.full((30, 40), 0.5) + 0.02 * slopes * nm)
+    assert not tells_of_curves(np.exp(-(((nm - slopes) / 0.04) ** 2)))
+    assert not tells_of_curves(np.empty((0, 40)))
 
 
 def test_changes_of_curves_are_those_of_the_data() -> None:
