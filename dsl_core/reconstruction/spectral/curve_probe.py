@@ -24,8 +24,9 @@ KNOWN_STD = 0.012
 #: What curves seem to be off that are right, as spectra are straight between bands: of bands of 5 nm, and as
 #: the square of their width.
 FLOOR, FLOOR_NM = 0.014, 5.0
-#: Variety of spectra from which they are those of many materials, and second differences of straight ones.
-MANY_COLOURS, STRAIGHT = 0.3, 0.05
+#: So many shapes, each with this share of the level, are those of many materials (a whole Color Checker has
+#: four, three patches of it have three), and second differences of straight spectra.
+MANY_SHAPES, LEAST_SHAPE, STRAIGHT = 4, 0.03, 0.05
 #: Mean square of straight pieces, relative to that of their ends.
 BETWEEN = 2 / 3
 #: Fewer differences say nothing.
@@ -35,17 +36,25 @@ FEWEST = 6
 def tells_of_curves(reflectance: Floats) -> bool:
     """Whether spectra (n, bands) tell of curves: those of many materials, and nearly straight between bands.
 
-    The error of one material's spectrum looks like one of the curves.
+    The errors of a few materials' spectra look like those of the curves.
     """
+    if len(reflectance) < MANY_SHAPES:
+        return False
     bend = np.diff(reflectance, 2, axis=1)
-    straight = np.sqrt(np.mean(bend**2) / np.mean(reflectance**2)) < STRAIGHT if len(reflectance) else False
-    return bool(straight and variety(reflectance) > MANY_COLOURS)
+    straight = np.sqrt(np.mean(bend**2) / np.mean(reflectance**2)) < STRAIGHT
+    strengths = np.linalg.svd(_shapes(reflectance), compute_uv=False) / np.sqrt(reflectance.size)
+    return bool(straight and np.count_nonzero(strengths > LEAST_SHAPE) >= MANY_SHAPES)
 
 
 def variety(reflectance: Floats) -> float:
     """By how much the shapes of spectra (n, bands) differ, as a share of their level: root mean square."""
+    return float(np.sqrt(np.nanmean(_shapes(reflectance) ** 2)))
+
+
+def _shapes(reflectance: Floats) -> Floats:
+    """Spectra (n, bands) relative to their levels, less the usual shape."""
     shape = reflectance / np.maximum(reflectance.mean(1, keepdims=True), 0.02)
-    return float(np.sqrt(np.nanmean((shape - np.nanmedian(shape, 0)) ** 2)))
+    return np.asarray(shape - np.nanmedian(shape, 0))
 
 
 def curve_changes(rows: Tensor, spectra: Tensor, centres_nm: Floats) -> Tensor:

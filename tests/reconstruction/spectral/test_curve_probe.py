@@ -56,7 +56,10 @@ def test_colours_that_know_too_little_say_nothing() -> None:
 def test_only_many_smooth_spectra_tell_of_curves() -> None:
     nm = np.linspace(-1, 1, 40)
     slopes = np.linspace(-0.9, 0.9, 30)[:, None]
-    assert tells_of_curves(np.exp(2 * slopes * nm) / 8)
+    waves = np.cos(np.pi * np.arange(1, 6)[:, None] * (nm + 1) / 2)
+    many = 0.5 + np.random.default_rng(4).uniform(-0.09, 0.09, (30, 5)) @ waves
+    assert tells_of_curves(many)
+    assert not tells_of_curves(many[np.arange(30) % 3])
     assert not tells_of_curves(np.full((30, 40), 0.5) + 0.02 * slopes * nm)
     assert not tells_of_curves(np.exp(-(((nm - slopes) / 0.04) ** 2)))
     assert not tells_of_curves(np.empty((0, 40)))
