@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from dsl_core.model.fit import FitFinding
 from dsl_core.model.rig import FlatField, Rig
 from dsl_core.optics.sensor import relative_gain
+from dsl_core.solve.robust import robust_linear
 
 Floats = NDArray[np.float64]
 #: A change of the gain to the corner that matters; so many deviations of its own it must be away from zero,
@@ -29,8 +30,6 @@ APART = 1 / 19
 ALIKE, EVEN = 0.06, 0.1
 #: Pairs that are looked at in each direction, about; fewer in a quarter say nothing.
 PAIRS, FEWEST = 30_000, 200
-#: Rounds of weights that lessen pairs which do not fit.
-ROUNDS = 6
 #: Nodes of a flat field, down and across.
 NODES = (17, 25)
 
@@ -151,12 +150,5 @@ def _slope(level: Floats, *causes: Floats) -> tuple[float, float] | None:
     """By how much a level follows the first of its causes, and the deviation of that."""
     if len(level) < FEWEST:
         return None
-    design, weight = np.stack(causes, 1), np.ones_like(level)
-    for _ in range(ROUNDS):
-        heavy = design * weight[:, None]
-        inverse = np.linalg.pinv(heavy.T @ design, hermitian=True)
-        found = inverse @ (heavy.T @ level)
-        residual = level - design @ found
-        scatter = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
-        weight = 1 / (1 + (residual / (3 * scatter)) ** 2) ** 2
+    found, inverse, scatter = robust_linear(np.stack(causes, 1), level)
     return float(found[0]), float(scatter * inverse[0, 0] ** 0.5)

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+#: Rounds of a linear fit with weights from its own residuals.
+ROUNDS = 6
+
 
 def robust_std(residual: NDArray[np.floating], axis: int | None = None) -> Floats:
     """Standard deviation of residuals about zero by their median size (scaled as normal ones need it)."""
@@ -21,3 +24,20 @@ def huber_weights(residual: Floats, sigma: Floats, limit_sigmas: float) -> tuple
     scale = max(1.0, float(robust_std(residual / sigma)))
     off = np.abs(residual) / (scale * sigma)
     return np.minimum(1.0, limit_sigmas / np.maximum(off, 1e-12)) / (scale * sigma) ** 2, scale
+
+
+def robust_linear(design: Floats, values: Floats) -> tuple[Floats, Floats, float]:
+    """Linear fit of values (n,) by a design (n, k) in which values far off count next to nothing.
+
+    Returns the coefficients (k,), the inverse (k, k) of the weighted normal matrix, and the scatter of the
+    residuals in the unit of the values: their covariance is the inverse times the scatter squared.
+    """
+    weight = np.ones_like(values)
+    for _ in range(ROUNDS):
+        heavy = design * weight[:, None]
+        inverse = np.linalg.pinv(heavy.T @ design, hermitian=True)
+        found = inverse @ (heavy.T @ values)
+        residual = values - design @ found
+        scatter = float(robust_std(residual)) + 1e-12
+        weight = 1 / (1 + (residual / (3 * scatter)) ** 2) ** 2
+    return found, np.asarray(inverse, np.float64), scatter

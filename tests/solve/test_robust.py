@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from dsl_core.solve.robust import huber_weights, robust_std
+from dsl_core.solve.robust import huber_weights, robust_linear, robust_std
 
 
 def test_the_robust_deviation_is_that_of_normal_values_in_spite_of_wrong_ones() -> None:
@@ -26,3 +26,15 @@ def test_residuals_that_scatter_more_than_stated_widen_the_deviation() -> None:
     weight, scale = huber_weights(residual, np.full(5, 0.1), 3.0)
     assert scale == pytest.approx(14.826)
     assert weight == pytest.approx(1 / (1.4826 * 1.0) ** 2)
+
+
+def test_a_linear_fit_leaves_out_what_is_far_off_and_states_its_own_scatter() -> None:
+    rng = np.random.default_rng(3)
+    x = np.linspace(-1, 1, 400)
+    design = np.stack([x, np.ones_like(x)], 1)
+    values = design @ [0.5, 2.0] + rng.normal(0, 0.01, len(x))
+    values[::8] += 3.0
+    found, inverse, scatter = robust_linear(design, values)
+    assert found == pytest.approx([0.5, 2.0], abs=0.004)
+    assert scatter == pytest.approx(0.012, abs=0.003)
+    assert scatter * inverse[0, 0] ** 0.5 == pytest.approx(0.01 / np.sqrt((x**2).sum()), rel=0.5)

@@ -19,6 +19,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.optics.colour_neighbours import bayer_colours
 from dsl_core.optics.line_set import LineSet
 from dsl_core.optics.spectra import chain_response
+from dsl_core.solve.robust import robust_linear
 
 Floats = NDArray[np.float64]
 #: Distance of red and blue that matters, rms over the picture, px of the projector.
@@ -31,8 +32,6 @@ SHARED = (8 / 3) ** 0.5
 PIXELS, FEWEST = 60_000, 1000
 #: A pixel that is farther than this from the middle of its neighbours is at an edge, px.
 EDGE_PX = 0.5
-#: Rounds of weights that lessen pixels which do not fit.
-ROUNDS = 6
 #: Deviation of the mean wavelength of one colour between materials, nm.
 MATERIAL_NM = 15.0
 #: Wavelengths of white light, nm.
@@ -72,14 +71,7 @@ def own_lateral_colour(
     bend_px, sign, blue, camera_px, projector_px = seen
     step_nm = np.where(blue, white[_BLUE] - white[_GREEN], white[0] - white[_GREEN])
     design = sign[:, None] * np.stack([-camera_px * ~blue, -camera_px * blue, projector_px * step_nm], 1)
-    weight = np.ones_like(bend_px)
-    for _ in range(ROUNDS):
-        heavy = design * weight[:, None]
-        inverse = np.linalg.pinv(heavy.T @ design, hermitian=True)
-        found = inverse @ (heavy.T @ bend_px)
-        residual = bend_px - design @ found
-        scatter = 1.4826 * float(np.median(np.abs(residual))) + 1e-12
-        weight = 1 / (1 + (residual / (3 * scatter)) ** 2) ** 2
+    found, inverse, scatter = robust_linear(design, bend_px)
     covariance = inverse * (SHARED * scatter) ** 2
     apart = np.stack([-camera_px, camera_px, projector_px * (white[0] - white[_BLUE])], 1)
     noise = float(np.mean(np.einsum("np,pq,nq->n", apart, covariance, apart)))
