@@ -43,7 +43,7 @@ def rigs(json: Json = False) -> None:
     output, entries = Output(json), list_rigs()
     output.table(
         ("rig", "package", "what it is"),
-        [(e.name, f"{e.package} {e.version}", e.error or e.description) for e in entries],
+        [(e.name, f"{e.package} {e.version}".strip(), e.error or e.description) for e in entries],
     )
     output.table(
         ("rig", "option", "default", "meaning"),

@@ -1,4 +1,4 @@
-"""Rigs by name: any installed package adds one through the entry-point group ``dsl_scan.rigs``.
+"""Rigs by name: profiles of this computer, and what packages add by the entry-point group ``dsl_scan.rigs``.
 
 The value of an entry point is a function ``open(options: dict[str, str]) -> DeviceRig`` whose
 docstring starts with one line for the list of rigs. Its attribute ``options``, if it has one, is a pydantic
@@ -10,7 +10,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -19,11 +22,15 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError, DslError
 
 GROUP = "dsl_scan.rigs"
+#: Stands for the package of rigs that are profiles.
+PROFILE = "profile"
 #: Rigs of this package, so that they are there in a source tree or a frozen app without metadata too.
 BUILT_IN = (
     EntryPoint("replay", "dsl_core.io.replay:open_replay", GROUP),
     EntryPoint("twin", "dsl_core.simulation.sim_devices:open_twin", GROUP),
 )
+#: Profiles are files, which is not this layer's business; imported when one is asked for.
+_PROFILES = "dsl_core.io.rig_profile"
 OpenRig = Callable[[dict[str, str]], DeviceRig]
 
 
@@ -59,13 +66,13 @@ def with_options(record: type[BaseModel]) -> Callable[[OpenRig], OpenRig]:
 
 
 def list_rigs() -> list[RigEntry]:
-    """All rigs of all installed packages by name; a broken one is listed with its error."""
-    return [_describe(point) for point in _points()]
+    """All rigs of all installed packages, then this computer's profiles; broken ones with their error."""
+    return [_describe(point) for point in _points()] + [_describe_profile(name) for name in _profile_names()]
 
 
 def rig_names() -> list[str]:
-    """Names of all rigs, broken ones too; quick, as no package is loaded."""
-    return sorted({point.name for point in _points()})
+    """Names of all rigs and profiles, broken ones too; quick, as no package is loaded."""
+    return sorted({point.name for point in _points()} | set(_profile_names()))
 
 
 def is_built_in(name: str) -> bool:
@@ -74,17 +81,20 @@ def is_built_in(name: str) -> bool:
 
 
 def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
-    """Open the devices of a rig.
+    """Open the devices of a rig, by its name or by the path of a profile, which ends in ``.json``.
 
     Raises `DeviceError` when there is no rig of that name (and says which there are), when its package
     is broken, and when its devices cannot be opened.
     """
     points = [point for point in _points() if point.name == name]
+    profile = None if points else _profiles().profile_path(name)
+    if profile is not None:
+        return _open_profile(profile, options)
     if not points:
-        known = ", ".join(sorted({point.name for point in _points()})) or "none"
+        known = ", ".join(rig_names()) or "none"
         raise DeviceError(
-            f"There is no rig {name!r}; installed rigs: {known}. Install the package that provides it, or"
-            " choose one of these."
+            f"There is no rig {name!r}; installed rigs: {known}. Install the package that provides it, give"
+            " the path of a rig profile (NAME.json), or choose one of these."
         )
     if len(points) > 1:
         packages = " and ".join(_package(point)[0] for point in points)
@@ -98,6 +108,35 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     if not isinstance(rig, DeviceRig):
         raise DeviceError(_fault(points[0], f"opened as {type(rig).__name__} instead of DeviceRig"))
     return rig
+
+
+def _profiles() -> Any:
+    return import_module(_PROFILES)
+
+
+def _profile_names() -> list[str]:
+    taken = {point.name for point in _points()}
+    return [name for name in _profiles().profile_names() if name not in taken]
+
+
+def _open_profile(path: Path, options: dict[str, str] | None) -> DeviceRig:
+    if options:
+        raise DeviceError(
+            f"The rig profile {path} takes no options, given: {', '.join(options)}. Change its settings in"
+            " the file instead."
+        )
+    rig: DeviceRig = _profiles().open_profile(path)
+    return rig
+
+
+def _describe_profile(name: str) -> RigEntry:
+    path = _profiles().profile_path(name)
+    try:
+        profile = _profiles().load_profile(path)
+    except DslError as error:
+        return RigEntry(name, PROFILE, "", error=str(error))
+    drivers = ", ".join(f"{kind} {part.driver}" for kind, part in profile.parts().items())
+    return RigEntry(name, PROFILE, "", f"{profile.note or profile.name}: {drivers}")
 
 
 def _points() -> list[EntryPoint]:

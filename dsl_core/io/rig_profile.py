@@ -1,0 +1,57 @@
+"""Rig profiles on disk: by path, or by name from the folder of this computer's rigs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.profile import RigProfile, open_parts
+from dsl_core.errors import DeviceError
+from dsl_core.io.calibration_library import library_home
+from dsl_core.io.records import read_record, write_record
+from dsl_core.io.rig_file import load_rig
+
+SUFFIX = ".json"
+
+
+def profiles_folder() -> Path:
+    """Where profiles are found by name, next to the calibration library; it need not exist."""
+    return library_home().parent / "rigs"
+
+
+def profile_path(name: str) -> Path | None:
+    """The file of a profile, absolute: a path ending in ``.json``, or a name in the folder; None without."""
+    if name.endswith(SUFFIX):
+        return Path(name).absolute()
+    path = profiles_folder() / f"{name}{SUFFIX}"
+    return path if Path(name).name == name and path.is_file() else None
+
+
+def profile_names() -> list[str]:
+    """Names of the profiles in the folder."""
+    return sorted(path.stem for path in profiles_folder().glob(f"*{SUFFIX}"))
+
+
+def load_profile(path: Path) -> RigProfile:
+    """Read a profile; raises `DeviceError` that names the fields that are wrong."""
+    return read_record(
+        path,
+        RigProfile,
+        "Correct the file; the help on adding a rig has an example.",
+        called="The rig profile",
+        fault="is not valid",
+        error=DeviceError,
+        most=5,
+    )
+
+
+def save_profile(profile: RigProfile, path: Path, *, overwrite: bool = False) -> Path:
+    """Write a profile, whole or not at all, and return its path; raises `StoreError`."""
+    return write_record(path, profile, overwrite=overwrite)
+
+
+def open_profile(path: Path) -> DeviceRig:
+    """Open the devices of a profile; raises `DeviceError` for those, `CalibrationError` for ``nominal``."""
+    profile = load_profile(path)
+    nominal = load_rig(path.parent / profile.nominal) if profile.nominal else None
+    return open_parts(profile, nominal)
