@@ -141,7 +141,7 @@ def open_device(kind: Kind, name: str, settings: Mapping[str, object]) -> Device
     if not isinstance(device, _CLASSES[kind]):
         device.close()
         raise DeviceError(
-            f"The {kind} driver {name!r} opened a {type(device).__name__}, which is no {kind}."
+            f"The {kind} driver {name!r} opened a {type(device).__name__}, which is not a {kind}."
             " Update or reinstall its package."
         )
     return device
