@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 from scipy.special import erf
 from torch import Tensor
 
-from dsl_core.model.line_spread import REACH, LineSpread, Spread, stretched
+from dsl_core.model.line_spread import REACH, LineSpread, Spread
 from dsl_core.model.rig import ProjectorResponse
-from dsl_core.optics.spread.curves import EvenTable, density, mixed, reach_px, step_response
+from dsl_core.optics.spread.curves import EvenTable, density, mixed, reach_px, step_response, step_table
 
 #: Samples a column of the tabulated profile; linear interpolation is avoided at an error below 1e-3.
 SAMPLES = 256
 #: Widths of a Gaussian blur beyond a line's band at which its profile ends.
 ENDS = 2.2
-#: Step of the logarithm of the width between tables of a spread that varies over the field.
-WIDTH_STEP = 0.005
 
 
 def band_profile(
@@ -139,34 +137,28 @@ class LineTable:
 
         ``widths`` (pixels,) are those of the spread relative to the response's, pixel by pixel.
         """
-        self._width_px, self._response = width_px, response
+        self._half_px, self._widths, spread = width_px / 2, widths, response.line_spread
         half = math.ceil(reach_px * SAMPLES)
-        self._distance = np.arange(-half, half + 1) / SAMPLES
-        self._row: Tensor | None = None
-        curves = [self._curves(response.line_spread)]
-        if widths is not None:
-            level = (widths.log() * (1 / WIDTH_STEP)).round().long()
-            first, last = int(level.min()), int(level.max())
-            self._row = level - first
-            curves = [
-                self._curves(stretched(response.line_spread, math.exp(WIDTH_STEP * k)))
-                for k in range(first, last + 1)
-            ]
-        joined = [np.concatenate(each) for each in zip(*curves, strict=True)]
-        self._table = EvenTable(float(self._distance[0]), 1 / SAMPLES, joined, like, len(curves))
-
-    def _curves(self, spread: Spread) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        half, decay = self._width_px / 2, self._response.halo_decay_px
-        near, far = self._distance + half, self._distance - half
-        halo = [halo_integral(torch.as_tensor(edge), self._response).numpy() for edge in (near, far)]
-        profile = step_response(spread, near) - step_response(spread, far) + halo[0] - halo[1]
-        halo_slope = np.exp(-np.abs(near) / decay) - np.exp(-np.abs(far) / decay)
-        slope = density(spread, near) - density(spread, far) + self._response.halo_peak_per_px * halo_slope
-        return profile, slope
+        distance = np.arange(-half, half + 1) / SAMPLES
+        near, far = distance + self._half_px, distance - self._half_px
+        halo = [halo_integral(torch.as_tensor(edge), response).numpy() for edge in (near, far)]
+        slopes = (np.exp(-np.abs(edge) / response.halo_decay_px) for edge in (near, far))
+        curves = [halo[0] - halo[1], response.halo_peak_per_px * np.subtract(*slopes)]
+        if widths is None:
+            curves[0] += step_response(spread, near) - step_response(spread, far)
+            curves[1] += density(spread, near) - density(spread, far)
+        else:
+            # The light of a step depends on the distance in widths alone, so that one table serves all.
+            self._step = step_table(spread, like)
+        self._table = EvenTable(float(distance[0]), 1 / SAMPLES, curves, like)
 
     def at(self, distance_px: Tensor) -> tuple[Tensor, Tensor]:
         """Profile and its slope (1/px) at distances from the line's middle, each (..., pixels) as given."""
-        profile, slope = self._table.at(distance_px, self._row)
+        profile, slope = self._table.at(distance_px)
+        if self._widths is not None:
+            for edge_px, sign in ((self._half_px, 1), (-self._half_px, -1)):
+                light, narrow = self._step.at((distance_px + edge_px) / self._widths)
+                profile, slope = profile + sign * light, slope + sign * narrow / self._widths
         return profile, slope
 
 

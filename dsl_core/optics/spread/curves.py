@@ -72,24 +72,16 @@ def density(spread: Spread, distance_px: Floats) -> Floats:
 class EvenTable:
     """Curves tabulated at even distances, interpolated linearly, and constant beyond the ends."""
 
-    def __init__(
-        self, low: float, step: float, curves: Sequence[Floats], like: Tensor, rows: int = 1
-    ) -> None:
-        """Curves (samples,) from ``low`` in steps of ``step``, looked up in the precision of ``like``.
-
-        Each may be one of several ``rows``, (rows * samples,).
-        """
-        self.samples = len(curves[0]) // rows
-        self.low, self.step, self.last = low, step, self.samples - 1.001
+    def __init__(self, low: float, step: float, curves: Sequence[Floats], like: Tensor) -> None:
+        """Curves (samples,) from ``low`` in steps of ``step``, looked up in the precision of ``like``."""
+        self.low, self.step, self.last = low, step, len(curves[0]) - 1.001
         self.curves = [torch.as_tensor(curve).to(like) for curve in curves]
 
-    def at(self, distance: Tensor, row: Tensor | None = None) -> list[Tensor]:
-        """Each curve at distances, same shape, from the rows (distance.shape[-1],) if there are several."""
+    def at(self, distance: Tensor) -> list[Tensor]:
+        """Each curve at distances, same shape."""
         position = torch.nan_to_num_((distance - self.low) * (1 / self.step)).clip_(0, self.last)
         whole = position.int()
         share = position - whole
-        if row is not None:
-            whole = whole + row.int() * self.samples
         flat = whole.reshape(-1)
         above = flat + 1
         return [
@@ -100,6 +92,19 @@ class EvenTable:
             )
             for curve in self.curves
         ]
+
+
+def step_table(spread: Spread, like: Tensor) -> EvenTable:
+    """`step_response` and `density`, looked up in the precision of ``like``."""
+    if isinstance(spread, LineSpread):
+        distance, light = _steps(spread)
+        return EvenTable(
+            float(distance[0]), float(distance[1] - distance[0]), [light, _densities(spread)[1]], like
+        )
+    half = math.ceil(REACH * spread * SAMPLES)
+    distance = np.arange(-half, half + 1) / SAMPLES
+    curves = [step_response(spread, distance), density(spread, distance)]
+    return EvenTable(float(distance[0]), 1 / SAMPLES, curves, like)
 
 
 def reach_px(spread: LineSpread) -> float:
