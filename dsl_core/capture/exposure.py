@@ -10,16 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.frame_order import FrameOrder, StaleFrameError
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.plausible import require_exposure, require_mosaic
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken
 
 PatternImage = Callable[[CapturePlan, Shot], NDArray[np.uint8]]
-
-#: A camera may round the exposure it is asked for by this share.
-EXPOSURE_TOLERANCE = 0.05
 _log = logging.getLogger(__name__)
 
 
@@ -36,10 +35,6 @@ class RetryPolicy:
     timeout_ms: float = 1500.0
 
 
-class _StaleFrameError(DeviceError):
-    """The camera delivered a picture that it had delivered before."""
-
-
 class ShotTaker:
     """Takes shots with a rig and remembers what projector and camera are set to."""
 
@@ -50,14 +45,20 @@ class ShotTaker:
         pattern_image: PatternImage,
         policy: RetryPolicy,
         token: CancelToken | None = None,
+        now: Callable[[], float] = time.time,
     ) -> None:
-        """Keep the parts; nothing is sent to the devices yet. A cancelled ``token`` ends further attempts."""
+        """Keep the parts; nothing is sent to the devices yet. A cancelled ``token`` ends further attempts.
+
+        ``now`` gives the time of day, s, that is noted when a pattern was shown.
+        """
         self._rig = rig
         self._plan = plan
         self._pattern_image = pattern_image
         self._policy = policy
         self._token = token or CancelToken()
-        self._sleep = rig.sleep or time.sleep
+        self._sleep, self._now = rig.sleep or time.sleep, now
+        self._order = FrameOrder(time.monotonic if rig.sleep is None else None)
+        self._shown_s = 0.0
         self._shown: tuple[object, ...] | None = None
         self._exposure_ms: float | None = None
         self._last: Frame | None = None
@@ -110,7 +111,9 @@ class ShotTaker:
             self._sleep(settle_ms / 1000.0)
         self._rig.camera.prepare(shot.index, attempt)
         frame = self._rig.camera.snap(shot.exposure_ms + self._policy.timeout_ms)
-        self._check(frame)
+        require_mosaic(frame.pixels, self._plan.camera_size_px, "The camera")
+        require_exposure(frame.exposure_ms, shot.exposure_ms, "The camera")
+        frame = replace(self._order.take(frame), shown_s=self._shown_s)
         self._last = frame
         return frame
 
@@ -118,35 +121,13 @@ class ShotTaker:
         """Send pattern and exposure where they differ from what the devices have."""
         if shot.exposure_ms != self._exposure_ms:
             actual = self._rig.camera.configure(shot.exposure_ms)
-            if abs(actual - shot.exposure_ms) > EXPOSURE_TOLERANCE * shot.exposure_ms:
-                raise DeviceError(
-                    f"The camera exposes for {actual:g} ms instead of the {shot.exposure_ms:g} ms of"
-                    f" {describe_shot(shot)}. Choose an exposure that this camera supports."
-                )
+            require_exposure(actual, shot.exposure_ms, "The camera")
             self._exposure_ms = shot.exposure_ms
         pattern = (shot.role, shot.pattern, shot.level)
         if pattern != self._shown:
             self._shown = None
             self._rig.projector.show(self._pattern_image(self._plan, shot))
-            self._shown = pattern
-
-    def _check(self, frame: Frame) -> None:
-        """Raise `DeviceError` for a frame of another size or type, or one that came before."""
-        width, height = self._plan.camera_size_px
-        if frame.pixels.shape != (height, width) or frame.pixels.dtype != np.uint16:
-            raise DeviceError(
-                f"The camera delivered {frame.pixels.dtype} of shape {frame.pixels.shape} instead of uint16"
-                f" of shape {(height, width)}. Check its pixel format and region of interest."
-            )
-        last = self._last
-        if last is None:
-            return
-        same_time = frame.timestamp_s == last.timestamp_s != 0.0
-        if frame.frame_id <= last.frame_id or same_time:
-            raise _StaleFrameError(
-                f"The camera delivered frame number {frame.frame_id} again (time {frame.timestamp_s:g} s)."
-                " Restart the camera; on a slow connection lower its frame rate."
-            )
+            self._shown, self._shown_s = pattern, self._now()
 
     def _recover(self, shot: Shot, attempt: int, error: DeviceError) -> None:
         """Get ready for another attempt, or give up with a clear sentence."""
@@ -160,7 +141,8 @@ class ShotTaker:
                 " Everything before it is saved; resume the scan when the device works again."
             ) from error
         _log.warning("%s, attempt %d: %s", describe_shot(shot), attempt + 1, error)
-        if not isinstance(error, _StaleFrameError):
+        self._order.interrupted()
+        if not isinstance(error, StaleFrameError):
             self._shown = self._exposure_ms = None
             self._sleep(self._policy.wait_ms / 1000.0)
 

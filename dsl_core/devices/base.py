@@ -126,7 +126,9 @@ class Projector(Device):
 
 
 class Stage(Device):
-    """Moves the target along the camera axis."""
+    """Moves the target along the camera axis; ``tolerance_mm`` is how far from a position it may stop."""
+
+    tolerance_mm = 0.5
 
     @property
     @abstractmethod
@@ -151,6 +153,19 @@ class Spectroradiometer(Device):
         """Measure once; the curve's unit is W/(sr m2 nm)."""
 
 
+@dataclass(frozen=True)
+class Patience:
+    """How long devices may take before a call counts as hanging, s; beyond what it takes by itself.
+
+    ``answer_s`` is for whatever should return at once. That of a picture is added to its time-out.
+    """
+
+    answer_s: float = 30.0
+    move_s: float = 300.0
+    measure_s: float = 600.0
+    place_s: float = 600.0
+
+
 @dataclass
 class DeviceRig:
     """The devices of one rig, opened together and closed together.
@@ -160,7 +175,8 @@ class DeviceRig:
     do that itself, as the twin can; where it is None, a person does it. A rig that places targets puts back
     what was there before with ``put_back``, and says in words with ``standing`` what is there now.
     ``nominal`` is what data sheets say of the rig, the start of a calibration. ``filters`` holds measured
-    transmissions of bandpass filters by their nominal centres, nm, as far as there are any.
+    transmissions of bandpass filters by their nominal centres, nm, as far as there are any. ``patience`` says
+    when a call that does not return is given up.
     """
 
     name: str
@@ -176,6 +192,7 @@ class DeviceRig:
     nominal: Rig | None = None
     filters: dict[float, SpectralCurve] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    patience: Patience = Patience()
 
     def close(self) -> None:
         """Close every device, also when one of them fails to; raises the first failure at the end."""

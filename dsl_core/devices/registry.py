@@ -2,7 +2,8 @@
 
 The value of an entry point is a function ``open(options: dict[str, str]) -> DeviceRig`` whose
 docstring starts with one line for the list of rigs. Its attribute ``options``, if it has one, is a pydantic
-model whose fields are listed with their defaults and descriptions; see `with_options`.
+model whose fields are listed with their defaults and descriptions; see `with_options`. With the attribute
+``on_callers_thread``, drivers are called on whatever thread needs them, and may then hold it up for ever.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from pydantic import BaseModel
 
 import dsl_core
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.device_thread import DeviceThread
+from dsl_core.devices.guard import guarded, open_on
 from dsl_core.errors import DeviceError, DslError
 
 GROUP = "dsl_scan.rigs"
@@ -83,7 +86,7 @@ def is_built_in(name: str) -> bool:
 def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     """Open the devices of a rig, by its name or by the path of a profile, which ends in ``.json``.
 
-    Raises `DeviceError` when there is no rig of that name (and says which there are), when its package
+    Those that control hardware come behind guards, on a thread of their own. Raises `DeviceError` when there is no rig of that name (and says which there are), when its package
     is broken, and when its devices cannot be opened.
     """
     points = [point for point in _points() if point.name == name]
@@ -99,15 +102,19 @@ def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     if len(points) > 1:
         packages = " and ".join(_package(point)[0] for point in points)
         raise DeviceError(f"The packages {packages} both provide a rig {name!r}. Uninstall one of them.")
+    function = _load(points[0])
+    is_unguarded = is_built_in(name)
+    here = is_unguarded or getattr(function, "on_callers_thread", False)
+    thread = None if here else DeviceThread(name)
     try:
-        rig = _load(points[0])(dict(options or {}))
+        rig = open_on(thread, name, lambda: function(dict(options or {})))
     except DslError:
         raise
     except Exception as error:
         raise DeviceError(_fault(points[0], f"failed to open: {type(error).__name__}: {error}")) from error
     if not isinstance(rig, DeviceRig):
         raise DeviceError(_fault(points[0], f"opened as {type(rig).__name__} instead of DeviceRig"))
-    return rig
+    return rig if is_unguarded else guarded(rig, thread)
 
 
 def _profiles() -> Any:
@@ -125,8 +132,9 @@ def _open_profile(path: Path, options: dict[str, str] | None) -> DeviceRig:
             f"The rig profile {path} takes no options, given: {', '.join(options)}. Change its settings in"
             " the file instead."
         )
-    rig: DeviceRig = _profiles().open_profile(path)
-    return rig
+    thread = DeviceThread(path.stem)
+    rig: DeviceRig = open_on(thread, path.stem, lambda: _profiles().open_profile(path))
+    return guarded(rig, thread)
 
 
 def _describe_profile(name: str) -> RigEntry:

@@ -17,7 +17,8 @@ class Frame:
     """One exposure: the raw mosaic, uint16, shape (rows, columns), in DN, and how it was taken.
 
     ``attempts`` counts the exposures it took until this one was kept, and ``corrected`` says what an earlier
-    one showed instead of the pattern (a runner sets both).
+    one showed instead of the pattern; ``shown_s`` is the time of day, s, at which the projector had shown the
+    pattern (a runner sets all three).
     """
 
     pixels: NDArray[np.uint16]
@@ -26,6 +27,7 @@ class Frame:
     frame_id: int = 0
     attempts: int = 1
     corrected: str = ""
+    shown_s: float = 0.0
 
 
 class FrameSource(Protocol):

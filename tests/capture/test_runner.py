@@ -153,7 +153,7 @@ def test_a_camera_without_noise_is_believed(
 
     def same(shot: int, attempt: int) -> Frame:
         number = next(count)
-        return Frame(picture, 10.0, float(number), number)
+        return Frame(picture, bench.exposures_ms[-1], float(number), number)
 
     bench.before_snap = same
     sink = MemorySink(plan)

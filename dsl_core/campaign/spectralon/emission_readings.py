@@ -8,6 +8,7 @@ import numpy as np
 
 from dsl_core.campaign.common.recipe import Bench, Step
 from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.plausible import require_light
 from dsl_core.errors import CalibrationError
 from dsl_core.io.spectra.spectrum_file import read_spectrum
 from dsl_core.model.calibration.spectralon import COLOURS, EmissionReadings, LightColour
@@ -57,7 +58,12 @@ def read_emission(bench: Bench, step: Step, count: int, files: Path | None, prog
     for done, colour in enumerate(COLOURS):
         progress.report("spectra", done, len(COLOURS))
         if colour not in readings:
-            readings = {**readings, colour: _measure(devices, colour, count)}
+            measured = _measure(devices, colour, count)
+            if colour != "black":
+                before = {known: each for known, curves in readings.items() for each in curves}
+                for curve in measured:
+                    require_light(curve, before, colour, "The spectroradiometer")
+            readings = {**readings, colour: measured}
             read = EmissionReadings(source="spectroradiometer", readings=readings)
             bench.keep(step, READINGS_NAME, read)
     progress.report("spectra", len(COLOURS), len(COLOURS))

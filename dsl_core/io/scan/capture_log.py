@@ -24,7 +24,8 @@ class LogEntry(Record):
 
     ``run`` counts how often the scan was opened for writing: frame numbers and clocks of a camera
     start again with it. ``attempts`` above one means that the frame was taken again before it was kept,
-    and ``corrected`` why, where an earlier picture did not show the pattern.
+    and ``corrected`` why, where an earlier picture did not show the pattern. ``shown_s`` is the time of day
+    at which the pattern was visible, s; 0 in scans of earlier versions.
     """
 
     shot: int = Field(ge=0)
@@ -34,6 +35,7 @@ class LogEntry(Record):
     crc32: int
     attempts: int = 1
     corrected: str = ""
+    shown_s: float = 0.0
     run: int = 0
     darkest_dn: int = 0
     brightest_dn: int = 65535

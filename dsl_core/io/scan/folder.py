@@ -214,6 +214,7 @@ class ScanWriter:
             crc32=checksum(frame.pixels),
             attempts=frame.attempts,
             corrected=frame.corrected,
+            shown_s=round(frame.shown_s, 3),
             run=self._run,
             darkest_dn=int(frame.pixels.min()),
             brightest_dn=int(frame.pixels.max()),

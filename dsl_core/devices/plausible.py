@@ -1,0 +1,148 @@
+"""What devices deliver, held against what they promise: a figure that cannot be is an error at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import CameraInfo
+from dsl_core.errors import DeviceError
+from dsl_core.model.frames import Frame
+from dsl_core.model.spectral import SpectralCurve
+
+#: A camera may round the exposure it is asked for by this share.
+EXPOSURE_TOLERANCE = 0.05
+#: Wavelengths that every spectrum has to cover, and those that can be meant at all, nm.
+COVERED_NM, POSSIBLE_NM = (430.0, 660.0), (150.0, 3000.0)
+#: Samples that a spectrum has at least; as many equal ones at its very peak are clipped.
+FEWEST_SAMPLES, CLIPPED_SAMPLES = 16, 6
+#: A spectrum of light may fall below zero by this share of its peak.
+NEGATIVE_SHARE = 0.1
+#: Unit of a spectroradiometer's curves.
+RADIANCE = "W/(sr m2 nm)"
+
+
+def require_frame(frame: object, camera: CameraInfo, exposure_ms: float | None) -> None:
+    """Raise `DeviceError` unless a frame is what ``camera`` promises, exposed for ``exposure_ms``.
+
+    None stands for an exposure that nobody has set yet.
+    """
+    name = f"The camera {camera.model}"
+    if not isinstance(frame, Frame) or not isinstance(frame.pixels, np.ndarray):
+        what = type(frame).__name__ if not isinstance(frame, Frame) else type(frame.pixels).__name__
+        raise DeviceError(f"{name} delivered {what} instead of a picture. Update its driver.")
+    said: dict[str, object] = {
+        "exposure": frame.exposure_ms,
+        "time": frame.timestamp_s,
+        "number": frame.frame_id,
+    }
+    for what, value in said.items():
+        if not isinstance(value, Real):
+            raise DeviceError(f"{name} says that the {what} of a frame is {value!r}. Update its driver.")
+    require_mosaic(frame.pixels, (camera.width_px, camera.height_px), name)
+    brightest, most = int(frame.pixels.max()), 2**camera.bit_depth - 1
+    if brightest > most:
+        raise DeviceError(
+            f"{name} delivered a value of {brightest}; with {camera.bit_depth} bits, {most} is the largest."
+            " Check its pixel format: values belong in the lower bits."
+        )
+    if not (math.isfinite(frame.exposure_ms) and frame.exposure_ms > 0):
+        raise DeviceError(f"{name} says that it exposed for {frame.exposure_ms:g} ms. Update its driver.")
+    if exposure_ms is not None:
+        require_exposure(frame.exposure_ms, exposure_ms, name)
+
+
+def require_mosaic(pixels: NDArray[np.uint16], size_px: tuple[int, int], name: str) -> None:
+    """Raise `DeviceError` unless pixels are a raw mosaic of this width and height."""
+    shape = (size_px[1], size_px[0])
+    if pixels.shape != shape or pixels.dtype != np.uint16:
+        raise DeviceError(
+            f"{name} delivered {pixels.dtype} of shape {pixels.shape} instead of uint16 of shape {shape}."
+            " Check its pixel format and region of interest."
+        )
+
+
+def require_exposure(actual_ms: float, wanted_ms: float, name: str) -> None:
+    """Raise `DeviceError` when a camera exposes for another time than it was asked for."""
+    # Written so that a figure that is no number is refused as well.
+    if not abs(actual_ms - wanted_ms) <= EXPOSURE_TOLERANCE * wanted_ms:
+        raise DeviceError(
+            f"{name} exposes for {actual_ms:g} ms instead of {wanted_ms:g} ms. Switch off its automatic"
+            " exposure, or choose an exposure that it supports."
+        )
+
+
+def require_position(
+    asked_mm: float, reached_mm: float, read_mm: float, tolerance_mm: float, name: str
+) -> None:
+    """Raise `DeviceError` unless a stage is where it was sent, by what it returned and by what it reads."""
+    for value, what in ((reached_mm, "says that it went to"), (read_mm, "then says that it is at")):
+        if not abs(value - asked_mm) <= tolerance_mm:
+            raise DeviceError(
+                f"{name} was sent to {asked_mm:g} mm and {what} {value:g} mm; {tolerance_mm:g} mm are"
+                " tolerated. Check that nothing blocks it, and let it find its reference again."
+            )
+
+
+def require_spectrum(curve: object, name: str) -> None:
+    """Raise `DeviceError` unless a curve can be the spectral radiance of something, dark or bright."""
+    if not isinstance(curve, SpectralCurve):
+        raise DeviceError(
+            f"{name} delivered {type(curve).__name__} instead of a spectrum. Update its driver."
+        )
+    fault = _fault_of(np.array(curve.wavelengths_nm, float), np.array(curve.values, float), curve.unit)
+    if fault:
+        raise DeviceError(
+            f"{name} delivered a spectrum that cannot be: {fault}. Check the instrument and measure again."
+        )
+
+
+def require_light(curve: SpectralCurve, others: Mapping[Any, SpectralCurve], what: str, name: str) -> None:
+    """Raise `DeviceError` unless a curve shows light, and other light than the curves measured before.
+
+    ``what`` names the light, as the keys of ``others`` name theirs. Noise makes every reading differ.
+    """
+    values = np.array(curve.values)
+    lowest, peak = float(values.min()), float(values.max())
+    fault = ""
+    if peak <= 0:
+        fault = "no value is above zero"
+    elif -lowest > NEGATIVE_SHARE * peak:
+        fault = f"it goes down to {lowest:g}, with a peak of {peak:g}"
+    same = [known for known, other in others.items() if other.values == curve.values]
+    if same:
+        fault = f"it is the spectrum of {same[0]}, value by value"
+    if fault:
+        raise DeviceError(
+            f"{name} delivered no spectrum of {what}: {fault}. Check that it sees the target and that the"
+            " projector follows, then measure again."
+        )
+
+
+def _fault_of(nm: NDArray[np.float64], value: NDArray[np.float64], unit: str) -> str:
+    if unit != RADIANCE:
+        return f"its unit is {unit!r} instead of {RADIANCE!r}"
+    if not (np.isfinite(nm).all() and np.isfinite(value).all()):
+        return f"{int((~np.isfinite(value)).sum())} of its {value.size} values are infinite or missing"
+    if nm[0] < POSSIBLE_NM[0] or nm[-1] > POSSIBLE_NM[1]:
+        return f"its wavelengths are {nm[0]:g} to {nm[-1]:g}, not those of light in nm"
+    if nm[0] > COVERED_NM[0] or nm[-1] < COVERED_NM[1]:
+        return f"it covers {nm[0]:g} to {nm[-1]:g} nm instead of {COVERED_NM[0]:g} to {COVERED_NM[1]:g} nm"
+    if nm.size < FEWEST_SAMPLES:
+        return f"it has {nm.size} samples; {FEWEST_SAMPLES} are the fewest"
+    peak = float(value.max())
+    if value.min() == peak and peak != 0:
+        return f"every value is {peak:g}"
+    if peak > 0 and _longest_run(value == peak) >= CLIPPED_SAMPLES:
+        return f"{_longest_run(value == peak)} neighbouring values are {peak:g}, its largest: it is saturated"
+    return ""
+
+
+def _longest_run(where: NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], where.astype(np.int8), [0]))))
+    return int((edges[1::2] - edges[::2]).max()) if edges.size else 0
