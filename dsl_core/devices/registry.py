@@ -86,7 +86,9 @@ def is_built_in(name: str) -> bool:
 def open_rig(name: str, options: dict[str, str] | None = None) -> DeviceRig:
     """Open the devices of a rig, by its name or by the path of a profile, which ends in ``.json``.
 
-    Those that control hardware come behind guards, on a thread of their own. Raises `DeviceError` when there is no rig of that name (and says which there are), when its package
+    Those that control hardware come behind guards, on a thread of their own.
+
+    Raises `DeviceError` when there is no rig of that name (and says which there are), when its package
     is broken, and when its devices cannot be opened.
     """
     points = [point for point in _points() if point.name == name]
