@@ -1,3 +1,64 @@
-"""Headless engine of dsl-scan: Dispersed Structured Light without a window."""
+"""Headless engine of dsl-scan: Dispersed Structured Light without a window.
 
-__version__ = "0.1.0"
+What a script needs is here, and loads when it is first used::
+
+    import dsl_core as dsl
+
+    with dsl.open_rig("twin", size="222x145") as rig:
+        scan = dsl.scan(rig, "first.dsl", dsl.plan(rig, "quick"))
+    result = dsl.reconstruct(scan)
+    result.dsl.plot(x=110, y=70)
+
+Results are `xarray.Dataset`; the accessor ``.dsl`` adds spectra with their bands, reasons, the verdict and
+exports.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from dsl_core.version import __version__
+
+if TYPE_CHECKING:
+    from dsl_core.api.results import evaluate as evaluate
+    from dsl_core.api.results import export as export
+    from dsl_core.api.results import load_result as load_result
+    from dsl_core.api.results import save_result as save_result
+    from dsl_core.api.scans import load_calibration as load_calibration
+    from dsl_core.api.scans import load_scan as load_scan
+    from dsl_core.api.scans import open_rig as open_rig
+    from dsl_core.api.scans import plan as plan
+    from dsl_core.api.scans import reconstruct as reconstruct
+    from dsl_core.api.scans import rigs as rigs
+    from dsl_core.api.scans import scan as scan
+
+_SCANS = ("load_calibration", "load_scan", "open_rig", "plan", "reconstruct", "rigs", "scan")
+_RESULTS = ("evaluate", "export", "load_result", "save_result")
+#: The module of each public name.
+_HOMES = dict.fromkeys(_SCANS, "dsl_core.api.scans") | dict.fromkeys(_RESULTS, "dsl_core.api.results")
+
+__all__ = [
+    "__version__",
+    "evaluate",
+    "export",
+    "load_calibration",
+    "load_result",
+    "load_scan",
+    "open_rig",
+    "plan",
+    "reconstruct",
+    "rigs",
+    "save_result",
+    "scan",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

@@ -134,7 +134,7 @@ def reconstruct(
         with timer.stage("spectra"):
             spectra = solve_spectra(rig, plan, options, stack, known_pixels(geometry), progress)
     with timer.stage("colour and result"):
-        return assemble(rig, plan, options.grid, geometry, spectra, findings)
+        return assemble(rig, plan, options.grid, geometry, spectra, findings, options.part)
 
 
 def evaluate(result: xr.Dataset, truth: Truth) -> Evaluation:

@@ -15,7 +15,6 @@ from typing import Annotated
 
 import typer
 
-import dsl_core
 from dsl_core.cli import (
     calibrate,
     calibrations,
@@ -29,6 +28,7 @@ from dsl_core.cli import (
     tradeoff,
 )
 from dsl_core.errors import Cancelled, DslError
+from dsl_core.version import __version__
 
 OK, BUG, WRONG_INPUT, STOPPED = 0, 1, 2, 130
 #: Wrong use of a command line; typer gives this class no public name.
@@ -68,7 +68,7 @@ app.add_typer(calibrations.calibrations, name="calibrations")
 
 def _print_version(requested: bool) -> None:
     if requested:
-        typer.echo(f"dsl-scan {dsl_core.__version__}")
+        typer.echo(f"dsl-scan {__version__}")
         raise typer.Exit
 
 

@@ -18,11 +18,11 @@ from typing import Any
 
 from pydantic import BaseModel
 
-import dsl_core
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.device_thread import DeviceThread
 from dsl_core.devices.guard import guarded, open_on
 from dsl_core.errors import DeviceError, DslError
+from dsl_core.version import __version__
 
 GROUP = "dsl_scan.rigs"
 #: Stands for the package of rigs that are profiles.
@@ -156,7 +156,7 @@ def _points() -> list[EntryPoint]:
 
 def _package(point: EntryPoint) -> tuple[str, str]:
     if point.dist is None:
-        return "dsl-scan", dsl_core.__version__
+        return "dsl-scan", __version__
     return point.dist.name, point.dist.version
 
 

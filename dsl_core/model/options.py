@@ -53,7 +53,8 @@ class Options:
     ``solver`` is ``best`` or, to compare with it, ``published`` (Adam on the published objective),
     ``nearest-line`` or ``colour-basis``. ``surface_window_px`` is the window of normals; None takes it from
     the image's width, which is wrong for a piece cut out of a larger image. ``as_calibrated`` corrects
-    nothing in the calibration by what the scan itself shows.
+    nothing in the calibration by what the scan itself shows. ``region_px`` (x, y, width, height) keeps only
+    that part of the picture and solves spectra there alone; depth and the check of the model use all of it.
     """
 
     grid: WavelengthGrid = field(default_factory=WavelengthGrid)
@@ -64,3 +65,12 @@ class Options:
     surface_window_px: int | None = None
     solver: str = "best"
     as_calibrated: bool = False
+    region_px: tuple[int, int, int, int] | None = None
+
+    @property
+    def part(self) -> tuple[slice, slice]:
+        """Rows and columns of the region, or of all."""
+        if self.region_px is None:
+            return slice(None), slice(None)
+        x, y, width, height = self.region_px
+        return slice(y, y + height), slice(x, x + width)

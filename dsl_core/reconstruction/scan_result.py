@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core import __version__
 from dsl_core.model.calibration.accepted import missed_attributes
 from dsl_core.model.fit import ATTRIBUTE, FitFinding
 from dsl_core.model.plan import CapturePlan
@@ -19,6 +18,7 @@ from dsl_core.reconstruction.fit_findings import fit_of
 from dsl_core.reconstruction.geometry import Geometry
 from dsl_core.reconstruction.spectral.spectra import SpectralMaps
 from dsl_core.reconstruction.spectral.tile_frames import Pixels
+from dsl_core.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,10 +53,11 @@ def assemble(
     geometry: Geometry,
     spectra: SpectralMaps | None,
     findings: Iterable[FitFinding] = (),
+    part: tuple[slice, slice] = (slice(None), slice(None)),
 ) -> xr.Dataset:
     """The dataset of a scan; without spectra when only depth was requested.
 
-    ``findings`` are those that were made on the way.
+    ``findings`` are those that were made on the way. Of the picture, a ``part`` (rows, columns) is kept.
     """
     from dsl_core.optics.colour import reflectance_to_srgb
 
@@ -81,10 +82,10 @@ def assemble(
         )
     arrays["flags"] = flags
     attributes: dict[str, str | int | float] = {"rig": rig.name, "plan": plan.name, "version": __version__}
-    fit = fit_of(rig, plan, grid, geometry.depth_mm, flags, spectra, findings)
+    fit = fit_of(rig, plan, grid, geometry.depth_mm, flags[part], spectra, findings)
     attributes[ATTRIBUTE] = fit.model_dump_json()
     attributes |= missed_attributes(rig.calibrations)
-    return build_result(arrays, grid.centres_nm, attributes)
+    return build_result(arrays, grid.centres_nm, attributes).isel(y=part[0], x=part[1])
 
 
 def with_calibration(rig: Rig, grid: WavelengthGrid, spectra: SpectralMaps) -> NDArray[np.float32]:

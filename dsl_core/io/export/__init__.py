@@ -23,7 +23,7 @@ from dsl_core.solve.many import Check, never
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FORMATS", "Exporter", "export", "export_csv", "export_png"]
+__all__ = ["FORMATS", "Exporter", "export", "export_by_ending", "export_csv", "export_png"]
 
 
 class Exporter(Protocol):
@@ -54,3 +54,20 @@ def export(
     if name not in FORMATS:
         raise StoreError(f"There is no export format {name!r}. Choose one of {', '.join(FORMATS)}.")
     return FORMATS[name](result, path, overwrite=overwrite, check=check)
+
+
+#: Formats by the ending of a file where it is not the format's own name.
+_ENDINGS = {"hdr": "envi", "tif": "tiff"}
+
+
+def export_by_ending(
+    result: xr.Dataset, path: Path, name: str | None = None, *, overwrite: bool = False
+) -> list[Path]:
+    """As `export`, in the format that the ending of the path says unless one is named."""
+    ending = path.suffix.removeprefix(".").lower()
+    chosen = (name or _ENDINGS.get(ending, ending)).lower()
+    if not chosen:
+        raise StoreError(
+            f"{path} has no ending that says its format. Add one, or give the format: {', '.join(FORMATS)}."
+        )
+    return export(result, path, chosen, overwrite=overwrite)

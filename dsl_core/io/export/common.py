@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-import dsl_core
 from dsl_core.errors import StoreError
+from dsl_core.version import __version__
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,7 @@ def provenance_of(attributes: Mapping[str, Any]) -> dict[str, str]:
         for key, value in attributes.items()
         if isinstance(value, str | int | float | np.number)
     }
-    return {**plain, "exported_by": f"dsl-scan {dsl_core.__version__}"}
+    return {**plain, "exported_by": f"dsl-scan {__version__}"}
 
 
 def ascii_text(text: str) -> str:

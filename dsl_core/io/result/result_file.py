@@ -11,6 +11,7 @@ files belong to it: damage is told when it is read.
 from __future__ import annotations
 
 import logging
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,7 +72,19 @@ def save_result(result: xr.Dataset, path: Path, *, overwrite: bool = False) -> P
             if str(name) not in labels:
                 _write_variable(group, str(name), variable)
         group.update_attributes(with_inventory(draft, dict(group.attrs)))
+        _consolidate(draft)
     return path
+
+
+def _consolidate(folder: Path) -> None:
+    """Repeat the arrays' metadata at the root, where other readers of zarr look for them first."""
+    import zarr
+    from zarr.errors import ZarrUserWarning
+
+    with warnings.catch_warnings():
+        # Not yet in the specification of version 3, but in use: zarr and xarray write and read it.
+        warnings.simplefilter("ignore", ZarrUserWarning)
+        zarr.consolidate_metadata(folder, zarr_format=3)
 
 
 def load_result(path: Path, *, lazy: bool = True) -> xr.Dataset:

@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-import dsl_core
 from dsl_core.devices.base import CameraInfo, DeviceRig, ProjectorInfo
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.errors import StoreError
@@ -20,6 +19,7 @@ from dsl_core.model.base import Record
 from dsl_core.model.conditions import differences as setting_differences
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
+from dsl_core.version import __version__
 
 #: The note that says what was before the camera, by a rig that knows.
 STANDING = "before_camera"
@@ -46,7 +46,7 @@ def describe_scan(plan: CapturePlan, rig: DeviceRig | None, notes: dict[str, str
         own |= {STANDING: rig.standing()}
     return Manifest(
         created=datetime.now(UTC).isoformat(timespec="seconds"),
-        versions={"dsl_core": dsl_core.__version__, "python": platform.python_version()},
+        versions={"dsl_core": __version__, "python": platform.python_version()},
         plan=plan,
         rig_name=rig.name if rig else "",
         camera=rig.camera.info if rig else None,

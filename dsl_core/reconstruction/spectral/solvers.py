@@ -48,7 +48,6 @@ def solve_spectra(
     model = correspondence(rig, options.correspondence)
     data = (rig, plan, options.grid, model, stack.radiance, stack.std, pixels)
     if kind is None:
-        return SpectralReconstruction(*data, device=options.device, as_calibrated=options.as_calibrated).run(
-            progress
-        )
+        solver = SpectralReconstruction(*data, device=options.device, as_calibrated=options.as_calibrated)
+        return solver.run(progress, part=options.part)
     return kind(*data, device=options.device).run(progress)

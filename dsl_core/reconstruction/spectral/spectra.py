@@ -120,8 +120,16 @@ class SpectralReconstruction:
         self._error: ModelError | None = None
         self._as_calibrated = as_calibrated
 
-    def run(self, progress: Progress | None = None, threads: int = 2) -> SpectralMaps:
-        """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy."""
+    def run(
+        self,
+        progress: Progress | None = None,
+        threads: int = 2,
+        part: tuple[slice, slice] = (slice(None), slice(None)),
+    ) -> SpectralMaps:
+        """Solve all tiles; single-threaded kernels in a few threads keep every core and its cache busy.
+
+        Where only a ``part`` (rows, columns) of the picture is wanted, tiles outside it stay NaN.
+        """
         progress = progress or NoProgress()
         out = SpectralMaps.empty(
             self.bands.reported.stop - self.bands.reported.start, self.pixels.valid.shape
@@ -133,7 +141,7 @@ class SpectralReconstruction:
                 self._error = model_error(found.left, common_error(found.left, fit_causes(found.left)))
             work_through(
                 lambda tile, check: self._tile(*tile, out, check),
-                list(self._tiles()),
+                [tile for tile in self._tiles() if _wanted(tile, part, self.pixels.valid.shape)],
                 threads,
                 "spectra",
                 progress,
@@ -320,6 +328,15 @@ class SpectralReconstruction:
         out.reach.reshape(len(out.reach), -1)[:, flat] = reach.cpu().numpy()
         out.chi_square.reshape(-1)[flat] = misfit.float().cpu().numpy()
         out.at_bound.reshape(-1)[flat] = spectra.at_bound[reported].any(0).cpu().numpy()
+
+
+def _wanted(tile: tuple[slice, slice], part: tuple[slice, slice], shape: tuple[int, ...]) -> bool:
+    """Whether a tile has pixels of a part of a picture."""
+    for own, wanted, size in zip(tile, part, shape, strict=True):
+        start, stop, _ = wanted.indices(size)
+        if own.start >= stop or own.stop <= start:
+            return False
+    return True
 
 
 def with_offset(spectra: Spectra, matrix: Tensor, variance: Tensor, prior: Prior) -> Spectra:

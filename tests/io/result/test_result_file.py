@@ -96,7 +96,7 @@ def test_a_cube_of_nothing_but_nan_stays_nan(tmp_path: Path) -> None:
 def test_a_depth_only_result(tmp_path: Path) -> None:
     result = small_result()[["depth_mm", "flags"]]
     loaded = load_result(save_result(result, tmp_path / "r.zarr"))
-    assert set(loaded.variables) == {"depth_mm", "flags"}
+    assert set(loaded.variables) == {"depth_mm", "flags", "x", "y"}
     assert np.isnan(loaded["depth_mm"].values[UNLIT])
 
 

@@ -29,6 +29,7 @@ ORDER = (
     "reading-an-intensity-graph",
     "comparing",
     "exporting",
+    "scripting",
     "importing",
     "how-it-measures",
     "glossary",

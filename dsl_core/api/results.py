@@ -1,0 +1,48 @@
+"""Results: loaded, saved, exported and compared with truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import dsl_core.api.accessor  # noqa: F401  (registers ``.dsl``)
+from dsl_core.api import FilePath
+from dsl_core.io.export import export_by_ending
+from dsl_core.io.result import result_file
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from dsl_core.evaluation.summary import Evaluation
+
+
+def load_result(path: FilePath) -> xr.Dataset:
+    """A saved result; bands are read when they are first used. Raises `StoreError`."""
+    return result_file.load_result(Path(path))
+
+
+def save_result(result: xr.Dataset, path: FilePath, *, overwrite: bool = False) -> Path:
+    """Store a result as a zarr folder, whole or not at all, and return its path; raises `StoreError`."""
+    return result_file.save_result(result, Path(path), overwrite=overwrite)
+
+
+def export(
+    result: xr.Dataset, path: FilePath, format: str | None = None, *, overwrite: bool = False
+) -> list[Path]:
+    """Write a result for another program and return the files written.
+
+    ``format`` is csv, envi, exr, npy, ply, png or tiff; by default the ending of the path says it. Raises
+    `StoreError` for an unknown format, an existing file and a disk that fails.
+    """
+    return export_by_ending(result, Path(path), format, overwrite=overwrite)
+
+
+def evaluate(result: xr.Dataset) -> Evaluation:
+    """Errors and coverage of a result of the simulated rig, whose truth is known.
+
+    Raises `DecodeError` for a result of another rig.
+    """
+    from dsl_core import pipeline
+    from dsl_core.workflows.scans import truth_of
+
+    return pipeline.evaluate(result, truth_of(result))

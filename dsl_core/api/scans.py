@@ -1,0 +1,149 @@
+"""From a rig to a result: open, plan, scan, reconstruct."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.api import FilePath
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.registry import open_rig as open_by_texts
+from dsl_core.devices.registry import rig_names
+from dsl_core.errors import PlanError
+from dsl_core.io import rig_file
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.io.scan.origin import rig_notes
+from dsl_core.model.options import Options
+from dsl_core.model.plan import CapturePlan
+from dsl_core.model.presets import PRESETS
+from dsl_core.model.rig import Rig
+from dsl_core.model.spectral import WavelengthGrid
+from dsl_core.progress import Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def rigs() -> list[str]:
+    """Names of the rigs that `open_rig` knows: the twin, replays, and those of installed packages."""
+    return rig_names()
+
+
+def open_rig(name: str = "twin", **options: object) -> DeviceRig:
+    """Open the devices of a rig; use it in a ``with`` statement, so that they are closed.
+
+    ``options`` are those that ``dsl-scan rigs`` lists, as text, numbers or True and False. Raises
+    `DeviceError` for an unknown rig or option, and for devices that cannot be opened.
+    """
+    texts = {key: _as_text(value) for key, value in options.items()}
+    rig = open_by_texts(name, texts)
+    return replace(rig, notes={**rig.notes, **rig_notes(name, texts)})
+
+
+def _as_text(value: object) -> str:
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
+
+
+def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> CapturePlan:
+    """What a scan captures: the preset of that name for the picture sizes and exposures of a rig.
+
+    ``changes`` replace fields of `CapturePlan`, such as ``settings`` or ``code``. Raises `PlanError` for an
+    unknown preset, and ``pydantic.ValidationError`` for a plan that contradicts itself.
+    """
+    from dsl_core.capture.preflight import fit_plan
+
+    known = {"reference": CapturePlan(), **{each.key: each.plan for each in PRESETS}}
+    if preset not in known:
+        raise PlanError(f"There is no plan {preset!r}; choose {', '.join(known)}.")
+    chosen = known[preset]
+    if changes:
+        chosen = CapturePlan.model_validate({**dict(chosen), **changes})
+    return fit_plan(chosen, rig)
+
+
+def scan(
+    rig: DeviceRig, folder: FilePath, plan: CapturePlan | None = None, progress: Progress | None = None
+) -> ScanReader:
+    """Capture a plan (the reference plan if none is given) into a folder, and return the stored scan.
+
+    Every frame is on disk before the next is taken. A folder with an unfinished scan of the same plan is
+    resumed. Raises `PlanError` for a plan that is impossible on the rig, `DeviceError` for a device that
+    fails and `StoreError` where the folder cannot be written or contains something else.
+    """
+    from dsl_core import pipeline
+
+    path = Path(folder)
+    pipeline.scan(rig, plan or pipeline.fit_plan(CapturePlan(), rig), path, progress, dict(rig.notes))
+    return ScanReader(path)
+
+
+def load_scan(folder: FilePath) -> ScanReader:
+    """A scan on disk: its ``plan``, ``calibration`` and ``manifest``, and ``read(shot)`` for a frame.
+
+    Raises `StoreError` where there is none, or where it is damaged.
+    """
+    return ScanReader(folder)
+
+
+def load_calibration(path: FilePath) -> Rig:
+    """The calibrated rig of a JSON file; raises `CalibrationError` naming the fields that are wrong."""
+    return rig_file.load_rig(Path(path))
+
+
+def reconstruct(
+    scan: ScanReader | FilePath,
+    calibration: Rig | FilePath | None = None,
+    *,
+    bands_nm: tuple[float, float, float] = (430.0, 660.0, 5.0),
+    region_px: Sequence[int] | None = None,
+    spectra: bool = True,
+    solver: str = "best",
+    correspondence: str = "auto",
+    device: str = "cpu",
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Depth, surface and spectra of a scan, with the calibration stored in it unless another is given.
+
+    ``bands_nm`` are the centre of the first and of the last band and their distance. ``region_px`` (x, y,
+    width, height) solves spectra in that part of the picture alone and returns only that part; depth, normals
+    and the check of the model still use the whole picture. Without ``spectra`` the result ends with depth.
+    ``solver``, ``correspondence`` and ``device`` are as in `Options`.
+
+    The dataset holds the variables of `dsl_core.model.result.VARIABLES` over pixel coordinates ``x``, ``y``
+    and ``wavelength_nm``, float32. Raises `StoreError` for an incomplete or damaged scan, `CalibrationError`
+    for a missing or unfitting calibration, `PlanError` for a solver that does not exist or does not fit, and
+    `DecodeError` where the frames show no usable light.
+    """
+    import dsl_core.api.accessor  # noqa: F401  (registers ``.dsl``)
+    from dsl_core.workflows.scans import reconstruct_scan
+
+    folder = scan.folder if isinstance(scan, ScanReader) else Path(scan)
+    rig = calibration if isinstance(calibration, Rig | None) else load_calibration(calibration)
+    first, last, step = bands_nm
+    options = Options(
+        grid=WavelengthGrid(start_nm=first, stop_nm=last, step_nm=step),
+        correspondence=correspondence,
+        spectra=spectra,
+        device=device,
+        solver=solver,
+        region_px=None if region_px is None else _region(region_px, ScanReader(folder).plan.camera_size_px),
+    )
+    return reconstruct_scan(folder, rig, options, progress)
+
+
+def _region(given: Sequence[int], size_px: tuple[int, int]) -> tuple[int, int, int, int]:
+    """The region, which must be a part of a picture of this width and height."""
+    if len(given) != 4:
+        raise PlanError(f"A region is x, y, width and height, given {tuple(given)}.")
+    x, y, width, height = (int(value) for value in given)
+    if x < 0 or y < 0 or width < 1 or height < 1 or x + width > size_px[0] or y + height > size_px[1]:
+        raise PlanError(
+            f"The region x {x}, y {y}, width {width}, height {height} is not a part of the picture of"
+            f" {size_px[0]} x {size_px[1]} pixels."
+        )
+    return x, y, width, height

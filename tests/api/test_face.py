@@ -1,0 +1,154 @@
+"""The functions and the accessor that scripts use, from a rig to a plot."""
+
+import re
+from contextlib import chdir
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+import dsl_core as dsl
+from dsl_core.errors import DecodeError, PlanError, StoreError
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.resources import resource_path
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What the names on the help page stand for after its code has run as it is printed there."""
+    text = resource_path("help/scripting.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    with chdir(tmp_path_factory.mktemp("page")):
+        for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+            exec(block, names)
+        names["folder"] = Path.cwd()
+    return names
+
+
+@pytest.fixture(scope="module")
+def scan(page: dict[str, Any]) -> ScanReader:
+    found: ScanReader = page["scan"]
+    return ScanReader(page["folder"] / found.folder)
+
+
+@pytest.fixture(scope="module")
+def result(page: dict[str, Any]) -> xr.Dataset:
+    found: xr.Dataset = page["result"]
+    return found
+
+
+def test_the_help_page_runs_as_written(page: dict[str, Any]) -> None:
+    assert (page["folder"] / "spectrum.png").stat().st_size > 0
+    assert (page["folder"] / "first.ply").stat().st_size > 0
+    assert page["patch"].attrs["used"] == 30
+    assert page["fine"].sizes["wavelength_nm"] == 81
+    assert page["xyz"].shape == (page["points"].sizes["point"], 3)
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    assert set(dsl.__all__) <= set(dir(dsl))
+    assert all(getattr(dsl, name).__doc__ for name in dsl.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = dsl.nonsense  # type: ignore[attr-defined]
+    assert "twin" in dsl.rigs()
+
+
+def test_a_finished_scan_is_not_captured_again(scan: ScanReader) -> None:
+    before = scan.manifest
+    with dsl.open_rig("twin", size="112x72", scene="color-checker") as rig:
+        again = dsl.scan(rig, scan.folder, dsl.plan(rig, "quick"))
+    assert again.manifest == before
+    assert not dsl.load_scan(str(scan.folder)).missing()
+
+
+def test_plans_by_name_and_with_changes() -> None:
+    with dsl.open_rig("twin", size="112x72") as rig:
+        changed = dsl.plan(rig, "balanced", name="mine")
+        assert changed.name == "mine"
+        assert changed.camera_size_px == (112, 72)
+        with pytest.raises(PlanError, match="no plan 'best'; choose reference, preview"):
+            dsl.plan(rig, "best")
+
+
+def test_a_spectrum_has_its_deviation_and_reasons(result: xr.Dataset) -> None:
+    y, x = (int(axis[0]) for axis in np.nonzero(result.dsl.good.values))
+    found = result.dsl.spectrum(x, y)
+    assert found["reflectance"].dtype == np.float32
+    np.testing.assert_array_equal(found["reflectance"], result["reflectance"].values[:, y, x])
+    assert (found["reflectance_std"] > 0).all()
+    assert found.attrs["reasons"] == []
+    y, x = (int(axis[0]) for axis in np.nonzero(result["flags"].values))
+    assert result.dsl.reasons(x, y)
+    with pytest.raises(DecodeError, match="x 112, y 0 is not in the result"):
+        result.dsl.spectrum(112, 0)
+
+
+def test_the_mean_of_a_region(result: xr.Dataset) -> None:
+    mask = np.zeros((72, 112), bool)
+    mask[20:24, 30:36] = True
+    by_mask, by_box = result.dsl.region(mask), result.dsl.region((30, 20, 6, 4))
+    xr.testing.assert_equal(by_mask, by_box)
+    inside = result["reflectance"].values[:, 20:24, 30:36].reshape(47, -1)
+    np.testing.assert_allclose(by_mask["reflectance"], np.nanmean(inside, 1), rtol=1e-6)
+    with pytest.raises(DecodeError, match="None of the 0 pixels"):
+        result.dsl.region(np.zeros((72, 112), bool))
+    with pytest.raises(DecodeError, match="mask has shape"):
+        result.dsl.region(np.zeros((2, 2), bool))
+
+
+def test_points_are_the_pixels_with_depth(result: xr.Dataset) -> None:
+    points = result.dsl.points()
+    known = np.isfinite(result["depth_mm"].values)
+    assert points.sizes["point"] == known.sum()
+    first = points.isel(point=0)
+    assert result["depth_mm"].sel(x=int(first["x"]), y=int(first["y"])) == first["depth_mm"]
+
+
+def test_a_plot_shows_the_band(result: xr.Dataset) -> None:
+    y, x = (int(axis[0]) for axis in np.nonzero(result.dsl.good.values))
+    axes = result.dsl.spectrum(x, y).dsl.plot(ax=plt.figure().subplots())
+    (line,), (band,) = axes.lines, axes.collections
+    np.testing.assert_allclose(line.get_ydata(), result["reflectance"].values[:, y, x])
+    height = np.ptp(band.get_paths()[0].vertices[:, 1])
+    assert height > np.ptp(line.get_ydata())
+    assert axes.get_xlabel() == "wavelength (nm)"
+    with pytest.raises(DecodeError, match="Say which pixel"):
+        result.dsl.plot()
+
+
+def test_part_of_a_picture_is_solved_again_with_other_bands(scan: ScanReader, result: xr.Dataset) -> None:
+    again = dsl.reconstruct(scan, region_px=(24, 18, 12, 8))
+    part = result.sel(x=slice(24, 35), y=slice(18, 25))
+    for name in ("depth_mm", "reflectance", "reflectance_std", "flags"):
+        np.testing.assert_array_equal(again[name], part[name])
+    np.testing.assert_array_equal(again["x"], part["x"])
+    coarse = dsl.reconstruct(scan, region_px=(24, 18, 12, 8), bands_nm=(450, 650, 10))
+    assert coarse["wavelength_nm"].values.tolist() == list(range(450, 651, 10))
+    both = np.isfinite(coarse["reflectance"]) & np.isfinite(part["reflectance"])
+    assert np.abs(coarse["reflectance"] - part["reflectance"]).where(both).median() < 0.02
+    with pytest.raises(PlanError, match="not a part of the picture of 112 x 72"):
+        dsl.reconstruct(scan, region_px=(104, 0, 12, 8))
+
+
+def test_results_go_to_disk_and_to_other_readers(result: xr.Dataset, tmp_path: Path) -> None:
+    path = result.dsl.save(tmp_path / "made.zarr")
+    loaded = dsl.load_result(str(path))
+    assert loaded["reflectance"].dtype == np.float32
+    assert loaded.dsl.verdict == result.dsl.verdict != ""
+    # A warning is an error here: metadata are where xarray looks for them.
+    foreign = xr.open_zarr(path)
+    np.testing.assert_array_equal(foreign["x"], np.arange(112))
+    np.testing.assert_array_equal(foreign["wavelength_nm"], result["wavelength_nm"])
+    np.testing.assert_allclose(foreign["reflectance"], result["reflectance"], atol=3e-5)
+    assert dsl.export(loaded, tmp_path / "cloud.ply") == [tmp_path / "cloud.ply"]
+    with pytest.raises(StoreError, match="no ending that says its format"):
+        dsl.export(loaded, tmp_path / "cloud")
+
+
+def test_a_twins_result_is_compared_with_its_truth(result: xr.Dataset) -> None:
+    found = dsl.evaluate(result)
+    assert found.depth_calibration is not None
+    assert found.depth_calibration.coverage_95 > 0.9
