@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 BAND_95 = 1.96
 
 
-@xr.register_dataset_accessor("dsl")
+@xr.register_dataset_accessor("dsl")  # type: ignore[no-untyped-call]
 class ResultAccessor:
     """What a result says: spectra with deviations, reasons, the verdict on the fit, exports, plots."""
 
@@ -56,8 +56,10 @@ class ResultAccessor:
         """
         self._require_spectra()
         mask = self._mask(where)
-        cubes = (self._result[name].values for name in ("reflectance", "reflectance_std", "data_share"))
-        found = region_spectrum(*cubes, mask)
+        values, std, share = (
+            self._result[name].values for name in ("reflectance", "reflectance_std", "data_share")
+        )
+        found = region_spectrum(values, std, share, mask)
         if found.used == 0:
             raise DecodeError(f"None of the {found.pixels} pixels of the region has a spectrum.")
         over = "wavelength_nm"

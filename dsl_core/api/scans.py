@@ -87,7 +87,7 @@ def load_scan(folder: FilePath) -> ScanReader:
 
     Raises `StoreError` where there is none, or where it is damaged.
     """
-    return ScanReader(folder)
+    return ScanReader(Path(folder))
 
 
 def load_calibration(path: FilePath) -> Rig:

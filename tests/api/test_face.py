@@ -52,7 +52,7 @@ def test_every_public_name_is_there_and_documented() -> None:
     assert set(dsl.__all__) <= set(dir(dsl))
     assert all(getattr(dsl, name).__doc__ for name in dsl.__all__)
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
-        _ = dsl.nonsense  # type: ignore[attr-defined]
+        _ = dsl.nonsense
     assert "twin" in dsl.rigs()
 
 
@@ -127,8 +127,8 @@ def test_part_of_a_picture_is_solved_again_with_other_bands(scan: ScanReader, re
     np.testing.assert_array_equal(again["x"], part["x"])
     coarse = dsl.reconstruct(scan, region_px=(24, 18, 12, 8), bands_nm=(450, 650, 10))
     assert coarse["wavelength_nm"].values.tolist() == list(range(450, 651, 10))
-    both = np.isfinite(coarse["reflectance"]) & np.isfinite(part["reflectance"])
-    assert np.abs(coarse["reflectance"] - part["reflectance"]).where(both).median() < 0.02
+    # Arithmetic goes by coordinates: bands and pixels that both have.
+    assert float(abs(coarse["reflectance"] - part["reflectance"]).median()) < 0.02
     with pytest.raises(PlanError, match="not a part of the picture of 112 x 72"):
         dsl.reconstruct(scan, region_px=(104, 0, 12, 8))
 
