@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from dsl_core.io.sealed import unseal
 from tests.cases.small_result import small_result
 from tests.cases.small_rig import small_rig
+from tests.cases.spectra_files import SPECTRA_FILES, reader_of, write_all
 
 #: Text of JSON values that no field expects.
 NASTY = (
@@ -246,7 +247,7 @@ def _read_tables(folder: Path) -> object:
 
 def _make_spectra(folder: Path) -> None:
     rows = [f"{nm}\t{0.5 + nm / 5000:.3f}" for nm in range(400, 700, 10)]
-    (folder / "a.txt").write_text("\n".join(["Spectrum", "nm\tW/(sr m2 nm)", *rows]))
+    (folder / "a.txt").write_text("\n".join(["Spectrum", "nm\treflectance", *rows]))
     rows = [f"{nm},{0.4},{0.01}" for nm in range(400, 700, 10)]
     head = "wavelength_nm,pin 1: reflectance (1),pin 1: standard deviation (1)"
     (folder / "a.csv").write_text("\n".join(["# made: by hand", head, *rows]))
@@ -345,6 +346,7 @@ SAMPLES = (
     Sample("CSV", _make_spectra, "a.csv", _read_spectra("a.csv")),
     Sample("ENVI header", _make_spectra, "a.hdr", _read_spectra("a.hdr")),
     Sample("ENVI data", _make_spectra, "a.sli", _read_spectra("a.sli")),
+    *(Sample(f"spectra: {name}", write_all, name, reader_of(name)) for name in SPECTRA_FILES),
     Sample("dataset: image", _make_dataset, "ldr_exposure1/capture_0000.png", _read_dataset),
     Sample("dataset: plan", _make_dataset, "plan.json", _read_dataset),
     Sample("pattern set", _make_patterns, "set.json", _read_patterns),

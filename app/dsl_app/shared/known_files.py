@@ -9,14 +9,15 @@ from pathlib import Path
 
 from dsl_core.io import CAMPAIGN_NAME, MANIFEST_NAME, PUBLISHED_PLACES, PUBLISHED_STARTS
 from dsl_core.io.reading import read_json
+from dsl_core.io.spectra.catalogue import SUFFIXES
 
 RESULT_NAME = "zarr.json"
 #: Endings of files that may hold a reference spectrum.
-REFERENCE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".asc", ".sli", ".hdr")
+REFERENCE_SUFFIXES = SUFFIXES
 _MARKS = ".marks.json"
 _OPENS = (
     "dsl-scan opens scans (folders NAME.dsl), results (folders NAME.zarr), plans and pattern sets (.json),"
-    " campaigns, calibrated rigs, and reference spectra (.csv, .txt, ENVI libraries .sli)."
+    " campaigns, calibrated rigs, and reference spectra (text, ENVI, ASD, SVC, JCAMP-DX, CGATS and others)."
     " Use File, Import for folders of images."
 )
 

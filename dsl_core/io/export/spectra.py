@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from dsl_core.errors import StoreError
 from dsl_core.io.export.common import provenance_of, require_suffix
-from dsl_core.io.spectra.reference_file import MEAN, WAVELENGTH
+from dsl_core.io.spectra.formats.own_table import MEAN, WAVELENGTH
 from dsl_core.io.staging import staged
 
 Floats = NDArray[np.floating[Any]]

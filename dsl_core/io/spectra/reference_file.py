@@ -1,24 +1,18 @@
-"""Spectra to compare with: text of a spectroradiometer, an ENVI library, a table of this program."""
+"""Spectra to compare with, from any file that contains reflectance."""
 
 from __future__ import annotations
 
-import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.reading import read_bounded
-from dsl_core.io.spectra.envi_library import read_library
-from dsl_core.io.spectra.spectrum_file import read_spectrum
+from dsl_core.io.spectra.catalogue import format_of
+from dsl_core.io.spectra.records import Floats, Spectrum
+from dsl_core.io.spectra.spectrum_file import of_kind
 from dsl_core.model.spectral import SpectralCurve
 
-Floats = NDArray[np.float64]
-#: The first column of a table of this program, and how a column of reflectance is called behind its name.
-WAVELENGTH, MEAN = "wavelength_nm", ": reflectance (1)"
-LIBRARY_SUFFIXES = (".sli", ".hdr")
 #: Fewer values make no spectrum.
 MIN_VALUES = 2
 #: Of what was deleted in the midst of a spectrum, so much is bridged by a straight line.
@@ -28,7 +22,7 @@ VISIBLE_NM = 380.0, 780.0
 
 @dataclass(frozen=True)
 class Reference:
-    """A spectrum with the name that it has in its file; the only one of a text file has none."""
+    """A spectrum with the name that it has in its file; the only one of a file may have none."""
 
     name: str
     curve: SpectralCurve
@@ -43,14 +37,12 @@ class ReferenceFile:
 
 
 def read_references(path: Path) -> ReferenceFile:
-    """All spectra of a file, whatever range they cover; raises `CalibrationError`."""
-    if path.suffix.lower() in LIBRARY_SUFFIXES:
-        nm, names, values = read_library(path)
-        return _gathered(path, names, [(nm, _without_gaps(nm, each)) for each in values])
-    if _is_table(path):
-        return _read_table(path)
-    curve = read_spectrum(path, covers_nm=(float("inf"), float("-inf")), radiance=False)
-    return ReferenceFile((Reference("", curve),))
+    """All reflectances of a file, whatever range they cover; raises `CalibrationError`."""
+    kind = format_of(path)
+    spectra = of_kind(path, kind.read(path), radiance=False, all_unstated=True)
+    if len(spectra) == 1 and not kind.is_library:
+        spectra = [replace(spectra[0], name="")]
+    return _gathered(path, spectra)
 
 
 def read_reference(path: Path, name: str = "") -> SpectralCurve:
@@ -60,34 +52,6 @@ def read_reference(path: Path, name: str = "") -> SpectralCurve:
         if name in (reference.name, "") and (name or len(found) == 1):
             return reference.curve
     raise CalibrationError(f"{path.name} contains no spectrum {name!r}. Add the reference again.")
-
-
-def _is_table(path: Path) -> bool:
-    """Whether this program wrote a table; only its names tell spectra from their deviations."""
-    try:
-        head = next(iter(_lines(path)), "")
-    except OSError:
-        return False
-    return head.startswith(f"{WAVELENGTH},") and MEAN in head
-
-
-def _lines(path: Path) -> list[str]:
-    """The lines of a table without what it says of itself; raises `OSError`."""
-    text = read_bounded(path).decode("utf-8-sig", errors="replace")
-    return [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
-
-
-def _read_table(path: Path) -> ReferenceFile:
-    try:
-        head, *rows = csv.reader(_lines(path))
-        cells = np.array([[float(cell or "nan") for cell in row] for row in rows]).reshape(-1, len(head))
-    except (ValueError, csv.Error) as error:
-        raise CalibrationError(
-            f"{path.name}: a cell is not a number ({error}). Export the table again."
-        ) from error
-    columns = [i for i, title in enumerate(head) if title.endswith(MEAN)]
-    names = [head[i].removesuffix(MEAN) for i in columns]
-    return _gathered(path, names, [(cells[:, 0], cells[:, i]) for i in columns])
 
 
 def _without_gaps(nm: Floats, values: Floats) -> Floats:
@@ -105,19 +69,19 @@ def _without_gaps(nm: Floats, values: Floats) -> Floats:
     return kept
 
 
-def _gathered(path: Path, names: list[str], spectra: list[tuple[Floats, Floats]]) -> ReferenceFile:
+def _gathered(path: Path, spectra: list[Spectrum]) -> ReferenceFile:
     found: dict[str, SpectralCurve] = {}
     empty = []
-    for place, (name, (nm, values)) in enumerate(zip(names, spectra, strict=True), 1):
+    for place, spectrum in enumerate(spectra, 1):
+        name = spectrum.name or ("" if len(spectra) == 1 else f"spectrum {place}")
+        values = _without_gaps(spectrum.nm, spectrum.values)
         known = np.isfinite(values)
         if np.count_nonzero(known) < MIN_VALUES:
             empty.append(name)
-        elif np.any(np.diff(nm[known]) <= 0):
-            raise CalibrationError(f"{path.name}: the wavelengths do not rise. Export the table again.")
-        else:
-            # Names bring a reference back with its result, so each must be one of a kind.
-            own = name if name not in found else f"{name} ({place})"
-            found[own] = SpectralCurve.of(nm[known], values[known])
+            continue
+        # Names bring a reference back with its result, so each must be one of a kind.
+        own = name if name not in found else f"{name} ({place})"
+        found[own] = SpectralCurve.of(spectrum.nm[known], values[known])
     if not found:
         raise CalibrationError(f"No spectrum of {path.name} contains values. Choose another file.")
     return ReferenceFile(tuple(Reference(name, curve) for name, curve in found.items()), tuple(empty))

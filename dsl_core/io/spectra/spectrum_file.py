@@ -1,134 +1,119 @@
-"""Spectra from the text files of spectroradiometers: two columns after a header of any length."""
+"""Spectra of a file as what a calibration needs: radiance, or a share of light such as reflectance."""
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.reading import read_bounded
+from dsl_core.io.spectra.catalogue import read_spectra
+from dsl_core.io.spectra.records import Floats, Quantity, Spectrum
 from dsl_core.model.spectral import SpectralCurve
 
 #: What radiance is kept in.
 RADIANCE_UNIT = "W/(sr m2 nm)"
-#: Fewer rows of numbers are part of a header.
-MIN_ROWS = 8
-_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\b", re.IGNORECASE)
-_PREFIXES = {"": 1.0, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "k": 1e3}
-#: "W/(sr m2 nm)", "mW/m^2/sr/nm", "W·sr⁻¹·m⁻²·nm⁻¹": a power, then steradian somewhere behind it.
-_RADIANCE = re.compile(r"(?<![a-zA-Zµμ])([mµμuk]?)W\b[^\n]{0,12}?(?:sr|m)", re.UNICODE)
-_PER_MICROMETRE = re.compile(r"W\b[^\n]*?[/ *·(](?:um|µm|μm)\b")
-_MICROMETRES = re.compile(
-    r"(?:wavelength|lambda|λ)(?:(?!nm)[^\n\t;,]){0,20}?[\[(/ ](?:um|µm|μm)\b", re.IGNORECASE
-)
-_OTHER = {"percent": re.compile(r"%|percent", re.IGNORECASE), "counts": re.compile(r"\bcounts?\b", re.I)}
+#: Shares above this can only be percentages, above a hundred times this only counts.
+MOST_SHARE = 2.0
+#: Radiance without a stated unit above this is something else; with one, above what the Sun's disc has.
+_MOST_UNSTATED, _MOST_RADIANCE = 100.0, 1e5
+_VISIBLE_NM = 380.0, 780.0
+_CALLED: dict[Quantity, str] = {"reflectance": "reflectance (a share or percent)", "counts": "counts"}
 
 
 def read_spectrum(
     path: Path, covers_nm: tuple[float, float] = (430.0, 660.0), radiance: bool = True
 ) -> SpectralCurve:
-    """The first spectrum of a text file: wavelength (nm) and value in columns, whatever stands around them.
+    """The only spectrum of a file that is radiance, or (``radiance=False``) a share such as reflectance.
 
-    Separators are tabs, semicolons, commas or spaces; with tabs or semicolons a decimal comma is understood.
-    Radiance is returned in W/(sr m2 nm), a stated mW or µW converted; ``radiance=False`` reads a quantity
-    without unit such as a reflectance (a stated percentage is converted). Raises `CalibrationError` that
-    names file and line for wavelengths in other units, out of order or too few, values that are not numbers,
-    and quantities that are not radiance.
+    Any format of `dsl_core.io.spectra.catalogue`. Radiance is returned in W/(sr m2 nm), other stated units
+    converted; a percentage becomes a share. Raises `CalibrationError` that names the file for wavelengths
+    that are no nanometres or do not cover the range, values that are missing, other quantities, and several
+    spectra where one is needed.
     """
-    try:
-        text = read_bounded(path).decode("utf-8-sig", errors="replace")
-    except OSError as error:
+    found = of_kind(path, read_spectra(path), radiance)
+    if len(found) > 1:
+        names = ", ".join(repr(each.name or f"column {i}") for i, each in enumerate(found[:6], 2))
         raise CalibrationError(
-            f"The spectrum {path} cannot be read ({error.strerror or error}). Correct its path."
-        ) from error
-    header, rows, numbers = _split(text)
-    if len(rows) < MIN_ROWS:
-        raise CalibrationError(
-            f"{path.name} contains no table of wavelengths and values. Export the spectrum as text in"
-            " two columns."
+            f"{path.name} contains {len(found)} spectra ({names}{', ...' if len(found) > 6 else ''}); one is"
+            " needed. Export it alone."
         )
-    nm, values = np.array(rows).T
-    _check_values(path, nm, values, numbers)
-    _check_wavelengths(path, header, nm, covers_nm)
-    factor, unit = _factor(path, header) if radiance else (_share(header, values), "1")
-    return SpectralCurve.of(nm, values * factor, unit=unit)
+    return _curve(path, found[0], covers_nm, radiance)
 
 
-def _split(text: str) -> tuple[str, list[tuple[float, float]], list[int]]:
-    """The header, the rows of the first table, and the number of each row's line."""
-    header: list[str] = []
-    rows: list[tuple[float, float]] = []
-    numbers: list[int] = []
-    for number, line in enumerate(text.splitlines(), 1):
-        row = _row(line)
-        if row is not None:
-            rows.append(row)
-            numbers.append(number)
-        elif len(rows) >= MIN_ROWS:
-            break  # behind the table
-        else:
-            header += [line, *(f"{a:g} {b:g}" for a, b in rows)]
-            rows, numbers = [], []
-    return "\n".join(header), rows, numbers
+def read_radiances(path: Path, covers_nm: tuple[float, float] = (430.0, 660.0)) -> tuple[SpectralCurve, ...]:
+    """Every radiance of a file, which are readings of one light; raises `CalibrationError`."""
+    return tuple(_curve(path, each, covers_nm, True) for each in of_kind(path, read_spectra(path), True))
 
 
-def _row(line: str) -> tuple[float, float] | None:
-    cells = re.split(r"[;\t]", line.strip()) if re.search(r"[;\t]", line.strip()) else None
-    if cells is not None:
-        cells = [cell.strip().strip('"').replace(",", ".") for cell in cells]
-    else:
-        cells = [cell.strip('"') for cell in re.split(r"[,\s]+", line.strip())]
-    cells = [cell for cell in cells if cell]
-    if len(cells) < 2 or not all(_NUMBER.fullmatch(cell) for cell in cells[:2]):
-        return None
-    return float(cells[0]), float(cells[1])
+def of_kind(
+    path: Path, spectra: list[Spectrum], radiance: bool, all_unstated: bool = False
+) -> list[Spectrum]:
+    """The spectra that are radiance, or shares: those that say so, else those that say nothing.
+
+    ``all_unstated`` takes both. Values become W/(sr m2 nm) or shares. Raises `CalibrationError` when there is
+    none.
+    """
+    wanted: tuple[Quantity, ...] = ("radiance",) if radiance else ("reflectance", "transmittance")
+    stated = [each for each in spectra if each.quantity in wanted]
+    if all_unstated:
+        wanted = (*wanted, "unstated")
+    found = [each for each in spectra if each.quantity in wanted] if stated else []
+    found = found or [each for each in spectra if each.quantity == "unstated"]
+    if not found:
+        kinds = sorted({_CALLED.get(each.quantity, each.quantity) for each in spectra})
+        needed = f"a spectral radiance. Export radiance in {RADIANCE_UNIT}" if radiance else "a reflectance"
+        way = "" if radiance else ". Divide it by the spectrum of a white standard, or export reflectance"
+        raise CalibrationError(f"{path.name} contains {' and '.join(kinds)}, not {needed}{way}.")
+    return [_as_radiance(path, each) if radiance else _as_share(path, each) for each in found]
 
 
-def _check_values(path: Path, nm: np.ndarray, values: np.ndarray, numbers: list[int]) -> None:
-    bad = ~(np.isfinite(nm) & np.isfinite(values))
-    if bad.any():
+def _as_share(path: Path, spectrum: Spectrum) -> Spectrum:
+    most = _most(spectrum)
+    if most > 100 * MOST_SHARE:
         raise CalibrationError(
-            f"{path.name}, line {numbers[int(bad.argmax())]}: a value is not a finite number."
-            " Measure this spectrum again, or leave out the range that the instrument does not cover."
+            f"{path.name} contains values up to {most:g}; reflectance from 0 to 1, or percent, is needed."
+            " Divide it by the spectrum of a white standard, or export reflectance."
         )
+    if spectrum.scaled or most <= MOST_SHARE:
+        return spectrum
+    return Spectrum(spectrum.name, spectrum.nm, spectrum.values * 0.01, spectrum.quantity, True)
 
 
-def _check_wavelengths(path: Path, header: str, nm: np.ndarray, covers_nm: tuple[float, float]) -> None:
-    if nm.max() < 10 or _MICROMETRES.search(header):
+def _as_radiance(path: Path, spectrum: Spectrum) -> Spectrum:
+    most = _most(spectrum)
+    if most > (_MOST_RADIANCE if spectrum.scaled else _MOST_UNSTATED):
+        stated = RADIANCE_UNIT if spectrum.scaled else "no stated unit"
         raise CalibrationError(
-            f"{path.name}: the wavelengths, {nm.min():g} to {nm.max():g}, are micrometres; nanometres are"
-            " needed. Export the spectrum in nm."
+            f"{path.name} contains values up to {most:g} in {stated}; a spectral radiance is not so large."
+            f" Export radiance in {RADIANCE_UNIT}, with its unit over the column."
         )
-    if np.any(np.diff(nm) <= 0):
-        at = int(np.argmax(np.diff(nm) <= 0))
+    return spectrum
+
+
+def _most(spectrum: Spectrum) -> float:
+    """The largest value where light is visible, where no instrument divides noise by noise."""
+    low, high = _VISIBLE_NM
+    inside = (spectrum.nm >= low) & (spectrum.nm <= high) & np.isfinite(spectrum.values)
+    values = spectrum.values[inside] if np.count_nonzero(inside) > 1 else spectrum.values
+    return float(np.nanmax(values, initial=0.0))
+
+
+def _curve(path: Path, spectrum: Spectrum, covers_nm: tuple[float, float], radiance: bool) -> SpectralCurve:
+    _require_range(path, spectrum.nm, covers_nm)
+    missing = ~np.isfinite(spectrum.values)
+    if missing.any():
         raise CalibrationError(
-            f"{path.name}: the wavelengths do not rise: {nm[at + 1]:g} comes after {nm[at]:g} nm. Export one"
-            " spectrum per file, in rising order."
+            f"{path.name} has no value at {spectrum.nm[int(missing.argmax())]:g} nm. Measure this spectrum"
+            " again, or leave out the range that the instrument does not cover."
         )
+    return SpectralCurve.of(spectrum.nm, spectrum.values, unit=RADIANCE_UNIT if radiance else "1")
+
+
+def _require_range(path: Path, nm: Floats, covers_nm: tuple[float, float]) -> None:
     low, high = covers_nm
     if nm[0] > low or nm[-1] < high:
         raise CalibrationError(
             f"{path.name} covers {nm[0]:g} to {nm[-1]:g} nm; {low:g} to {high:g} nm are needed."
             " Measure the whole range."
         )
-
-
-def _factor(path: Path, header: str) -> tuple[float, str]:
-    """Factor to W/(sr m2 nm), one where no unit is stated."""
-    found = _RADIANCE.search(header)
-    if found is None:
-        for name, pattern in _OTHER.items():
-            if pattern.search(header):
-                raise CalibrationError(
-                    f"{path.name} contains {name}, not a spectral radiance. Export radiance in W/(sr m2 nm)."
-                )
-        return 1.0, RADIANCE_UNIT
-    per_micrometre = 1e-3 if _PER_MICROMETRE.search(header) else 1.0
-    return _PREFIXES[found[1]] * per_micrometre, RADIANCE_UNIT
-
-
-def _share(header: str, values: np.ndarray) -> float:
-    """Factor from a percentage to a share; values far above one can only be percentages."""
-    return 0.01 if _OTHER["percent"].search(header) or values.max() > 2 else 1.0

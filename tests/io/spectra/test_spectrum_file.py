@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dsl_core.errors import CalibrationError
-from dsl_core.io.spectra.spectrum_file import read_spectrum
+from dsl_core.io.spectra.spectrum_file import read_radiances, read_spectrum
 
 NM = np.arange(380.0, 781.0, 5.0)
 VALUES = np.exp(-0.5 * ((NM - 550) / 40) ** 2) * 0.02
@@ -44,11 +44,48 @@ def test_headers_and_separators_are_tolerated(
 
 @pytest.mark.parametrize(
     ("unit", "scale"),
-    [("mW/(sr m2 nm)", 1e3), ("µW/(sr·m²·nm)", 1e6), ("W/(m2 sr um)", 1e3), ("W/(m2 sr nm)", 1.0)],
+    [
+        *(("mW/(sr m2 nm)", 1e3), ("µW/(sr·m²·nm)", 1e6), ("W/(m2 sr um)", 1e3), ("W/(m2 sr nm)", 1.0)),
+        *(("µW/cm²/sr/nm", 1e2), ("W·sr⁻¹·m⁻³", 1e9), ("10^-3 W/m^2/nm/sr", 1e3), ("nW/cm2/nm/sr", 1e5)),
+    ],
 )
 def test_stated_units_are_converted(tmp_path: Path, unit: str, scale: float) -> None:
     curve = read_spectrum(_write(tmp_path / "red.txt", f"wavelength (nm)\tradiance {unit}", scale=scale))
     np.testing.assert_allclose(curve.values, VALUES, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("rows", "header"),
+    [
+        ([f"{nm:g};{value:.8f}" for nm, value in zip(NM[::-1], VALUES[::-1], strict=True)], "nm;radiance"),
+        ([f"{nm / 1000:.3f} {v:.8f}" for nm, v in zip(NM, VALUES, strict=True)], "wavelength [µm] radiance"),
+        ([f"{nm / 1000:.3f} {v:.8f}" for nm, v in zip(NM, VALUES, strict=True)], ""),
+        ([f"{nm:.1f} {v:.8f}".replace(".", ",") for nm, v in zip(NM, VALUES, strict=True)], "nm L"),
+        ([f'"{nm:.1f}","{v:.8f}"'.replace(".", ",") for nm, v in zip(NM, VALUES, strict=True)], ""),
+        ([f"{i};{nm};{v:.8f}" for i, (nm, v) in enumerate(zip(NM, VALUES, strict=True))], "No.;Wvl;L"),
+        ([f"{nm};{v:.8f};.1" for nm, v in zip(NM, VALUES, strict=True)], "nm;radiance;standard deviation"),
+        (
+            [f"{nm};{v:.8f};7" for nm, v in zip(NM, VALUES, strict=True)],
+            "Wave;L;DN\n[nm];[W/(sr m2 nm)];[counts]",
+        ),
+    ],
+)
+def test_order_micrometres_decimal_commas_and_further_columns_are_understood(
+    tmp_path: Path, rows: list[str], header: str
+) -> None:
+    path = tmp_path / "red.csv"
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    curve = read_spectrum(path)
+    np.testing.assert_allclose(curve.wavelengths_nm, NM, rtol=1e-6)
+    np.testing.assert_allclose(curve.values, VALUES, atol=6e-9)
+
+
+def test_every_radiance_of_a_file_is_a_reading(tmp_path: Path) -> None:
+    rows = [f"{nm};{value:.8f};{value * 2:.8f}" for nm, value in zip(NM, VALUES, strict=True)]
+    path = tmp_path / "red.csv"
+    path.write_text("\n".join(["nm;L1 [W/(sr m2 nm)];L2 [W/(sr m2 nm)]", *rows]), encoding="utf-8")
+    first, second = read_radiances(path)
+    np.testing.assert_allclose(2 * np.array(first.values), second.values, atol=3e-8)
 
 
 def test_percentages_become_shares(tmp_path: Path) -> None:
@@ -66,11 +103,16 @@ def _table(rows: list[str], header: str = "nm;W/(sr m2 nm)") -> str:
         (_table([f"{nm / 1000};1" for nm in NM]), "micrometres"),
         (_table([f"{nm};1" for nm in NM], "wavelength [µm];value"), "micrometres"),
         (_table([f"{nm};1" for nm in NM if nm < 640]), "430 to 660 nm are needed"),
-        (_table([f"{nm};1" for nm in NM[::-1]]), "do not rise"),
         (_table([f"{nm};1" for nm in [*NM[:20], NM[18], *NM[20:]]]), "do not rise"),
         (_table([f"{nm};{'nan' if nm == 550 else 1}" for nm in NM]), "line 36"),
         (_table([f"{nm};1" for nm in NM], "nm;reflectance %"), "percent"),
         (_table([f"{nm};1" for nm in NM], "nm;counts"), "counts"),
+        (_table([f"{nm};1" for nm in NM], "nm;W/(m2 nm)"), "irradiance"),
+        (_table([f"{nm};{'' if nm == 550 else 1}" for nm in NM]), "no value at 550 nm"),
+        (_table([f"{nm};1;2" for nm in NM], ""), r"2 spectra \('column 2', 'column 3'\)"),
+        (_table([f"{nm};9000" for nm in NM], ""), "up to 9000 in no stated unit"),
+        (_table([f"{nm * 20};1" for nm in NM], "cm-1;radiance"), "over wavenumber"),
+        (_table([f"{nm * 200};1" for nm in NM], ""), "between 150 and 50000 nm are needed"),
         ("nothing here\nbut words", "no table"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from PySide6.QtCore import QModelIndex, QSize, Qt
@@ -23,13 +24,26 @@ from dsl_app.results.state import Mark, ResultsState
 from dsl_app.shared.theme import DARK, Theme
 from dsl_app.shared.widgets.forms import label, named, push_button, quiet
 from dsl_app.shared.widgets.layouts import STRETCH, column_of, row_of
+from dsl_core.io.spectra.catalogue import FORMATS, SUFFIXES
 
 KEY = Qt.ItemDataRole.UserRole
 EMPTY = (
     "Click the picture to pin a spectrum, draw a region with the tools above it, or drop a file with a"
     " reference spectrum here."
 )
-_FORMATS = "Spectra (*.csv *.txt *.tsv *.dat *.asc *.sli *.hdr);;All files (*)"
+
+
+def _filter(name: str, suffixes: Iterable[str]) -> str:
+    return f"{name} ({' '.join(f'*{suffix}' for suffix in suffixes)})"
+
+
+_FORMATS = ";;".join(
+    [
+        _filter("Spectra", SUFFIXES),
+        *(_filter(each.name, each.suffixes) for each in FORMATS if each.suffixes),
+        "All files (*)",
+    ]
+)
 
 
 class MarksPanel(QWidget):
@@ -68,7 +82,7 @@ class MarksPanel(QWidget):
         self.tree.setMinimumHeight(88)
         self.reference = push_button(
             "Add reference…",
-            "Open a spectrum (text with nm and reflectance) or an ENVI library (.sli) to compare with",
+            "Open a file with reflectance to compare with: text, CSV, ENVI, ASD, SVC, JCAMP-DX, CGATS",
         )
         self.remove = push_button("Remove", "Remove the selected pin, region or reference (Delete)")
         self.copy = push_button(

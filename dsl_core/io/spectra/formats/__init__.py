@@ -1,0 +1,1 @@
+"""One file for each format of spectra; `dsl_core.io.spectra.catalogue` lists them."""

@@ -1,0 +1,44 @@
+"""Tables that this program exported: spectra with their deviations next to them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.spectra.records import Format, Spectrum, content_of
+from dsl_core.io.spectra.text import decoded
+
+#: The first column of a table of this program, and how a column of reflectance is called behind its name.
+WAVELENGTH, MEAN = "wavelength_nm", ": reflectance (1)"
+_HEAD = re.compile(rf"^(?:\ufeff)?{WAVELENGTH},[^\n]*{re.escape(MEAN)}", re.MULTILINE)
+
+
+def is_own(path: Path, head: bytes) -> bool:
+    """Whether this program wrote a table; only its names tell spectra from their deviations."""
+    lines = (line for line in decoded(head).splitlines() if not line.startswith("#"))
+    return bool(_HEAD.match(next(lines, "")))
+
+
+def read_own(path: Path) -> list[Spectrum]:
+    """Every spectrum of a table; raises `CalibrationError`."""
+    lines = decoded(content_of(path)).splitlines(keepends=True)
+    try:
+        head, *rows = csv.reader([line for line in lines if not line.startswith("#")])
+        cells = np.array([[float(cell or "nan") for cell in row] for row in rows]).reshape(-1, len(head))
+    except (ValueError, csv.Error) as error:
+        raise CalibrationError(
+            f"{path.name}: a cell is not a number ({error}). Export the table again."
+        ) from error
+    columns = [i for i, title in enumerate(head) if title.endswith(MEAN)]
+    if np.any(~(np.diff(cells[:, 0]) > 0)):
+        raise CalibrationError(f"{path.name}: the wavelengths do not rise. Export the table again.")
+    return [
+        Spectrum(head[i].removesuffix(MEAN), cells[:, 0], cells[:, i], "reflectance", True) for i in columns
+    ]
+
+
+FORMAT = Format("table of dsl-scan", (".csv",), is_own, read_own, is_library=True)

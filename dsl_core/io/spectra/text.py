@@ -1,0 +1,186 @@
+"""Text of instruments: its encoding, and the tables of numbers in it with the words over their columns."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.spectra.records import MOST_NUMBER, Floats
+
+#: Fewer rows of numbers are part of a header.
+MIN_ROWS = 8
+#: More cells are no spectra; they would fill the memory.
+MOST_CELLS = 20_000_000
+_NUMBER = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|[-+]?(?:nan|inf)\b", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?")
+_UNIT = re.compile(r"[\[(].*[\])]|nm|um|µm|μm|%|counts?|1|[nmµuk]?W[/·* ].*", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of numbers: ``cells`` (rows, columns) with NaN where there is none.
+
+    ``titles`` has what stands over each column, units included, and ``names`` the same without a separate
+    line of units; ``header`` is all text before the table and ``lines`` has the number of each row's line.
+    """
+
+    header: str
+    titles: tuple[str, ...]
+    names: tuple[str, ...]
+    cells: Floats
+    lines: tuple[int, ...]
+
+
+def decoded(content: bytes) -> str:
+    """Text in UTF-8 or UTF-16, and in the alphabet of Western Windows where it is neither."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def is_text(content: bytes) -> bool:
+    """Whether the beginning of a file can be text."""
+    return content[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" not in content[:4096]
+
+
+def cells_of(line: str) -> list[str]:
+    """The cells of a line: by tabs or semicolons, else by commas, else by spaces; quotes are taken off.
+
+    With tabs, semicolons, and between spaces where no other reading makes sense, a decimal comma becomes a
+    point.
+    """
+    line = line.strip("\r\n ")
+    if ";" in line or "\t" in line:
+        cells = [_pointed(cell) for cell in re.split(r"[;\t]", line)]
+    elif '"' in line and "," in line:
+        cells = [_pointed(cell) for cell in _quoted(line)]
+    else:
+        words = line.split()
+        if len(words) > 1 and "," in line and all(_DECIMAL_COMMA.fullmatch(word) for word in words):
+            cells = [_pointed(word) for word in words]
+        elif "," in line:
+            cells = [cell.strip().strip('"') for cell in line.split(",")]
+            apart = line.replace(",", " ").split()
+            if any(" " in cell for cell in cells) and all(map(_NUMBER.fullmatch, apart)):
+                cells = apart
+        else:
+            cells = [word.strip('"') for word in words]
+    while cells and not cells[-1].strip():
+        cells.pop()
+    return cells
+
+
+def _pointed(cell: str) -> str:
+    cell = cell.strip().strip('"').strip()
+    return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
+
+
+def _quoted(line: str) -> list[str]:
+    try:
+        return next(csv.reader([line], skipinitialspace=True), [])
+    except csv.Error:
+        return line.split(",")
+
+
+def tables_of(path: Path, text: str) -> list[Table]:
+    """All tables of a text; raises `CalibrationError` for a number that is not finite."""
+    tables: list[Table] = []
+    header: list[str] = []
+    rows: list[list[str]] = []
+    numbers: list[int] = []
+    sources: list[str] = []
+
+    def end() -> None:
+        nonlocal header, rows, numbers, sources
+        if len(rows) >= MIN_ROWS:
+            tables.append(_table(path, header, rows, numbers, sources[0]))
+            header = []
+        else:
+            header += sources
+        rows, numbers, sources = [], [], []
+
+    for number, line in enumerate(text.splitlines(), 1):
+        cells = cells_of(line)
+        is_missing = bool(rows) and len(cells) == 1 and line.strip(" \r\n")[-1:] in (";", "\t", ",")
+        if is_row(cells) or (is_missing and _NUMBER.fullmatch(cells[0])):
+            rows.append(cells)
+            numbers.append(number)
+            sources.append(line)
+        else:
+            end()
+            header.append(line)
+    end()
+    return tables
+
+
+def is_row(cells: list[str]) -> bool:
+    """Whether a line is a row of a table: a number first, and another behind it."""
+    return len(cells) > 1 and bool(_NUMBER.fullmatch(cells[0])) and any(map(_NUMBER.fullmatch, cells[1:]))
+
+
+def number_of(cell: str) -> float:
+    """The number in a cell, NaN where there is none, or one that marks what was deleted."""
+    number = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
+    return number if abs(number) < MOST_NUMBER else float("nan")
+
+
+def _table(path: Path, header: list[str], rows: list[list[str]], numbers: list[int], first: str) -> Table:
+    width = max(len(row) for row in rows)
+    if width * len(rows) > MOST_CELLS:
+        raise CalibrationError(
+            f"{path.name} has a table of {len(rows)} rows and {width} columns; at most {MOST_CELLS} cells are"
+            " read. Split the file."
+        )
+    cells = np.full((len(rows), width), np.nan)
+    for i, row in enumerate(rows):
+        values = [number_of(cell) for cell in row]
+        cells[i, : len(row)] = values
+        if any(_NUMBER.fullmatch(cell) and not math.isfinite(float(cell)) for cell in row):
+            raise CalibrationError(
+                f"{path.name}, line {numbers[i]}: a value is not a finite number. Measure this spectrum"
+                " again, or leave out the range that the instrument does not cover."
+            )
+    separator = ";" if re.search(r"[;\t]", first.strip()) else "," if "," in first else " "
+    titles, names = _over(header, width, separator)
+    return Table("\n".join(header), titles, names, cells, tuple(numbers))
+
+
+def _over(header: list[str], width: int, separator: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What stands over the columns: titles with units, and names; empty words where nothing does."""
+    lines = [line for line in header[-6:] if line.strip(" \t;,\r#")]
+    found = [_fitting(line, width, separator) for line in reversed(lines)]
+    nearest = found[0] if found else None
+    if nearest is None:
+        return ("",) * width, ("",) * width
+    above = found[1] if len(found) > 1 else None
+    if above is not None and all(_UNIT.fullmatch(cell) for cell in nearest if cell):
+        titles = tuple(f"{a} {b}".strip() for a, b in zip(above, nearest, strict=True))
+        return titles, tuple(above)
+    return tuple(nearest), tuple(nearest)
+
+
+def _fitting(line: str, width: int, separator: str) -> list[str] | None:
+    """The cells of a header's line if there is one for each column, but for an empty last one."""
+    line = line.strip("# \r")
+    if separator == ";":
+        readings = [re.split(r"[;\t]", line)]
+    elif separator == ",":
+        readings = [_quoted(line)]
+    else:
+        readings = [re.split(r"\s{2,}|\t", line), re.findall(r'"[^"]*"|\S+', line)]
+    for reading in readings:
+        cells = [cell.strip().strip('"').strip() for cell in reading]
+        while cells and not cells[-1]:
+            cells.pop()
+        if len(cells) > 1 and width - 1 <= len(cells) <= width and not is_row(cells):
+            return cells + [""] * (width - len(cells))
+    return None

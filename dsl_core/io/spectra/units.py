@@ -1,0 +1,111 @@
+"""What the words around a column say: the quantity, its unit, and the unit of the wavelengths."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.spectra.records import Floats, Quantity
+
+_PREFIXES = {"": 1.0, "n": 1e-9, "m": 1e-3, "µ": 1e-6, "μ": 1e-6, "u": 1e-6, "k": 1e3}
+#: Power, then area and steradian somewhere behind it: "mW/m^2/sr/nm", "W·sr⁻¹·m⁻²·nm⁻¹", "W/(sr sqm nm)".
+_POWER = re.compile(r"(?<![a-zA-Zµμ])([nmµμuk]?)(?:W|Watts?)(?![a-zA-Z])([^\n]{0,40})")
+_TEN = re.compile(r"(?:10\s?\^\s?\(?|10[eE]|1[eE])([-+−]?\d{1,2})\)?[ ·*×]{0,3}$")
+_MICROMETRE = re.compile(r"(?<![a-zA-Z])(?:um|µm|μm|micromet(?:er|re)s?|microns?)(?![a-zA-Z])", re.IGNORECASE)
+_NANOMETRE = re.compile(r"(?<![a-zA-Z])(?:nm|nanomet(?:er|re)s?)(?![a-zA-Z])", re.IGNORECASE)
+_ANGSTROM = re.compile(r"(?<![a-zA-Z])(?:Å|angstr(?:o|ö)ms?)(?![a-zA-Z])", re.IGNORECASE)
+_WAVENUMBER = re.compile(r"wave ?number|cm\s?(?:\^?-1|⁻¹)|1/cm", re.IGNORECASE)
+_PERCENT = re.compile(r"%|percent", re.IGNORECASE)
+#: In the order in which they are tried; a unit of power decides before all of them.
+_WORDS: tuple[tuple[Quantity, re.Pattern[str]], ...] = (
+    ("irradiance", re.compile(r"irrad|\birr\b", re.IGNORECASE)),
+    ("absorbance", re.compile(r"absorb|log ?\(1/R\)", re.IGNORECASE)),
+    ("transmittance", re.compile(r"transmi", re.IGNORECASE)),
+    ("reflectance", re.compile(r"reflect|reflekt|remission|albedo", re.IGNORECASE)),
+    ("counts", re.compile(r"\bcounts?\b|\bDN\b|\bscope\b|digital number", re.IGNORECASE)),
+    ("radiance", re.compile(r"radiance|strahldichte|\brad\b", re.IGNORECASE)),
+)
+#: Columns that hold no spectrum of their own.
+_BESIDE = re.compile(
+    r"std|st\. ?dev|deviation|uncertain|unsicherheit|\berror|\bsd\b|\bsem\b|variance|pixel|chan|flag|wave"
+    r"|\bindex\b|lambda|λ|^\W*n[or]\b",
+    re.IGNORECASE,
+)
+
+
+def is_beside(title: str) -> bool:
+    """Whether a column's title says that it is no spectrum: a deviation, a pixel number, wavelengths."""
+    return bool(_BESIDE.search(title))
+
+
+def quantity_of(title: str, around: str = "") -> tuple[Quantity, float, bool]:
+    """The quantity of a column, the factor to shares or W/(sr m2 nm), and whether its unit is stated.
+
+    ``title`` is what is written over the column, ``around`` the rest of the header, which decides only where
+    the title says nothing.
+    """
+    for text in (title, around):
+        found = _quantity(text, everywhere=text is title)
+        if found[0] != "unstated":
+            return found
+    return "unstated", 1.0, False
+
+
+def _quantity(text: str, everywhere: bool) -> tuple[Quantity, float, bool]:
+    unit = _POWER.search(text)
+    if unit is not None and re.search(r"sr|ster", unit[2]):
+        return "radiance", _to_radiance(text[: unit.start()], unit[1], unit[2]), True
+    if unit is not None and re.search(r"/ ?\(?c?m|m\^?-?2|m²|m⁻²", unit[2]):
+        return "irradiance", 1.0, True
+    for quantity, words in _WORDS:
+        found = words.search(text)
+        if found is None:
+            continue
+        near = text if everywhere else text[found.start() : found.start() + 40].split("\n")[0]
+        is_share = quantity in ("reflectance", "transmittance")
+        if is_share and _PERCENT.search(near):
+            return quantity, 0.01, True
+        return quantity, 1.0, is_share and bool(re.search(r"\[1(?:\.0)?\]|\(1\)|0 ?[-.…] ?1\b", near))
+    if everywhere and _PERCENT.search(text):
+        return "reflectance", 0.01, True
+    return "unstated", 1.0, False
+
+
+def _to_radiance(before: str, prefix: str, behind: str) -> float:
+    factor = _PREFIXES[prefix]
+    if re.search(r"(?<![a-z])(?:cm\s?(?:\^?-?2|²|⁻²)|sq ?cm)", behind):
+        factor *= 1e4
+    if re.search(r"(?<![a-zA-Zµμn])m\s?(?:\^?-?3|³|⁻³)", behind):
+        factor *= 1e-9
+    elif _MICROMETRE.search(behind):
+        factor *= 1e-3
+    ten = _TEN.search(before)
+    return factor * 10.0 ** int(ten[1].replace("−", "-")) if ten else factor
+
+
+def to_nanometres(path: Path, given: Floats, title: str, around: str = "") -> Floats:
+    """Wavelengths in nm; raises `CalibrationError` where the numbers contradict the stated unit."""
+    least, most = float(given.min()), float(given.max())
+    if _WAVENUMBER.search(title):
+        raise CalibrationError(
+            f"{path.name} is over wavenumber ({least:g} to {most:g}); nanometres are needed. Export the"
+            " spectrum over wavelength."
+        )
+    words = title if _NANOMETRE.search(title) or _MICROMETRE.search(title) else f"{title}\n{_spoken(around)}"
+    if _ANGSTROM.search(words) and most > 1500:
+        return given / 10.0
+    in_nm, in_um = bool(_NANOMETRE.search(words)), bool(_MICROMETRE.search(words))
+    is_small = most < 50
+    if (in_um and not is_small) or (in_nm and not in_um and is_small):
+        raise CalibrationError(
+            f"{path.name}: the wavelengths, {least:g} to {most:g}, are {'not ' if in_um else ''}micrometres,"
+            f" but the header states {'micrometres' if in_um else 'nanometres'}. Export the spectrum in nm."
+        )
+    return given * 1e3 if is_small else given
+
+
+def _spoken(around: str) -> str:
+    """What a header says of the wavelengths, and not of anything else."""
+    said = re.findall(r"(?:wavelength|lambda|λ|wvl)[^\n]{0,30}", around, re.IGNORECASE)
+    return "\n".join(said)

@@ -1,0 +1,140 @@
+"""Every format: recognised by content alone, with its spectra, quantities and units; wrong ones refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import CalibrationError
+from dsl_core.io.spectra.catalogue import FORMATS, SUFFIXES, format_of, read_spectra
+from dsl_core.io.spectra.reference_file import read_reference, read_references
+from dsl_core.io.spectra.spectrum_file import read_radiances, read_spectrum
+from tests.cases import spectra_files as made
+from tests.cases.spectra_files import NM, SHARE, SPECTRA_FILES, write
+
+COVERS = 401.0, 699.0
+
+
+@pytest.mark.parametrize(
+    ("name", "format_name"),
+    [
+        *(("leaf.asd", "ASD FieldSpec"), ("leaf.sig", "SVC"), ("leaf.sed", "Spectral Evolution")),
+        *(("ocean.txt", "Ocean"), ("avantes.txt", "Avantes"), ("cs2000.csv", "Konica Minolta CS-2000")),
+        *(("plain.jdx", "JCAMP-DX"), ("packed.jdx", "JCAMP-DX"), ("pairs.dx", "JCAMP-DX")),
+        ("patches.cgats", "CGATS, ArgyllCMS"),
+    ],
+)
+def test_a_format_is_recognised_whatever_its_ending(tmp_path: Path, name: str, format_name: str) -> None:
+    path = write(tmp_path / "anything.bin", SPECTRA_FILES[name])
+    assert format_of(path).name == format_name
+
+
+def test_endings_and_names_are_listed_once() -> None:
+    assert len(set(SUFFIXES)) == len(SUFFIXES)
+    assert {".asd", ".sig", ".sed", ".jdx", ".cgats", ".sp", ".sli", ".csv", ".txt"} <= set(SUFFIXES)
+    assert len({each.name for each in FORMATS}) == len(FORMATS)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["leaf.asd", "leaf.sig", "leaf.sed", "ocean.txt", "avantes.txt", "plain.jdx", "packed.jdx", "pairs.dx"],
+)
+def test_reflectance_is_a_share_over_nanometres(tmp_path: Path, name: str) -> None:
+    curve = read_spectrum(write(tmp_path / name, SPECTRA_FILES[name]), COVERS, radiance=False)
+    np.testing.assert_allclose(curve.wavelengths_nm, NM, rtol=1e-6)
+    np.testing.assert_allclose(curve.values, SHARE, atol=1e-5)
+    assert len(read_references(tmp_path / name).references) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "scale"),
+    [
+        ("a.sig", made.sig(), 1e-2),
+        ("a.sed", made.sed(), 0.1),
+        ("a.sed", made.sed(units="uW/cm^2/sr/nm"), 1e-3),
+        ("a.asd", made.asd(kind=2, white=False, values=SHARE / 10), 0.1),
+        ("a.csv", made.konica_minolta(), 1e-2),
+        ("a.csv", made.konica_minolta(lines=False), 1e-2),
+        ("a.sp", made.cgats("EMISSION", "1.0"), 0.1),
+        ("a.sp", made.cgats("EMISSION", "100.0"), 0.1),
+    ],
+)
+def test_radiance_is_in_one_unit(tmp_path: Path, name: str, content: str | bytes, scale: float) -> None:
+    curve = read_radiances(write(tmp_path / name, content), COVERS)[0]
+    np.testing.assert_allclose(curve.values, SHARE * scale, rtol=1e-5)
+    assert curve.unit == "W/(sr m2 nm)"
+
+
+def test_several_spectra_are_listed_by_name(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.cgats", made.cgats("REFLECTIVE", "100.0"))
+    assert [each.name for each in read_references(path).references] == ["patch 1", "patch 2"]
+    np.testing.assert_allclose(read_reference(path, "patch 2").values, SHARE / 5, atol=1e-6)
+    with pytest.raises(CalibrationError, match=r"2 spectra \('patch 1', 'patch 2'\)"):
+        read_spectrum(path, COVERS, radiance=False)
+    assert len(read_radiances(write(tmp_path / "b.csv", made.konica_minolta()), COVERS)) == 2
+    rows = [f"{nm:g};{100 * r};{50 * r};{'' if nm > 600 else r}" for nm, r in zip(NM, SHARE, strict=True)]
+    path = write(tmp_path / "c.csv", "\n".join(["nm;leaf [%];bark [%];moss", *rows]))
+    leaf, bark, moss = read_references(path).references
+    assert (leaf.name, bark.name, moss.name) == ("leaf [%]", "bark [%]", "moss")
+    np.testing.assert_allclose(2 * np.array(bark.curve.values), leaf.curve.values)
+    assert moss.curve.wavelengths_nm[-1] == 600
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("a.asd", made.asd(white=False), r"a\.asd contains counts, not a reflectance"),
+        ("a.asd", made.asd(b"ASD", 8), "contains absorbance"),
+        ("a.asd", made.asd()[:600], "cut off: its spectra end at byte 732, but it has 600"),
+        ("a.asd", made.asd()[:760], "cut off"),
+        ("a.asd", b"as7" + bytes(500), "no ASD instrument writes this"),
+        (
+            "a.sig",
+            "/*** Spectra Vista SIG Data ***/\ndata=\n",
+            "no table of wavelength, reference and target",
+        ),
+        ("a.sed", made.sed()[:200], "no spectrum behind its line 'Data:'"),
+        ("a.txt", made.ocean("Data from USB2000 Node", 9000), "contains counts"),
+        ("a.txt", made.ocean().replace("Wavelengths", "Raman Shifts"), "not over wavelength"),
+        ("a.txt", made.avantes("Scope", "[counts]"), "contains counts"),
+        ("a.txt", made.avantes("Irradiance", "[µWatt/cm²/nm]"), "contains counts and irradiance"),
+        (
+            "a.jdx",
+            made.jcamp().replace("NPOINTS=31", "NPOINTS=32"),
+            "32 values are declared, but there are 31",
+        ),
+        (
+            "a.jdx",
+            made.jcamp("packed").replace("NPOINTS=31", "NPOINTS=99999999999"),
+            "NPOINTS is 99999999999",
+        ),
+        ("a.jdx", made.jcamp("packed").replace("\n480", "Z9999999\n480"), "is repeated 9e.07 times"),
+        ("a.jdx", made.jcamp("packed").replace("\n480", "\n480I"), "a line begins with"),
+        ("a.jdx", made.jcamp().replace("XYDATA", "NTUPLES"), "contains NTUPLES"),
+        ("a.jdx", made.jcamp().replace("(X++(Y..Y))", "(XYZ)"), "has the form"),
+        ("a.cgats", made.cgats().replace("SPEC_", "LAB_"), "no spectral fields"),
+        ("a.cgats", made.cgats().replace("END_DATA\n", ""), "its table does not end"),
+        ("a.cgats", made.cgats().replace("patch 2", 'patch" "2'), "do not fill rows"),
+        ("a.sp", made.cgats("EMISSION", "0"), "SPECTRAL_NORM of 0"),
+        ("a.xlsx", b"PK\x03\x04 and so on", "Save the sheet with the spectrum as CSV"),
+        ("a.spc", bytes(900), "in no format of spectra"),
+    ],
+)
+def test_wrong_files_are_refused_with_the_reason(
+    tmp_path: Path, name: str, content: str | bytes, told: str
+) -> None:
+    with pytest.raises(CalibrationError, match=told) as caught:
+        read_references(write(tmp_path / name, content))
+    assert name in str(caught.value)
+
+
+def test_repeated_values_of_a_packed_file_are_counted(tmp_path: Path) -> None:
+    head = (
+        made.jcamp().split("##XYDATA")[0].replace("NPOINTS=31", "NPOINTS=7").replace("LASTX=700", "LASTX=460")
+    )
+    # 100, then three steps of +10, a difference of -30, and twice the last value.
+    path = write(tmp_path / "a.jdx", f"{head}##XYDATA=(X++(Y..Y))\n400A00J0Ul0%T\n##END=")
+    (spectrum,) = read_spectra(path)
+    np.testing.assert_allclose(spectrum.values * 1e5, [100, 110, 120, 130, 100, 100, 100])
