@@ -24,6 +24,8 @@ GROUP = "dsl_scan.drivers"
 #: Name of each driver of this program, and the module under `dsl_core.devices.drivers` with its ``DRIVER``.
 _BUILT_IN = {
     "projector.none": "no_projector",
+    "spectroradiometer.jeti": "jeti_specbos",
+    "stage.thorlabs-lts": "thorlabs_lts",
 }
 BUILT_IN = tuple(
     EntryPoint(name, f"dsl_core.devices.drivers.{module}:DRIVER", GROUP) for name, module in _BUILT_IN.items()

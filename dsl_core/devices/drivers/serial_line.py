@@ -1,0 +1,140 @@
+"""A serial line with time-outs, whose failures are sentences; pyserial is imported when a line is opened."""
+
+from __future__ import annotations
+
+import errno
+import time
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from dsl_core.errors import DeviceError
+
+T = TypeVar("T")
+BRINGS = "pip install 'dsl-scan[serial]' (pyserial)"
+#: Reading waits in steps of this, s, so that what arrives is seen soon.
+_STEP_S = 0.05
+
+
+class SerialPort(Protocol):
+    """What is used of a port of pyserial."""
+
+    timeout: float | None
+
+    def read(self, size: int) -> bytes:
+        """Up to ``size`` bytes, fewer when the time-out passes."""
+
+    def write(self, data: bytes) -> object:
+        """Send bytes."""
+
+    def reset_input_buffer(self) -> None:
+        """Forget what has arrived."""
+
+    def close(self) -> None:
+        """Release the port."""
+
+
+class SerialLine:
+    """Bytes to and from one instrument, ``name`` in sentences about it.
+
+    ``clock`` tells seconds. Every method raises `DeviceError` where the port fails, as it does when a cable
+    is pulled.
+    """
+
+    def __init__(self, port: SerialPort, name: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.name, self._port, self._clock, self._is_open = name, port, clock, True
+
+    def write(self, data: bytes) -> None:
+        """Send bytes."""
+        self._do(lambda: self._port.write(data))
+
+    def read(self, size: int, timeout_s: float) -> bytes:
+        """Exactly ``size`` bytes, fewer when ``timeout_s`` passes before."""
+        return self._read(lambda got: len(got) >= size, timeout_s, lambda got: size - len(got))
+
+    def read_until(self, end: bytes, timeout_s: float, most: int = 1 << 20) -> bytes:
+        """Bytes up to and with ``end``, or without it what came in ``timeout_s`` or until ``most`` bytes."""
+        return self._read(lambda got: got.endswith(end) or len(got) >= most, timeout_s, lambda got: 1)
+
+    def drain(self, quiet_s: float = 0.0) -> None:
+        """Forget what has arrived, and what still arrives until it has been quiet for ``quiet_s``."""
+        self._do(self._port.reset_input_buffer)
+        end = self._clock() + max(10 * quiet_s, 1.0)
+        while quiet_s and self.read(1, quiet_s):
+            self._do(self._port.reset_input_buffer)
+            if self._clock() > end:
+                raise DeviceError(
+                    f"{self.name} does not stop sending. Switch it off and on, and check that the port is its"
+                    " own."
+                )
+
+    def close(self) -> None:
+        """Release the port; a second call does nothing, and neither does a port that is gone."""
+        if self._is_open:
+            self._is_open = False
+            try:
+                self._port.close()
+            except OSError:
+                return
+
+    def _read(
+        self, is_done: Callable[[bytes], bool], timeout_s: float, next_size: Callable[[bytes], int]
+    ) -> bytes:
+        got = b""
+        end = self._clock() + timeout_s
+        while not is_done(got):
+            left_s = end - self._clock()
+            if left_s <= 0:
+                break
+            self._port.timeout = min(left_s, _STEP_S)
+            size = next_size(got)
+            got += self._do(lambda size=size: self._port.read(size))  # type: ignore[misc]
+        return got
+
+    def _do(self, action: Callable[[], T]) -> T:
+        if not self._is_open:
+            raise DeviceError(f"{self.name} is closed. Open the rig again.")
+        try:
+            return action()
+        except (OSError, TypeError, ValueError) as error:  # pyserial raises all three when a cable is pulled
+            raise DeviceError(
+                f"{self.name} no longer answers on its port ({error}). Check its cable and power, then open"
+                " the rig again."
+            ) from error
+
+
+def open_line(port: str, name: str, baud: int, rtscts: bool = False) -> SerialLine:
+    """Open a serial port; raises `DeviceError` when there is none or pyserial is missing."""
+    try:
+        import serial
+    except ImportError as error:
+        raise DeviceError(f"{name} needs the package pyserial. Install it with {BRINGS}.") from error
+    try:
+        # No waiting for ever: an instrument that holds up writing is as lost as one that does not answer.
+        found = serial.Serial(port, baud, timeout=0.1, write_timeout=2.0)
+        if rtscts:
+            _hand_shake(found)
+    except (OSError, ValueError) as error:
+        raise DeviceError(
+            f"{name} cannot be opened on the port {port!r} ({error}). Check the address, the cable, and that"
+            " no other program uses it; on Linux, that you may use serial ports (group dialout)."
+        ) from error
+    return SerialLine(found, name)
+
+
+def _hand_shake(port: Any) -> None:
+    """Switch hardware flow control on, where a port has the lines for it; a virtual one has not."""
+    try:
+        port.rtscts = True
+    except OSError as error:
+        if error.errno != errno.ENOTTY:
+            raise
+        port.rtscts = False
+
+
+def serial_ports(vendor: int | None = None) -> list[tuple[str, str]]:
+    """Address and description of every serial port, of one USB vendor or all; raises `DeviceError`."""
+    try:
+        from serial.tools import list_ports
+    except ImportError as error:
+        raise DeviceError(f"Serial ports are listed by pyserial. Install it with {BRINGS}.") from error
+    return [(each.device, each.description) for each in list_ports.comports() if vendor in (None, each.vid)]
