@@ -282,7 +282,7 @@ def lock(venv: Path) -> int:
     command = [str(venv_program(venv, "python")), "-m", "uv", "pip", "compile", "--universal", "--upgrade"]
     command += ["--fork-strategy", "fewest", "--python-version", "3.11", "--no-annotate", "--quiet"]
     command += ["--custom-compile-command", "python3 packaging/run.py lock"]
-    command += ["--extra", "test", "--group", "lock", "--output-file", str(CONSTRAINTS), "pyproject.toml"]
+    command += ["--all-extras", "--group", "lock", "--output-file", str(CONSTRAINTS), "pyproject.toml"]
     hidden = ("UV_FIND_LINKS", "PIP_FIND_LINKS")  # local builds must not get into the file
     variables = {key: value for key, value in os.environ.items() if key not in hidden}
     return run(command, variables, ROOT)[0]

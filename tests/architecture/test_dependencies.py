@@ -22,10 +22,18 @@ DISTRIBUTIONS = {
     "PySide6": "pyside6-essentials",
     "colour": "colour-science",
     "cv2": "opencv-contrib-python-headless",
+    "serial": "pyserial",
     # The part of PySide that knows which objects are still alive.
     "shiboken6": "pyside6-essentials",
     "vtkmodules": "vtk",
 }
+#: What extras bring to those who run the program; that of the tests is not imported by it.
+EXTRAS = [
+    requirement
+    for extra, requirements in PROJECT["optional-dependencies"].items()
+    for requirement in requirements
+    if extra != "test"
+]
 # The desktop application is built on these; until its first window nothing imports them.
 OF_THE_APP = {"platformdirs", "pyside6-essentials", "pyqtgraph", "pyvista", "superqt"}
 GPL = {"plyfile", "pylablib", "pylablib-lightweight", "thorlabs-apt-device", "pyqt5", "pyqt6"}
@@ -51,17 +59,18 @@ def declared(requirements: list[str]) -> dict[str, Requirement]:
 
 
 def test_every_import_is_declared() -> None:
-    assert set(imported()) - set(declared(PROJECT["dependencies"])) == set()
+    assert set(imported()) - set(declared(PROJECT["dependencies"] + EXTRAS)) == set()
 
 
 def test_every_declaration_is_imported() -> None:
-    assert set(declared(PROJECT["dependencies"])) - set(imported()) - OF_THE_APP == set()
+    assert set(declared(PROJECT["dependencies"] + EXTRAS)) - set(imported()) - OF_THE_APP == set()
 
 
 def test_every_declaration_is_pinned_to_a_version_that_it_allows() -> None:
     lines = (ROOT / "packaging" / "constraints.txt").read_text(encoding="utf-8").splitlines()
     pins = declared([line for line in lines if line and not line.startswith("#")])
-    for name, wanted in declared(PROJECT["dependencies"] + PROJECT["optional-dependencies"]["test"]).items():
+    for_tests = PROJECT["optional-dependencies"]["test"]
+    for name, wanted in declared(PROJECT["dependencies"] + EXTRAS + for_tests).items():
         version = re.fullmatch(r"==([^+]+)", str(pins[name].specifier))
         assert version is not None, f"{name} is not pinned to one public version"
         assert wanted.specifier.contains(version[1]), f"{name} {version[1]} is not {wanted.specifier}"
@@ -75,5 +84,5 @@ def test_nothing_is_under_the_gpl() -> None:
 
 def test_architecture_gives_a_reason_for_every_dependency() -> None:
     table = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").lower()
-    missing = [name for name in declared(PROJECT["dependencies"]) if f"`{name}`" not in table]
+    missing = [name for name in declared(PROJECT["dependencies"] + EXTRAS) if f"`{name}`" not in table]
     assert missing == []

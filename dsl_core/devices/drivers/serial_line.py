@@ -20,6 +20,10 @@ class SerialPort(Protocol):
 
     timeout: float | None
 
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that have arrived."""
+
     def read(self, size: int) -> bytes:
         """Up to ``size`` bytes, fewer when the time-out passes."""
 
@@ -42,6 +46,7 @@ class SerialLine:
 
     def __init__(self, port: SerialPort, name: str, clock: Callable[[], float] = time.monotonic) -> None:
         self.name, self._port, self._clock, self._is_open = name, port, clock, True
+        self._rest = b""
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
@@ -49,23 +54,32 @@ class SerialLine:
 
     def read(self, size: int, timeout_s: float) -> bytes:
         """Exactly ``size`` bytes, fewer when ``timeout_s`` passes before."""
-        return self._read(lambda got: len(got) >= size, timeout_s, lambda got: size - len(got))
+        return self._read(lambda got: size if len(got) >= size else None, timeout_s)
 
     def read_until(self, end: bytes, timeout_s: float, most: int = 1 << 20) -> bytes:
         """Bytes up to and with ``end``, or without it what came in ``timeout_s`` or until ``most`` bytes."""
-        return self._read(lambda got: got.endswith(end) or len(got) >= most, timeout_s, lambda got: 1)
+
+        def length(got: bytes) -> int | None:
+            at = got.find(end)
+            return at + len(end) if at >= 0 else most if len(got) >= most else None
+
+        return self._read(length, timeout_s)
 
     def drain(self, quiet_s: float = 0.0) -> None:
         """Forget what has arrived, and what still arrives until it has been quiet for ``quiet_s``."""
-        self._do(self._port.reset_input_buffer)
+        self._forget()
         end = self._clock() + max(10 * quiet_s, 1.0)
         while quiet_s and self.read(1, quiet_s):
-            self._do(self._port.reset_input_buffer)
+            self._forget()
             if self._clock() > end:
                 raise DeviceError(
                     f"{self.name} does not stop sending. Switch it off and on, and check that the port is its"
                     " own."
                 )
+
+    def _forget(self) -> None:
+        self._do(self._port.reset_input_buffer)
+        self._rest = b""
 
     def close(self) -> None:
         """Release the port; a second call does nothing, and neither does a port that is gone."""
@@ -76,18 +90,17 @@ class SerialLine:
             except OSError:
                 return
 
-    def _read(
-        self, is_done: Callable[[bytes], bool], timeout_s: float, next_size: Callable[[bytes], int]
-    ) -> bytes:
-        got = b""
+    def _read(self, length: Callable[[bytes], int | None], timeout_s: float) -> bytes:
+        """What is read up to the ``length`` of it that is wanted; what came behind that is kept."""
+        got, self._rest = self._rest, b""
         end = self._clock() + timeout_s
-        while not is_done(got):
+        while (wanted := length(got)) is None:
             left_s = end - self._clock()
             if left_s <= 0:
-                break
+                return got
             self._port.timeout = min(left_s, _STEP_S)
-            size = next_size(got)
-            got += self._do(lambda size=size: self._port.read(size))  # type: ignore[misc]
+            got += self._do(lambda: self._port.read(max(1, self._port.in_waiting)))
+        got, self._rest = got[:wanted], got[wanted:]
         return got
 
     def _do(self, action: Callable[[], T]) -> T:

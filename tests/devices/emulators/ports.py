@@ -85,6 +85,12 @@ class FakePort:
     def sleep(self, seconds: float) -> None:
         self.now_s += seconds
 
+    @property
+    def in_waiting(self) -> int:
+        self._require()
+        self._arrive()
+        return len(self._buffer)
+
     def write(self, data: bytes) -> object:
         self._require()
         for when, answer in self._instrument.take(data, self.now_s):
