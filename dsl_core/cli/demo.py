@@ -74,9 +74,9 @@ def _choose_folder(given: Path, options: dict[str, str]) -> Path:
 
 def _plan() -> CapturePlan:
     """The published line frames; of the binary code the columns, since rows do not enter the result."""
-    from dsl_core.model.plan import CapturePlan, GrayCode
+    from dsl_core.model.plan import CapturePlan, GrayCode, Sentinels
 
-    return CapturePlan(name="demo", code=GrayCode(rows=False))
+    return CapturePlan(name="demo", code=GrayCode(rows=False), sentinels=Sentinels())
 
 
 def _capture(output: Output, timer: StageTimer, folder: Path, options: dict[str, str]) -> None:

@@ -67,6 +67,14 @@ Settings = Annotated[
     typer.Option("--setting", help="EXPOSURE_MS@LEVEL, like 166.7@0.2; repeat for a bracket, darkest first."),
 ]
 
+Sentinel = Annotated[
+    bool | None,
+    typer.Option(
+        "--sentinels/--no-sentinels",
+        help="Repeat a few old shots during the scan and at its end, to follow light and position (usual).",
+    ),
+]
+
 
 @dataclass(frozen=True)
 class PlanChoice:
@@ -77,6 +85,7 @@ class PlanChoice:
     lines: str | None = None
     comb: str | None = None
     settings: Sequence[str] = ()
+    sentinels: bool | None = None
 
     def build(self) -> CapturePlan:
         """The plan; raises `PlanError` when the choices contradict each other or are impossible."""
@@ -88,6 +97,7 @@ class PlanChoice:
             "--lines": self.lines,
             "--comb": self.comb,
             "--setting": tuple(self.settings) or None,
+            "--sentinels or --no-sentinels": self.sentinels,
         }
         given = [name for name, value in details.items() if value is not None]
         if self.file is not None:
@@ -99,7 +109,7 @@ class PlanChoice:
     def _fields(self) -> dict[str, object]:
         from dsl_core.model.presets import CODE_CHOICES, code_of
 
-        fields: dict[str, object] = {}
+        fields: dict[str, object] = {"sentinels": None if self.sentinels is False else {}}
         if self.code is not None:
             fields["code"] = code_of(self.code)
             if fields["code"] is None:

@@ -22,6 +22,7 @@ from dsl_core.cli.options import (
     PlanFile,
     RigName,
     RigOptions,
+    Sentinel,
     Settings,
     Tolerance,
     parse_options,
@@ -74,6 +75,7 @@ def plan(
     lines: Lines = None,
     comb: Comb = None,
     setting: Settings = [],  # noqa: B006
+    sentinels: Sentinel = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
@@ -83,7 +85,7 @@ def plan(
     from dsl_core.io.plan_file import save_plan
     from dsl_core.pipeline import fit_plan
 
-    output, choice = Output(json), PlanChoice(None, code, lines, comb, setting).build()
+    output, choice = Output(json), PlanChoice(None, code, lines, comb, setting, sentinels).build()
     with open_rig(rig, parse_options(option)) as devices:
         made = fit_plan(choice, devices)
         _require_patterns(made)
@@ -106,6 +108,7 @@ def scan(
     lines: Lines = None,
     comb: Comb = None,
     setting: Settings = [],  # noqa: B006
+    sentinels: Sentinel = None,
     calibration: CalibrationName = None,
     override: OverrideCalibration = False,
     effects: Effects = None,
@@ -118,7 +121,7 @@ def scan(
     from dsl_core.io.scan.origin import rig_notes
 
     output, options = Output(json), with_effects(parse_options(option), effects, tolerance)
-    choice = PlanChoice(plan, code, lines, comb, setting).build()
+    choice = PlanChoice(plan, code, lines, comb, setting, sentinels).build()
     if (target / MANIFEST_NAME).exists():
         raise StoreError(
             f"{target} already contains a scan."

@@ -85,14 +85,14 @@ def design(
     from dsl_core.capture.preflight import require_possible
     from dsl_core.devices.registry import open_rig
     from dsl_core.io.plan_file import save_plan
-    from dsl_core.model.plan import CapturePlan, GrayCode
+    from dsl_core.model.plan import CapturePlan, GrayCode, Sentinels
     from dsl_core.planning.design import design as search
     from dsl_core.planning.designed import DesignedSet, packed, save_design
 
     output = Output(json)
     with open_rig(rig, parse_options(option)) as devices:
         known = _calibration(devices, calibration)
-        base = CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False))
+        base = CapturePlan(name=f"designed {frames}", code=GrayCode(rows=False), sentinels=Sentinels())
         base = base.sized(known.camera, known.projector)
         if plan is not None:
             require_possible(replace(devices, calibration=None), base)  # reported before the search

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
@@ -140,5 +141,13 @@ def _plan_facts(plan: CapturePlan) -> Facts:
         "projector_px": list(plan.projector_size_px),
         "code_frames": plan.code_count,
         "spectral_patterns": f"{plan.spectral_count} ({plan.spectral.kind})",
+        "sentinels": _sentinel_fact(plan),
         "settings": [f"{s.exposure_ms:.4g} ms at level {s.level:g}" for s in plan.settings],
     }
+
+
+def _sentinel_fact(plan: CapturePlan) -> str:
+    shots = [shot.index for shot in plan.shots() if shot.role == "sentinel"]
+    rounds = sum(b - a > 1 for a, b in itertools.pairwise(shots)) + bool(shots)
+    share = 100 * len(shots) / plan.shot_count
+    return f"{len(shots)} repeats in {rounds} rounds ({share:.1f} %)" if shots else "none"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal, Protocol, Self
 
 from pydantic import Field, model_validator
@@ -112,7 +112,20 @@ class Setting(Record):
     level: float = Field(gt=0, le=1)
 
 
-Role = Literal["code", "spectral", "white", "black"]
+class Sentinels(Record):
+    """Rounds of old shots taken again, which show how light and position change during a scan.
+
+    A round repeats white, black, a frame of the code and a line, all of the first setting that has the code.
+    There are as many rounds as a plan has times ``every`` shots, at least one: evenly spaced, the last one at
+    the end. Four shots a round and 80 between them cost 5 %.
+    """
+
+    every: int = Field(default=80, ge=8)
+
+
+Role = Literal["code", "spectral", "white", "black", "sentinel"]
+#: The bit of the columns that sentinels show: its stripes are narrow enough to tell a small motion.
+_SENTINEL_BIT = 5
 
 
 @dataclass(frozen=True)
@@ -121,7 +134,8 @@ class Shot:
 
     ``index`` counts all shots of the plan; ``pattern`` counts within the role's pattern set:
     ``code`` frames in the order of the code (white and black last, as roles of their own),
-    ``spectral`` frames in the order of the set. ``setting`` is an index into the plan's settings.
+    ``spectral`` frames in the order of the set; a ``sentinel`` repeats the shot with index ``pattern``.
+    ``setting`` is an index into the plan's settings.
     """
 
     index: int
@@ -148,7 +162,8 @@ class CapturePlan(Record):
     """Everything a scan will do, known before it starts.
 
     Shots run through the settings one after the other, code first, then the lines, so that
-    exposure and drive level change once.
+    exposure and drive level change once; ``sentinels`` come between them (none in plans
+    of earlier versions).
     """
 
     schema_version: Literal[1] = 1
@@ -162,6 +177,7 @@ class CapturePlan(Record):
         Setting(exposure_ms=1000.0 / 3.0, level=0.8),
     )
     code_settings: tuple[int, ...] = (0, 1)
+    sentinels: Sentinels | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -174,8 +190,8 @@ class CapturePlan(Record):
             raise ValueError(
                 f"code_settings {self.code_settings} must name settings 0 to {len(self.settings) - 1}"
             )
-        if self.shot_count > MOST_SHOTS:
-            raise ValueError(f"the plan has {self.shot_count} frames; at most {MOST_SHOTS} are possible")
+        if self._own_count > MOST_SHOTS:
+            raise ValueError(f"the plan has {self._own_count} frames; at most {MOST_SHOTS} are possible")
         return self
 
     def sized(self, camera: Sized, projector: Sized) -> Self:
@@ -216,12 +232,40 @@ class CapturePlan(Record):
 
     def shots(self) -> Iterator[Shot]:
         """Every exposure, in the order it is taken."""
-        index = 0
+        rounds, taken, index = dict(self._rounds()), list[Shot](), 0
         for i, setting in enumerate(self.settings):
             for role, count in self._roles(i):
                 for pattern in range(count):
-                    yield Shot(index, role, pattern, i, setting.exposure_ms, setting.level)
+                    shot = Shot(index, role, pattern, i, setting.exposure_ms, setting.level)
+                    yield shot
+                    taken.append(shot)
                     index += 1
+                    for place in rounds.get(len(taken), ()):
+                        yield replace(taken[place], index=index, role="sentinel", pattern=taken[place].index)
+                        index += 1
+
+    def original(self, shot: Shot) -> Shot:
+        """The shot that a sentinel repeats; any other shot as it is."""
+        if shot.role != "sentinel":
+            return shot
+        return next(each for each in self.shots() if each.index == shot.pattern)
+
+    def _rounds(self) -> Iterator[tuple[int, tuple[int, ...]]]:
+        """After how many other shots each round of sentinels comes, and which of these it repeats."""
+        if self.sentinels is None:
+            return
+        first = min(self.code_settings)
+        before = sum(count for i in range(first) for _, count in self._roles(i))
+        codes, total = self.code_count, self._own_count
+        code = 2 * min(_SENTINEL_BIT, self.code_bits[0] - 1)
+        white, black, line = before + codes, before + codes + (codes > 0), before + codes + 1 + (codes > 0)
+        rounds = max(total // self.sentinels.every, 1)
+        for number in range(1, rounds + 1):
+            after = -(-number * total // rounds)
+            lines = min(after - line, self.spectral_count)
+            places = [white, black, before + code] if codes else [black]
+            places += [line + lines // 2] if lines > 0 else []
+            yield after, tuple(place for place in places if place < after)
 
     def _roles(self, setting: int) -> list[tuple[Role, int]]:
         """Roles of a setting in the order they are taken, and how many shots each has."""
@@ -234,6 +278,15 @@ class CapturePlan(Record):
     @property
     def shot_count(self) -> int:
         """Number of exposures."""
+        return self._own_count + self.sentinel_count
+
+    @property
+    def sentinel_count(self) -> int:
+        """How many of the exposures repeat an old shot."""
+        return sum(len(places) for _, places in self._rounds())
+
+    @property
+    def _own_count(self) -> int:
         return sum(count for i in range(len(self.settings)) for _, count in self._roles(i))
 
     @property
@@ -252,4 +305,6 @@ def describe_shot(shot: Shot) -> str:
     >>> describe_shot(Shot(44, "spectral", 3, 1, 10.0, 0.8))
     'frame 44 (spectral pattern 3, setting 1)'
     """
+    if shot.role == "sentinel":
+        return f"frame {shot.index} (frame {shot.pattern} again, setting {shot.setting})"
     return f"frame {shot.index} ({shot.role} pattern {shot.pattern}, setting {shot.setting})"

@@ -13,6 +13,7 @@ from dsl_core.model.plan import (
     GrayCode,
     LineComb,
     ScanLines,
+    Sentinels,
     Setting,
     XorCode,
 )
@@ -51,6 +52,7 @@ def _plan(name: str, spectral: ScanLines | LineComb, *settings: Setting) -> Capt
         spectral=spectral,
         settings=settings,
         code_settings=tuple(range(len(settings))),
+        sentinels=Sentinels(),
     )
 
 
@@ -92,7 +94,12 @@ PRESETS: tuple[Preset, ...] = (
         "All lines as published, without the row code: equally accurate on the twin.",
         _plan("columns", ScanLines(), _DARK, _BRIGHT),
     ),
-    Preset("reference", "Reference", "As published: row and column code, 318 lines.", CapturePlan()),
+    Preset(
+        "reference",
+        "Reference",
+        "As published: row and column code, 318 lines.",
+        CapturePlan(sentinels=Sentinels()),
+    ),
 )
 
 

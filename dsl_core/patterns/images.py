@@ -32,6 +32,8 @@ def pattern_image(plan: CapturePlan, shot: Shot) -> NDArray[np.uint8]:
             image[:] = 0
         case "spectral":
             image[:] = drive_levels(profile(plan.spectral, width, shot.pattern), shot.level)
+        case "sentinel":
+            return pattern_image(plan, plan.original(shot))
     return image
 
 

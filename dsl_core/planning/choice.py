@@ -12,7 +12,7 @@ from itertools import product
 from dsl_core.capture.preflight import find_obstacles
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import PlanError
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Setting, SpectralSet
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, ScanLines, Sentinels, Setting, SpectralSet
 from dsl_core.model.rig import Rig
 from dsl_core.planning.designed import designed_sets
 from dsl_core.planning.prediction import Prediction, predict
@@ -95,7 +95,7 @@ def choose(weighed: Sequence[Weighed], budget_s: float | None = None, error: flo
 
 def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
     """All combinations on a rig, the published plan first."""
-    yield CapturePlan(name="published").sized(rig.camera, rig.projector)
+    yield CapturePlan(name="published", sentinels=Sentinels()).sized(rig.camera, rig.projector)
     for (name, spectral), bracket in product(pattern_sets(rig).items(), BRACKETS):
         settings = tuple(
             Setting(exposure_ms=cycles * rig.frame_period_ms, level=level) for cycles, level in bracket
@@ -107,6 +107,7 @@ def candidate_plans(rig: Rig) -> Iterator[CapturePlan]:
             spectral=spectral,
             settings=settings,
             code_settings=tuple(range(len(settings))),
+            sentinels=Sentinels(),
         )
         yield plan.sized(rig.camera, rig.projector)
 

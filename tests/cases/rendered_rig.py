@@ -21,6 +21,7 @@ Key = tuple[str, int, float]
 
 def token_image(plan: CapturePlan, shot: Shot) -> NDArray[np.uint8]:
     """Instead of the pattern of a shot, its name: role, pattern and level as bytes of a tiny image."""
+    shot = plan.original(shot)
     if shot.role == "black":
         return np.zeros((1, 8), np.uint8)
     role = ("code", "spectral", "white").index(shot.role) + 1

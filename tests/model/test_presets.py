@@ -13,7 +13,8 @@ def test_presets_can_be_projected(preset: Preset) -> None:
 
 
 def test_the_reference_is_the_published_plan() -> None:
-    assert PRESETS[-1].plan == CapturePlan()
+    # But for the shots that watch over the scan.
+    assert PRESETS[-1].plan.model_copy(update={"sentinels": None}) == CapturePlan()
     assert CapturePlan().shot_count == 716
 
 

@@ -75,8 +75,8 @@ def _lost_metadata(scan: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "sentence"),
     [
-        (_missing, "lacks 1 of 150 frames, the first is frame 7 (code pattern 7, setting 0). Resume"),
-        (_extra, "contains 1 more frames than the 150 of its plan, the first is number 999"),
+        (_missing, "lacks 1 of 154 frames, the first is frame 7 (code pattern 7, setting 0). Resume"),
+        (_extra, "contains 1 more frames than the 154 of its plan, the first is number 999"),
         (_swapped, "(swapped or copied)"),
         (_truncated, "has 100 of"),
         (_repeated, "Frame 8 (code pattern 8, setting 0)"),
@@ -110,7 +110,7 @@ def test_resume_mends_damaged_frames_to_the_bit(
     damage(scan_copy)
     ending = give("resume", scan_copy)
     assert (ending.code, says in ending.out) == (0, True)
-    assert "All 150 frames are saved" in ending.out
+    assert "All 154 frames are saved" in ending.out
     sound, mended = ScanReader(finished / "scan.dsl"), ScanReader(scan_copy)
     for shot in sound.plan.shots():
         np.testing.assert_array_equal(mended.read(shot), sound.read(shot))
@@ -327,7 +327,7 @@ def test_a_disk_that_fills_up_loses_nothing(
         ending = give("scan", scan, *SMALL_RIG, *SMALL_PLAN)
     assert ending.code == 2
     assert "disk is full" in ending.sentence
-    assert 100 <= len(ScanReader(scan).missing()) < 150
+    assert 100 <= len(ScanReader(scan).missing()) < 154
     assert give("resume", scan).code == 0
     sound, mended = ScanReader(finished / "scan.dsl"), ScanReader(scan)
     for shot in sound.plan.shots():

@@ -31,7 +31,7 @@ SCAN = [
     "--setting",
     "333.3@0.8",
 ]
-FRAMES = 86
+FRAMES = 90
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends Ctrl-C to the whole console")
 

@@ -250,11 +250,11 @@ class Composition(QObject):
         from dsl_app.scan.forecast.state import ForecastState
         from dsl_app.scan.page import ScanPage
         from dsl_app.scan.state import Phase, ScanState
-        from dsl_core.model.plan import CapturePlan
+        from dsl_core.model.plan import CapturePlan, Sentinels
 
         window, parts, rig = self.window, self.window.parts, self.rig
         folder = Path(parts.settings.output_folder or Path.home() / "dsl-scans")
-        state = ScanState(CapturePlan(), fresh_target(folder, datetime.now()))
+        state = ScanState(CapturePlan(sentinels=Sentinels()), fresh_target(folder, datetime.now()))
         state.phase.changed.connect(
             lambda phase: self._remember_folder(state) if phase is Phase.DONE else None
         )

@@ -11,7 +11,7 @@ from dsl_app.connection.state import RigChoice
 from dsl_app.shared.known_files import first_free
 from dsl_core.io.scan.folder import SUFFIX
 from dsl_core.io.scan.origin import rig_of_notes
-from dsl_core.model.plan import CapturePlan, LineComb, ScanLines
+from dsl_core.model.plan import CapturePlan, LineComb, ScanLines, Sentinels
 from dsl_core.model.presets import name_of
 
 
@@ -24,6 +24,8 @@ def plan_words(plan: CapturePlan) -> list[str]:
             words.append(f"--lines {width}x{step}")
         case LineComb(width_px=width, step_px=step, period_px=period):
             words.append(f"--comb {width}x{step}x{period}")
+    if plan.sentinels is None:
+        words.append("--no-sentinels")
     # Enough digits to keep an exposure a whole number of LED cycles.
     words += [f"--setting {setting.exposure_ms:.12g}@{setting.level:g}" for setting in plan.settings]
     return words
@@ -33,7 +35,8 @@ def needs_file(plan: CapturePlan) -> bool:
     """Whether a plan cannot be expressed by options of the command line."""
     is_line_set = isinstance(plan.spectral, ScanLines) and not plan.spectral.sparse
     is_comb = isinstance(plan.spectral, LineComb) and not any(plan.spectral.shifts_px)
-    return not (is_line_set or is_comb) or plan.code_settings != tuple(range(len(plan.settings)))
+    usual = plan.sentinels in (None, Sentinels())
+    return not (usual and (is_line_set or is_comb)) or plan.code_settings != tuple(range(len(plan.settings)))
 
 
 def scan_command(

@@ -25,7 +25,7 @@ CHANNEL_COLOURS = ("#d94545", "#3fa34d", "#3f7fd9")
 HINT = "No frame yet. Start a scan, then point at the picture to plot the intensity of a pixel."
 #: Columns of the published projector: the range of the empty axis.
 PUBLISHED_COLUMNS = 640
-_ROLES = {"code": "code", "spectral": "pattern", "white": "white", "black": "black"}
+_ROLES = {"code": "code", "spectral": "pattern", "white": "white", "black": "black", "sentinel": "repeat"}
 
 
 class FramePicture(QWidget):

@@ -35,7 +35,7 @@ class Lit:
 
 def line_profile(plan: CapturePlan, shot: Shot) -> Floats | None:
     """Light over columns and LEDs, flat (3 width,), as a camera sees it; None for a pattern with rows."""
-    width = plan.projector_size_px[0]
+    width, shot = plan.projector_size_px[0], plan.original(shot)
     match shot.role:
         case "white":
             return np.ones(3 * width, np.float32)

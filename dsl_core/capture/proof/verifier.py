@@ -23,6 +23,7 @@ from dsl_core.capture.proof.prediction import (
     rescaled,
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
+from dsl_core.capture.proof.sentinel import SentinelProof
 from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
@@ -72,6 +73,7 @@ class FrameProof:
         self._places = {(s.role, s.pattern): s.index for s in self._shots if s.setting == self._first}
         self._blacks = {s.setting: s.index for s in self._shots if s.role == "black"}
         self._code = self._first_code(at_the_end)
+        self._sentinels = SentinelProof(self._noise, self._raster)
         self._kept: dict[int, Counts] = {}
         self._untold: set[int] = set()
         self._contested: set[int] = set()
@@ -113,13 +115,15 @@ class FrameProof:
         plan = self._plan
         if isinstance(plan.code, NoCode):
             return None
-        own = [s for s in self._shots if s.setting == self._first and s.role != "spectral"]
+        own = [s for s in self._shots if s.setting == self._first and s.role in ("code", "white", "black")]
         rises = None if self._calibration is None else self._calibration.pose.matrix[0, 0] > 0
         return FirstCode(plan, plan.code, own, self._raster, self._noise, self._bayer, rises, at_the_end)
 
     def _judge(self, shot: Shot, seen: Counts) -> Finding:
         before = self._last[1] if self._last is not None else None
         self.reviewed = []
+        if shot.role == "sentinel":
+            return self._judge_sentinel(shot, seen)
         if self._code is not None and shot.setting == self._first and shot.role != "spectral":
             found = self._code.add(shot, seen, before)
             self.reviewed = self._code.reviewed
@@ -129,6 +133,13 @@ class FrameProof:
         if shot.setting == self._first:
             return self._judge_lines(shot, seen)
         return self._judge_again(shot, seen)
+
+    def _judge_sentinel(self, shot: Shot, seen: Counts) -> Finding:
+        places = [shot.pattern, self._blacks[self._first], self._places.get(("white", 0), -1)]
+        before = self._plan.original(self._shots[shot.index - 1])
+        old, black, white = (self._kept.get(place) for place in places)
+        rivals = [self._earlier(before), black, white]
+        return self._sentinels.judge(shot, seen, old, black, [each for each in rivals if each is not None])
 
     # The lines of the first setting: columns, white and black are known ------------------------------
 
@@ -170,7 +181,7 @@ class FrameProof:
         best, found = 0.5, None
         for other in self._shots:
             pattern = line_profile(self._plan, other) if other.setting == shot.setting else None
-            if pattern is None or not pattern.any():
+            if pattern is None or other.role == "sentinel" or not pattern.any():
                 continue
             norm = float(np.sqrt((weight * pattern**2).sum() * (weight * mean**2).sum()))
             score = float((weight * pattern * mean).sum()) / norm if norm > 0 else 0.0
@@ -228,6 +239,7 @@ class FrameProof:
 
     def _expected(self, pattern: Shot, shot: Shot) -> Expected | None:
         """The picture of a pattern at the setting of ``shot``, from that at an earlier setting."""
+        pattern = self._plan.original(pattern)
         old, old_black = self._earlier(pattern), self._earlier(self._role("black", shot))
         if old is None or old_black is None:
             return None

@@ -204,7 +204,8 @@ def _plan_facts(plan: CapturePlan) -> dict[str, str]:
     settings = ", ".join(f"{s.exposure_ms:.4g} ms at level {s.level:g}" for s in plan.settings)
     return {
         "Plan": plan.name,
-        "Frames": f"{plan.shot_count} ({plan.code_count} code, {plan.spectral_count} spectral patterns)",
+        "Frames": f"{plan.shot_count} ({plan.code_count} code, {plan.spectral_count} spectral patterns,"
+        f" {plan.sentinel_count} repeats)",
         "Settings": settings,
         "Exposure": f"{plan.duration_s() / 60:.1f} min without latency",
         "Raw data": f"{plan.raw_bytes / 1e6:.0f} MB before compression",

@@ -119,6 +119,7 @@ def open_dataset(root: Path, bayer: BayerPattern = "RGGB", bit_depth: int = 12) 
         if stored.is_file()
         else _published_plan(root)
     )
+    plan = plan.model_copy(update={"sentinels": None})
     return PublishedScan(root, plan, bayer, bit_depth, survey(root, plan))
 
 
@@ -137,10 +138,12 @@ def export_dataset(
     source does not have, and `Cancelled`; then nothing is written.
     """
     progress = progress or NoProgress()
-    plan = source.plan
+    # Sentinels have no place in that layout, and are not needed for the result.
+    plan = source.plan.model_copy(update={"sentinels": None})
     with staged([folder], overwrite=overwrite, kind=DATASET_FOLDER) as (draft,):
-        for shot in plan.shots():
-            progress.report("export", shot.index, plan.shot_count)
+        own = [shot for shot in source.plan.shots() if shot.role != "sentinel"]
+        for done, shot in enumerate(own):
+            progress.report("export", done, len(own))
             target = draft / folder_name(shot.role, shot.setting) / file_name(shot.role, shot.pattern)
             _write_rgb(source.read(shot), target, bayer, bit_depth)
         (draft / PLAN_NAME).write_text(plan.model_dump_json(indent=1) + "\n", encoding="utf-8")

@@ -98,7 +98,7 @@ def test_a_dataset_becomes_a_scan_with_the_calibration_of_its_rig(bench: Bench, 
     assert bench.control.start()
     assert bench.done == [bench.home / "scene.dsl"]
     before, after = ScanReader(made.scan), ScanReader(bench.done[0])
-    for shot in before.plan.shots():
+    for shot in after.plan.shots():
         np.testing.assert_array_equal(after.read(shot), before.read(shot))
     assert [path.name for path in bench.home.iterdir()] == ["scene.dsl"]
 

@@ -276,8 +276,8 @@ def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
     state = begin(qtbot, page)
     curve = page.forecast.curve.content
     assert figures(page, 1)["Frames"] == str(FRAMES)
-    assert figures(page, 2)["Frames"] == "716"
-    assert figures(page, 2)["Capture"] == "3.6 min"
+    assert figures(page, 2)["Frames"] == "748"
+    assert figures(page, 2)["Capture"] == "3.7 min"
     published = state.published
     assert published is not None
     at = curve.spot(published)
@@ -286,7 +286,7 @@ def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
     curve.marker.moving = True
     curve.marker.setPos(at[0] - 0.004, at[1])
     curve.marker.sigPositionChanged.emit(curve.marker)
-    assert figures(page, 1)["Frames"] == "716"
+    assert figures(page, 1)["Frames"] == "748"
     assert bench.state.preset is PRESETS[0]
     curve.marker.sigPositionChangeFinished.emit(curve.marker)
     assert bench.state.preset is PRESETS[-1]
@@ -314,7 +314,7 @@ def test_a_wish_for_time_is_answered(qtbot: QtBot, ready: Bench, predicted: None
     click(page.forecast.ask)
     assert bench.state.preset is not None
     assert bench.state.preset.key == "coarse"
-    assert "Chosen: Coarse, 90 s" in page.forecast._answer.text()
+    assert "Chosen: Coarse, 93 s" in page.forecast._answer.text()
     page.forecast.wish.setCurrentIndex(1)
     assert page.forecast.error.isVisible()
     page.forecast.error.setValue(0.001)

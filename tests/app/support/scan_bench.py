@@ -17,7 +17,7 @@ from dsl_app.shared.jobs.base import JobRunner
 from dsl_app.shared.undo import UndoStack
 
 from dsl_core.io.calibration_library import CalibrationLibrary
-from dsl_core.model.plan import CapturePlan, LineComb
+from dsl_core.model.plan import CapturePlan, LineComb, Sentinels
 from dsl_core.model.presets import PRESETS
 from dsl_core.model.rig import Rig
 from tests.app.support.doubles import InlineRunner, RecordingNotifier
@@ -63,7 +63,7 @@ def make_bench(folder: Path, runner: JobRunner | None = None) -> ScanBench:
     """A bench whose rig is not yet connected."""
     notifier, undo = RecordingNotifier(), UndoStack()
     runner = runner or InlineRunner(notifier)
-    state = ScanState(CapturePlan(), folder / "first.dsl")
+    state = ScanState(CapturePlan(sentinels=Sentinels()), folder / "first.dsl")
     rig = RigController(RigState(TWIN), runner, notifier)
     library = CalibrationLibrary(folder / "library")
     clock = lambda: datetime(2026, 3, 1, 10, 20)  # noqa: E731
@@ -96,7 +96,7 @@ def make_forecast(
         bench.notifier,
         folder,
         automatic,
-        lambda rig: (CapturePlan(name="published"), COMB),
+        lambda rig: (CapturePlan(name="published", sentinels=Sentinels()), COMB),
     )
 
 

@@ -99,7 +99,7 @@ def identity(plan: CapturePlan) -> int:
     A number, because custom patterns are too long to compare while a marker is dragged.
     """
     settings = tuple((round(setting.exposure_ms, 6), setting.level) for setting in plan.settings)
-    return hash((plan.code, plan.spectral, settings, plan.code_settings))
+    return hash((plan.code, plan.spectral, settings, plan.code_settings, plan.sentinels))
 
 
 def plan_title(plan: CapturePlan) -> str:

@@ -72,7 +72,7 @@ def test_presets_and_candidates_are_predicted_once_and_remembered(
     # The published candidate is the reference preset.
     assert len(points) == len(PRESETS) + 1
     assert control.state.published is not None
-    assert control.state.published.expected.frames == 716
+    assert control.state.published.expected.frames == 748
     assert control.state.current.value is not None
     assert control.state.current.value.preset == "preview"
     assert control.state.progress.value == (0, 0)
@@ -200,7 +200,7 @@ def test_after_a_scan_what_it_was_stands_beside_what_was_expected(
     bench.scans.start()
     found = control.state.measured.value
     assert found is not None
-    assert (found.name, found.frames, found.seconds) == ("first", 150, None)
+    assert (found.name, found.frames, found.seconds) == ("first", 154, None)
     assert found.raw_bytes == bench.state.plan.value.raw_bytes
     assert found.computing_s is not None
     assert found.depth_rmse_mm is not None

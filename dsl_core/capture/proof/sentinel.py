@@ -1,0 +1,51 @@
+"""Whether an old shot, taken again, shows its pattern: its own picture of before says how it should look.
+
+What has moved since is not for this module: a sentinel that looks the same wrong way twice is believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.prediction import Expected, contest_of_pictures
+from dsl_core.capture.proof.raster import Counts, Noise, Raster
+from dsl_core.model.plan import Shot
+
+#: So many takes of one sentinel may be refused.
+REFUSALS = 2
+
+
+class SentinelProof:
+    """Judges sentinels by the pictures that they repeat."""
+
+    def __init__(self, noise: Noise, raster: Raster) -> None:
+        """For pictures of this raster."""
+        self._noise, self._raster = noise, raster
+        self._refused: dict[int, int] = {}
+
+    def judge(
+        self, shot: Shot, seen: Counts, old: Counts | None, black: Counts | None, rivals: Iterable[Counts]
+    ) -> Finding:
+        """Compare with the ``old`` picture; the first of the ``rivals`` is that of the shot before."""
+        if old is None or black is None:
+            return Finding(shot, Verdict.UNTOLD)
+        dark, wanted = black.astype(np.float32), self._expected(old)
+        verdicts = [Verdict.LATE, *[Verdict.OTHER] * 8]
+        told = False
+        for verdict, rival in zip(verdicts, rivals, strict=False):
+            found = contest_of_pictures(
+                seen, wanted, self._expected(rival), dark, np.zeros_like(dark), self._noise, self._raster
+            )
+            told |= found.is_told
+            if found.is_lost or found.is_torn:
+                self._refused[shot.index] = self._refused.get(shot.index, 0) + 1
+                if self._refused[shot.index] > REFUSALS:
+                    return Finding(shot, Verdict.UNTOLD)
+                return Finding(shot, verdict if found.is_lost else Verdict.TORN, (shot,))
+        return Finding(shot, Verdict.RIGHT if told else Verdict.UNTOLD)
+
+    def _expected(self, picture: Counts) -> Expected:
+        return Expected(picture.astype(np.float32), self._noise.variance(picture))

@@ -1,0 +1,52 @@
+"""Sentinels of a scan: believed where they show their pattern, taken again where they do not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.finding import Verdict
+from dsl_core.capture.proof.raster import Noise, Raster
+from dsl_core.capture.proof.sentinel import REFUSALS, SentinelProof
+from dsl_core.model.plan import Shot
+
+SIZE = (48, 40)
+SHOT = Shot(90, "sentinel", 20, 0, 10.0, 1.0)
+
+
+@pytest.fixture
+def pictures() -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(3)
+    light = rng.uniform(300, 1500, SIZE[0] * SIZE[1])
+    line = np.where(np.arange(light.size) % SIZE[0] // 8 == 2, light, 0.0)
+    noisy = {name: rng.poisson(at) + 60 for name, at in (("white", light), ("again", light), ("line", line))}
+    noisy["black"] = rng.poisson(np.full(light.size, 4.0)) + 60
+    return {name: picture.astype(np.uint16) for name, picture in noisy.items()}
+
+
+def judge(pictures: dict[str, np.ndarray], seen: np.ndarray, proof: SentinelProof) -> Verdict:
+    rivals = [pictures["line"], pictures["black"]]
+    return proof.judge(SHOT, seen, pictures["white"], pictures["black"], rivals).verdict
+
+
+def test_a_repeat_is_believed_even_if_the_light_has_changed(pictures: dict[str, np.ndarray]) -> None:
+    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    assert judge(pictures, pictures["again"], proof) is Verdict.RIGHT
+    assert judge(pictures, (0.85 * pictures["again"]).astype(np.uint16), proof) is Verdict.RIGHT
+
+
+def test_another_picture_is_named_and_refused_a_few_times_only(pictures: dict[str, np.ndarray]) -> None:
+    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    for _ in range(REFUSALS):
+        assert judge(pictures, pictures["line"], proof) is Verdict.LATE
+    assert judge(pictures, pictures["line"], proof) is Verdict.UNTOLD
+    torn = np.concatenate([pictures["again"][:800], pictures["black"][800:]])
+    other = replace(SHOT, index=91)
+    found = proof.judge(other, torn, pictures["white"], pictures["black"], [pictures["black"]])
+    assert found.again == (other,)
+
+
+def test_nothing_is_said_without_the_picture_of_before(pictures: dict[str, np.ndarray]) -> None:
+    proof = SentinelProof(Noise.of(None, 12), Raster(SIZE))
+    found = proof.judge(SHOT, pictures["line"], None, pictures["black"], [])
+    assert found.verdict is Verdict.UNTOLD
