@@ -47,6 +47,8 @@ SWAPS: dict[type[ast.AST], str] = {
     ast.BitOr: "&",
 }
 LIMIT_S = 900.0
+#: Half as much again of a guard against zero is as good a guard, so numbers below this become one.
+TINY = 1e-5
 #: Statements whose absence changes no result.
 TALK = ("progress.report(", "_log.", "warnings.")
 
@@ -100,7 +102,7 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
             case ast.Constant(value=int(value)):
                 yield on(node.lineno, node.col_offset, node.end_col_offset or 0, str(value + 1))
             case ast.Constant(value=float(value)):
-                new = repr(value * 1.5 if value else 1.0)
+                new = repr(1.0 if abs(value) < TINY else value * 1.5)
                 yield on(node.lineno, node.col_offset, node.end_col_offset or 0, new)
             case ast.AugAssign() | ast.Expr(value=ast.Call()) if node.lineno == node.end_lineno:
                 if lines[node.lineno - 1].strip().startswith(TALK):
@@ -109,8 +111,12 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
 
 
 def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
-    """Annotations, decorators, and the guard of a zip whose parts are equally long."""
+    """Annotations, decorators, texts of errors and of the log, the guard of a zip of equally long parts."""
     for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            yield node.exc
+        if isinstance(node, ast.Expr) and ast.unparse(node).startswith(("_log.", "warnings.")):
+            yield node
         if isinstance(node, ast.arg | ast.AnnAssign) and node.annotation is not None:
             yield node.annotation
         if isinstance(node, ast.FunctionDef | ast.ClassDef):

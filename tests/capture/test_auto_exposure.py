@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dsl_core.capture.auto_exposure import FILL, ExposureSearch
+from dsl_core.capture.auto_exposure import FILL, MOST_FRAMES, ExposureSearch
 
 FULL = 4095
 CYCLE_MS = 1000 / 60
@@ -73,3 +73,65 @@ def test_a_saturated_frame_quarters_the_exposure_and_a_black_one_lengthens_it_si
     assert search.judge(np.full((6, 8), FULL, np.uint16), 160.0) == pytest.approx(40.0)
     assert search.judge(np.full((6, 8), 200, np.uint16), 10.0) == pytest.approx(160.0)
     assert not search.is_over
+
+
+def judged(share: float, exposure_ms: float = 100.0) -> tuple[ExposureSearch, float]:
+    """The exposure after an even frame that bright, and the search."""
+    search = ExposureSearch((1.0, 1000.0), 1000, None)
+    return search, search.judge(np.full((10, 10), round(1000 * share), np.uint16), exposure_ms)
+
+
+@pytest.mark.parametrize(
+    ("share", "is_found"), [(0.79, False), (0.8, True), (0.9, True), (0.91, False), (0.999, False)]
+)
+def test_a_frame_near_the_wanted_brightness_ends_the_search(share: float, is_found: bool) -> None:
+    search, following = judged(share)
+    assert search.found == is_found
+    assert following == pytest.approx(100.0 if is_found else 100 * 0.9 / share)
+
+
+@pytest.mark.parametrize(("share", "is_found"), [(0.09, False), (0.11, True)])
+def test_the_longest_exposure_is_enough_from_a_tenth_of_full_scale(share: float, is_found: bool) -> None:
+    search, following = judged(share, 1000.0)
+    assert search.found == is_found
+    assert bool(search.trouble) != is_found
+    assert following == 1000.0
+
+
+def test_saturation_at_the_shortest_exposure_is_trouble_and_above_it_is_not() -> None:
+    assert judged(1.0, 1.0)[0].trouble
+    search, following = judged(1.0, 1.1)
+    assert (search.trouble, following) == ("", 1.0)
+
+
+@pytest.mark.parametrize(("glints", "level"), [(4, 0.5), (5, 1.0)])
+def test_half_a_percent_of_pixels_may_be_brighter(glints: int, level: float) -> None:
+    search = ExposureSearch((1.0, 1000.0), 1000, None, 200.0)
+    pixels = np.full(1000, 600, np.uint16)
+    pixels[:glints] = 1000
+    assert search._brightness(pixels) == level
+    pixels[:glints] = 100
+    assert search._brightness(np.full(9, 100, np.uint16)) == 0.0, "below black"
+
+
+def test_large_frames_are_judged_by_an_even_part_of_their_pixels() -> None:
+    search = ExposureSearch((1.0, 1000.0), 1000, None)
+    pixels = np.zeros(400_000, np.uint16)
+    pixels[1::2] = 900
+    assert search._brightness(pixels) == 0.0
+    assert search._brightness(pixels[:399_999]) == 0.9
+
+
+def test_the_twelfth_frame_is_the_last() -> None:
+    search, asked = ExposureSearch((1.0, 5000.0), 1000, None), 0
+    while not search.is_over:
+        asked += 1
+        search.judge(np.full((4, 4), 1000 if asked % 2 else 50, np.uint16), 100.0)
+    assert asked == MOST_FRAMES == 12
+
+
+def test_exposures_are_whole_cycles_within_the_range() -> None:
+    search = ExposureSearch((12.0, 47.0), 1000, 10.0)
+    assert [search.start_from(ms) for ms in (1.0, 20.0, 29.9, 30.0 - 1e-6, 36.0, 99.0)] == [20, 20, 20, 30, 30, 40]
+    assert ExposureSearch((12.0, 15.0), 1000, 10.0).start_from(1.0) == 20.0
+    assert ExposureSearch((1.0, 2.0), 1000, 10.0)._whole(0.5) == 10.0

@@ -62,6 +62,24 @@ def test_focus_rises_with_sharp_edges_and_not_with_exposure() -> None:
     assert scores[2] == pytest.approx(scores[0], rel=1e-3)
 
 
+def test_an_odd_row_and_column_are_left_out() -> None:
+    mosaic = np.arange(35, dtype=np.uint16).reshape(5, 7)
+    whole = mosaic[:4, :6].copy()
+    assert quick_picture(mosaic, "RGGB", 4095).tolist() == quick_picture(whole, "RGGB", 4095).tolist()
+    assert quick_picture(mosaic, "BGGR", 4095).shape == (2, 3, 3)
+    assert statistics(mosaic, "BGGR", 4095).mean_dn == statistics(whole, "BGGR", 4095).mean_dn
+
+
+def test_focus_is_the_mean_squared_step_of_green_over_its_squared_mean() -> None:
+    mosaic = np.zeros((8, 8), np.uint16)
+    # First greens of every second row of cells: 10, 20, 40, 50; the others do not count.
+    mosaic[0::4, 1::2] = 10, 20, 40, 50
+    mosaic[2::4, 1::2] = 999
+    assert statistics(mosaic, "RGGB", 4095).focus == pytest.approx((100 + 400 + 100) / 3 / 30**2)
+    assert statistics(np.zeros((4, 4), np.uint16), "RGGB", 4095).focus == 0.0
+    assert statistics(np.full((4, 2), 9, np.uint16), "RGGB", 4095).focus == 0.0
+
+
 def test_a_picture_of_one_row_is_told() -> None:
     with pytest.raises(DecodeError, match="at least 2 x 2"):
         statistics(np.zeros((1, 8), np.uint16), "RGGB", 4095)

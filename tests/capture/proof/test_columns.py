@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from dsl_core.capture.proof.code_pairs import Pair
-from dsl_core.capture.proof.columns import decode, exchanged_pairs
+from dsl_core.capture.proof import columns
+from dsl_core.capture.proof.columns import _Neighbours, _of_columns, decode, exchanged_pairs
 from dsl_core.model.plan import GrayCode
 from dsl_core.patterns.gray_code import code_image
 
@@ -55,3 +56,89 @@ def test_a_fine_pair_is_named_alone(number: int) -> None:
 
 def test_a_picture_turned_around_says_nothing_where_nobody_knows_which_way_columns_rise() -> None:
     assert _suspects(0, None) == ()
+
+
+def judged(row: list[int]) -> tuple[float, float] | None:
+    return _Neighbours((1, len(row)), np.ones(len(row), bool)).judge(np.array(row, np.int32))
+
+
+def test_neighbours_are_judged_from_sixty_triples_on() -> None:
+    assert judged(list(range(61))) is None
+    # Column 0 is as good as any.
+    assert judged(list(range(62))) == (0.0, 1.0)
+    assert judged([-1, *range(1, 62)]) is None
+    assert _Neighbours((1, 62), np.arange(62) > 0).judge(np.arange(62, dtype=np.int32)) is None
+
+
+def test_columns_rise_by_steps_of_up_to_twenty() -> None:
+    stairs = [20 * i for i in range(70)]
+    assert judged(stairs) == (0.0, 1.0)
+    assert judged(stairs[::-1]) == (0.0, -1.0)
+    assert judged([21 * i for i in range(70)]) == (0.0, 0.0), "no neighbours on one surface"
+    rises = judged([5 * (i % 2) for i in range(71)])
+    assert rises is not None
+    assert rises[1] == 0.0
+
+
+def test_roughness_is_the_mean_second_difference_clipped_at_six_times_the_first_median() -> None:
+    asked = _Neighbours((1, 70), np.ones(70, bool))
+    step = np.r_[np.zeros(35), np.full(35, 30)].astype(np.int32) + np.arange(70, dtype=np.int32)
+    # Two second differences of thirty, at a median below one: six of each count.
+    assert asked.judge(step) == pytest.approx((12 / 68, 1.0))
+    saw = (9 * (np.arange(70) % 2)).astype(np.int32)
+    found = asked.judge(saw)
+    assert found is not None
+    assert found[0] == 6.0, "the first picture's clip stays"
+    own = _Neighbours((1, 70), np.ones(70, bool)).judge(saw)
+    assert own is not None
+    assert own[0] == 18.0
+
+
+def test_pairs_of_rows_are_left_alone() -> None:
+    pairs = dict.fromkeys(range(20), (np.zeros(1, np.uint16), np.zeros(1, np.uint16)))
+    # Eight bits of columns, two of rows, and the same of a second setting.
+    assert _of_columns(GrayCode(rows=True), pairs, SIZE) == [*range(8), *range(10, 18)]
+    assert _of_columns(GrayCode(rows=False), pairs, SIZE) == list(range(20))
+
+
+def suspects_of(
+    monkeypatch: pytest.MonkeyPatch,
+    table: dict[int | None, tuple[float, float] | None],
+    rises: bool | None = True,
+) -> tuple[int, ...]:
+    """The suspects where pairs exchanged (None: as taken) leave columns so rough, so far rising."""
+
+    class Known:
+        def __init__(self, *_: object) -> None: ...
+
+        def judge(self, number: int | None) -> tuple[float, float] | None:
+            return table[number]
+
+    monkeypatch.setattr(columns, "_Neighbours", Known)
+    monkeypatch.setattr(columns, "decode", lambda code, size, pairs, number=None: (number, None))
+    pair = (np.zeros(1, np.uint16), np.zeros(1, np.uint16))
+    pairs = {number: pair for number in table if number is not None}
+    return exchanged_pairs(CODE, SIZE, pairs, np.ones(1, bool), (1, 1), rises)
+
+
+def test_undoing_a_pair_has_to_make_columns_a_quarter_smoother(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert suspects_of(monkeypatch, {None: (1.3, 0.9), 0: (2.0, 0.9), 1: (1.0, 0.9)}) == (1,)
+    assert suspects_of(monkeypatch, {None: (1.2, 0.9), 0: (2.0, 0.9), 1: (1.0, 0.9)}) == ()
+    assert suspects_of(monkeypatch, {None: None, 0: (1.0, 0.9)}) == ()
+    assert suspects_of(monkeypatch, {None: (9.0, 0.9), 0: None}) == ()
+
+
+def test_undone_columns_have_to_rise(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert suspects_of(monkeypatch, {None: (9.0, 0.9), 0: (1.0, 0.59)}) == ()
+    assert suspects_of(monkeypatch, {None: (9.0, 0.9), 0: (1.0, 0.6)}) == (0,)
+    assert suspects_of(monkeypatch, {None: (9.0, -0.9), 0: (1.0, -0.6)}, rises=False) == (0,)
+    assert suspects_of(monkeypatch, {None: (9.0, 0.9), 0: (1.0, 0.6)}, rises=False) == ()
+
+
+def test_of_columns_turned_around_all_pairs_that_leave_them_nearly_as_smooth_are_suspects(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    table: dict[int | None, tuple[float, float] | None] = {0: (2.9, 0.9), 1: (1.0, 0.9), 2: (3.1, 0.9)}
+    assert suspects_of(monkeypatch, {None: (1.0, 0.19), **table}) == (0, 1)
+    assert suspects_of(monkeypatch, {None: (1.0, 0.19), **table}, rises=None) == ()
+    assert suspects_of(monkeypatch, {None: (1.0, 0.2), **table}) == ()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from dsl_core.capture.proof.contest import vote
+from dsl_core.capture.proof.contest import Contest, vote
 
 WANTED, RIVAL = np.full(400, 900, np.float32), np.full(400, 100, np.float32)
 
@@ -40,3 +41,17 @@ def test_scattered_pixels_against_are_no_tear() -> None:
 def test_few_pixels_tell_nothing() -> None:
     assert not vote(RIVAL[:11], WANTED[:11], RIVAL[:11]).is_told
     assert not vote(RIVAL[:0], WANTED[:0], RIVAL[:0]).is_told
+    assert vote(WANTED[:12], WANTED[:12], RIVAL[:12]).is_told
+
+
+@pytest.mark.parametrize(("mean", "is_lost"), [(0.16, False), (0.14, True), (-1.0, True)])
+def test_a_picture_is_lost_below_a_small_majority(mean: float, is_lost: bool) -> None:
+    assert Contest(100, mean).is_lost == is_lost
+    assert not Contest(11, mean).is_lost
+
+
+@pytest.mark.parametrize(("count", "limit"), [(100, 8.0), (1000, 20.0)])
+def test_a_tear_has_eight_votes_and_a_fiftieth_of_all(count: int, limit: float) -> None:
+    assert Contest(count, 0.9, -limit - 0.1).is_torn
+    assert not Contest(count, 0.9, -limit + 0.1).is_torn
+    assert not Contest(11, 0.9, -limit - 0.1).is_torn

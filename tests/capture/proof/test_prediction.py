@@ -1,0 +1,181 @@
+"""Pictures predicted from lines and from earlier settings, and the pixels that tell two of them apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.prediction import (
+    Expected,
+    Lit,
+    brightness_of_lines,
+    brightness_of_picture,
+    contest_of_lines,
+    contest_of_pictures,
+    line_profile,
+    rescaled,
+)
+from dsl_core.capture.proof.raster import Noise, Raster
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Role, Shot
+from dsl_core.model.rig import Sensor
+
+#: Variance of counts: light above 100 DN over 10, and 0.35.
+NOISE = Noise(Sensor(black_level_dn=100.0, electrons_per_dn=10.0, read_noise_dn=0.5))
+PLAN = CapturePlan(
+    camera_size_px=(32, 16),
+    projector_size_px=(40, 8),
+    code=GrayCode(rows=False),
+    spectral=LineComb(width_px=4, step_px=4, period_px=20),
+)
+
+
+def shot(role: Role, pattern: int = 0) -> Shot:
+    return Shot(0, role, pattern, 0, 10.0, 0.5)
+
+
+def floats(values: object) -> NDArray[np.float32]:
+    return np.asarray(values, np.float32)
+
+
+def test_a_line_gives_its_neighbours_fifteen_percent_each() -> None:
+    found = line_profile(PLAN, shot("spectral", 1))
+    assert found is not None
+    one = [0.15, 0.85, 1.0, 1.0, 0.85, 0.15]
+    wanted = np.zeros(40)
+    wanted[3:9] = wanted[23:29] = one
+    assert found == pytest.approx(np.repeat(wanted, 3), abs=1e-6)
+    first = line_profile(PLAN, shot("spectral", 0))
+    assert first is not None
+    assert first[:15:3] == pytest.approx([1.0, 1.0, 1.0, 0.85, 0.15]), "the frame's edge goes on"
+
+
+def test_white_black_and_codes_as_profiles() -> None:
+    white, black = line_profile(PLAN, shot("white")), line_profile(PLAN, shot("black"))
+    assert white is not None
+    assert black is not None
+    assert white.tolist() == [1.0] * 120
+    assert black.tolist() == [0.0] * 120
+    assert line_profile(PLAN, shot("code")) is None
+
+
+def lit(count: int, contrast: float = 1000.0) -> Lit:
+    """Every second pixel of a picture, each at a column and channel of its own."""
+    even = np.full(count, contrast, np.float32)
+    return Lit(
+        2 * np.arange(count), np.arange(count, dtype=np.int32), floats(np.full(count, 120)), even, floats(even / 20)
+    )
+
+
+def test_pixels_vote_where_two_patterns_differ_by_three_tenths() -> None:
+    seen = np.full(60, 120, np.uint16)
+    seen[::2] += 600
+    wanted, rival = floats(np.full(30, 0.6)), floats(np.full(30, 0.29))
+    found = contest_of_lines(seen, lit(30), wanted, rival)
+    assert (found.count, found.mean) == (30, 1.0)
+    assert contest_of_lines(seen, lit(30), rival, wanted).mean == -1.0
+    assert contest_of_lines(seen, lit(30), wanted, wanted - floats(0.29)).count == 0
+
+
+@pytest.mark.parametrize(("count", "asked"), [(7999, 7999), (8000, 4000), (12000, 4000)])
+def test_of_many_pixels_some_thousand_are_asked(count: int, asked: int) -> None:
+    ones, none = floats(np.ones(count)), floats(np.zeros(count))
+    assert contest_of_lines(np.zeros(2 * count, np.uint16), lit(count), ones, none).count == asked
+
+
+def test_brightness_is_light_over_light_wanted_of_bright_pixels_that_are_not_saturated() -> None:
+    wanted = floats([0.09] * 10 + [0.11] * 10 + [1.0] * 10)
+    seen = np.full(60, 120, np.uint16)
+    seen[::2] += (800 * wanted).round().astype(np.uint16)
+    assert brightness_of_lines(seen, lit(30), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
+    seen[:20] = 3000  # where too little is expected
+    seen[58] = 4095
+    assert brightness_of_lines(seen, lit(30), wanted, NOISE) == pytest.approx(0.8, rel=1e-3)
+
+
+@pytest.mark.parametrize(("count", "contrast", "is_told"), [(12, 1000, True), (11, 1000, False)])
+def test_brightness_needs_twelve_pixels(count: int, contrast: float, is_told: bool) -> None:
+    seen = np.full(2 * count, 500, np.uint16)
+    assert (brightness_of_lines(seen, lit(count, contrast), floats(np.ones(count)), NOISE) is not None) == is_told
+
+
+@pytest.mark.parametrize(("light", "is_told"), [(24.5, False), (25.5, True)])
+def test_brightness_is_that_of_twenty_five_deviations_of_all_pixels_together(light: float, is_told: bool) -> None:
+    # Sixteen pixels of deviation one: four together.
+    some = Lit(
+        np.arange(16), np.arange(16, dtype=np.int32), floats(np.zeros(16)), floats(np.full(16, light / 4)), floats(np.ones(16))
+    )
+    found = brightness_of_lines(np.full(16, 7, np.uint16), some, floats(np.ones(16)), NOISE)
+    assert found == (pytest.approx(28 / light) if is_told else None)
+
+
+def test_a_picture_of_another_setting_is_its_light_times_that_of_the_setting() -> None:
+    picture = np.array([300, 200, 4095, 4095], np.uint16)
+    old_black = np.array([200, 200, 200, 3900], np.uint16)
+    found = rescaled(picture, old_black, floats([150, 150, 150, 150]), 2.0, NOISE)
+    assert found.counts == pytest.approx([350, 150, 4095, 540])
+    # Twice squared, of picture and black: (200 + 100) / 10 + 0.7, and so on.
+    assert found.variance[:3] == pytest.approx([4 * 30.7, 4 * 20.7, 4 * (399.5 + 10 + 0.7)], rel=1e-3)
+    assert np.isinf(found.variance[3]), "nobody knows how bright a saturated pixel was"
+
+
+def pictures(apart: float, light: float, variance: float, count: int = 50) -> tuple[Expected, Expected, NDArray[np.float32]]:
+    """A picture with so much light, one darker by ``apart``, and black."""
+    black = floats(np.full(count, 100))
+    each = floats(np.full(count, variance))
+    return Expected(black + light, each), Expected(black + (light - apart), each), black
+
+
+@pytest.mark.parametrize(("apart", "is_told"), [(290.0, False), (310.0, True)])
+def test_pictures_are_told_apart_by_three_tenths_of_their_light(apart: float, is_told: bool) -> None:
+    raster, none = Raster((10, 5)), floats(np.zeros(50))
+    wanted, rival, black = pictures(apart, 1000.0, 0.1)
+    seen = wanted.counts.astype(np.uint16)
+    found = contest_of_pictures(seen, wanted, rival, black, none, NOISE, raster)
+    assert (found.count, found.mean) == ((50, 1.0) if is_told else (0, 1.0))
+    assert contest_of_pictures(seen, rival, wanted, black, none, NOISE, raster).is_lost == is_told
+    least = floats(np.full(50, 320.0))
+    assert contest_of_pictures(seen, wanted, rival, black, least, NOISE, raster).count == 0
+
+
+@pytest.mark.parametrize(("apart", "is_told"), [(59.0, False), (61.0, True)])
+def test_pictures_are_told_apart_by_six_deviations_of_all_three(apart: float, is_told: bool) -> None:
+    # Seen 97 DN of black level and noise 0.35, both predictions 49.825: a deviation of ten together.
+    wanted, rival, black = pictures(apart, apart, 49.825)
+    found = contest_of_pictures(np.full(50, 90, np.uint16), wanted, rival, black, floats(np.zeros(50)), NOISE, Raster((10, 5)))
+    assert (found.count == 50) == is_told
+
+
+def test_where_pixels_are_too_noisy_blocks_are_asked() -> None:
+    raster = Raster((32, 32))
+    assert raster.pooled == 4
+    count = 32 * 32
+    # Blocks of four have half the deviation.
+    for apart, asked in ((40.0, 256), (29.0, 0)):
+        wanted, rival, black = pictures(apart, apart, 49.825, count)
+        seen = np.full(count, 90, np.uint16)
+        found = contest_of_pictures(seen, wanted, rival, black, floats(np.zeros(count)), NOISE, raster)
+        assert (found.count, found.is_lost) == (asked, asked > 0)
+
+
+def test_brightness_of_a_picture_leaves_out_what_is_or_should_be_saturated() -> None:
+    black = floats(np.full(40, 100))
+    wanted = Expected(black + 1000, floats(np.full(40, 1.0)))
+    seen = np.full(40, 600, np.uint16)
+    assert brightness_of_picture(seen, wanted, black, NOISE) == pytest.approx(0.5)
+    seen[0] = 4095
+    counts = wanted.counts.copy()
+    counts[1] = 3690  # nine tenths of full scale are 3685.5
+    assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(0.5)
+    counts[1] = 3680
+    assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(19500 / 41580)
+    assert brightness_of_picture(seen[:11], Expected(counts[:11], wanted.variance[:11]), black[:11], NOISE) is None
+
+
+def test_brightness_of_a_picture_asks_for_light_beyond_both_noises() -> None:
+    black = floats(np.full(16, 100))
+    # Variance 5.65 of the prediction and 10.35 of the picture: sixteen pixels, a deviation of sixteen.
+    for light, is_told in ((24.0, False), (26.0, True)):
+        wanted = Expected(black + light, floats(np.full(16, 5.65)))
+        found = brightness_of_picture(np.full(16, 200, np.uint16), wanted, black, NOISE)
+        assert (found is not None) == is_told

@@ -1,0 +1,72 @@
+"""Rows that stand for a picture, their blocks and colours, and what counts are worth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.capture.proof.raster import Noise, Raster
+from dsl_core.model.rig import Sensor
+
+
+@pytest.mark.parametrize(
+    ("size", "shape"),
+    [
+        ((64, 48), (48, 64)),
+        ((1000, 600), (36, 1000)),
+        ((400, 600), (80, 400)),
+        ((1024, 600), (36, 1024)),
+        ((1025, 600), (36, 513)),
+        ((4000, 3000), (36, 1000)),
+    ],
+)
+def test_a_raster_is_whole_rows_of_small_pictures_and_some_of_large_ones(
+    size: tuple[int, int], shape: tuple[int, int]
+) -> None:
+    raster = Raster(size)
+    assert raster.shape == shape
+    pixels = np.arange(size[0] * size[1], dtype=np.uint32).reshape(size[::-1])
+    taken = raster.take(pixels).reshape(shape)  # type: ignore[arg-type]
+    rows, columns = np.divmod(taken, size[0])
+    assert (rows[0, 0], rows[-1, 0]) == (0, size[1] - 1)
+    assert np.ptp(np.diff(rows[:, 0].astype(int))) <= 1
+    assert set(np.diff(columns[0].astype(int))) == {-(-size[0] // 1024)}
+
+
+@pytest.mark.parametrize("size", [(64, 48), (1025, 90), (7, 5)])
+@pytest.mark.parametrize("bayer", ["RGGB", "GBRG"])
+def test_channels_are_those_of_the_pixels_taken(size: tuple[int, int], bayer: str) -> None:
+    raster = Raster(size)
+    rows, columns = np.mgrid[: size[1], : size[0]]
+    colours = np.array(["RGB".index(letter) for letter in bayer])[2 * (rows % 2) + columns % 2]
+    assert raster.channels(bayer).tolist() == raster.take(colours.astype(np.uint16)).tolist()
+
+
+def test_blocks_are_means_of_sixteen_parts_down_and_across() -> None:
+    raster = Raster((70, 33))
+    assert raster.pooled == 2 * 4
+    values = np.random.default_rng(1).random((33, 70)).astype(np.float32)
+    blocks = values[:32, :68].reshape(16, 2, 17, 4).mean((1, 3))
+    assert raster.pool(values.ravel()) == pytest.approx(blocks.ravel(), rel=1e-5)
+    small = Raster((9, 31))
+    assert small.pooled == 1
+    assert small.pool(np.arange(279, dtype=np.uint16)).tolist() == list(range(279))
+
+
+def test_variance_of_counts_is_shot_noise_above_black_read_noise_and_rounding() -> None:
+    noise = Noise(Sensor(black_level_dn=260.0, electrons_per_dn=4.0, read_noise_dn=3.0))
+    assert noise.variance(np.array([0, 260, 660], np.uint16)) == pytest.approx([9.1, 9.1, 109.1])
+
+
+@pytest.mark.parametrize(
+    ("bits", "electrons", "read_dn"), [(12, 10.0, 2.0), (8, 160.0, 0.5), (10, 40.0, 0.5), (16, 0.625, 32.0)]
+)
+def test_an_unknown_sensor_is_like_the_published_one_in_its_own_counts(
+    bits: int, electrons: float, read_dn: float
+) -> None:
+    sensor = Noise.of(None, bits).sensor
+    assert (sensor.bit_depth, sensor.black_level_dn) == (bits, 0.0)
+    assert sensor.electrons_per_dn == pytest.approx(electrons)
+    assert sensor.read_noise_dn == pytest.approx(read_dn)
+    known = Sensor(bit_depth=10)
+    assert Noise.of(known, 12).sensor is known
