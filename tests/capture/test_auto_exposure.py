@@ -132,6 +132,13 @@ def test_the_twelfth_frame_is_the_last() -> None:
 
 def test_exposures_are_whole_cycles_within_the_range() -> None:
     search = ExposureSearch((12.0, 47.0), 1000, 10.0)
-    assert [search.start_from(ms) for ms in (1.0, 20.0, 29.9, 30.0 - 1e-6, 36.0, 99.0)] == [20, 20, 20, 30, 30, 40]
+    assert [search.start_from(ms) for ms in (1.0, 20.0, 29.9, 30.0 - 1e-6, 36.0, 99.0)] == [
+        20,
+        20,
+        20,
+        30,
+        30,
+        40,
+    ]
     assert ExposureSearch((12.0, 15.0), 1000, 10.0).start_from(1.0) == 20.0
     assert ExposureSearch((1.0, 2.0), 1000, 10.0)._whole(0.5) == 10.0

@@ -178,3 +178,27 @@ def test_wider_lines_are_those_of_a_wider_spread() -> None:
         system.add(1, columns, inside, one, one, 0, width)
         matrices.append(system.matrix)
     assert torch.equal(*matrices)
+
+
+@pytest.mark.parametrize("outside", [0, 20, -1])
+def test_a_band_outside_the_frame_has_no_part_in_the_equations(outside: int) -> None:
+    rig = published_rig()
+    bands = Bands.of(rig, WavelengthGrid())
+    lines = LineSet(5, 2, 2.0, 320, 320)
+    columns = 100.0 + 2.5 * torch.arange(bands.count, dtype=torch.float64)[:, None].expand(-1, 2)
+    inside = torch.ones_like(columns, dtype=torch.bool)
+    inside[outside, 1] = False
+    one = torch.ones((lines.frames, 2), dtype=torch.float64)
+    system = LineEquations(bands, lines, rig.projector_response.blur_px, torch.tensor([1, 1]), columns[0])
+    system.add(1, columns, inside, one, one, 0)
+    full = banded.to_dense(system.matrix)
+    assert not full[1, outside].any()
+    assert not full[1, :, outside].any()
+    assert float(system.right[outside, 1]) == 0.0
+    others = torch.ones(bands.count, dtype=torch.bool)
+    others[outside] = False
+    assert torch.allclose(full[1][others][:, others], full[0][others][:, others])
+    # Without any band inside there is nothing to add.
+    before = system.matrix.clone()
+    system.add(1, columns, torch.zeros_like(inside), one, one, 0)
+    assert torch.equal(system.matrix, before)

@@ -65,3 +65,38 @@ def test_beyond_the_image_circle_the_radial_factor_fades_into_a_constant() -> No
     assert end == pytest.approx(slope * FADE_RADIUS_SQ, rel=1e-4)
     assert radial[2] == pytest.approx(radial[-1] - end / 2, abs=1e-5)
     assert radial[3] == pytest.approx(radial[-1] - end / 1000, abs=1e-5)
+
+
+def test_rays_are_shared_and_so_cannot_be_written_to() -> None:
+    assert not pixel_rays(LENS).flags.writeable
+
+
+def test_the_image_circle_is_a_tenth_beyond_the_farthest_corner() -> None:
+    lens = LENS.model_copy(update={"distortion": (0.0,) * 5})
+    x = max(lens.cx_px, lens.width_px - 1 - lens.cx_px) / lens.fx_px
+    y = max(lens.cy_px, lens.height_px - 1 - lens.cy_px) / lens.fy_px
+    assert max_radius_sq(lens) == pytest.approx(1.21 * (x * x + y * y))
+
+
+def test_beyond_the_circle_the_radial_factor_goes_on_with_its_slope_and_levels_off() -> None:
+    k1, k2, k3, limit = -0.3, 0.2, -0.1, 0.5
+    coefficients = (k1, k2, 0.0, 0.0, k3)
+
+    def factor(radius_sq: float) -> float:
+        x = np.array([np.sqrt(radius_sq)])
+        return float(distort(x, 0 * x, coefficients, limit)[0][0] / x[0])
+
+    edge = 1 + k1 * limit + k2 * limit**2 + k3 * limit**3
+    slope = k1 + 2 * k2 * limit + 3 * k3 * limit**2
+    assert factor(0.2) == pytest.approx(1 + k1 * 0.2 + k2 * 0.04 + k3 * 0.008)
+    assert factor(limit) == pytest.approx(edge)
+    assert (factor(limit + 1e-5) - edge) / 1e-5 == pytest.approx(slope, rel=1e-3)
+    assert factor(limit + 0.3) == pytest.approx(edge + slope * 0.15)
+    assert factor(1e9) == pytest.approx(edge + slope * 0.3, rel=1e-6)
+
+
+def test_tangential_distortion_moves_points_across_the_axes() -> None:
+    x, y = np.array([0.3]), np.array([0.2])
+    u, v = distort(x, y, (0.0, 0.0, 0.01, 0.02, 0.0))
+    assert float(u[0]) == pytest.approx(0.3 + 0.01 * 2 * 0.06 + 0.02 * (0.13 + 2 * 0.09))
+    assert float(v[0]) == pytest.approx(0.2 + 0.01 * (0.13 + 2 * 0.04) + 0.02 * 2 * 0.06)

@@ -332,3 +332,38 @@ def test_demosaicing_blurs_by_the_typical_distance_of_neighbours() -> None:
     columns = np.array([[0.0, 0.7, 1.4, np.nan, 9.0], [0.0, -0.7, 50.0, 50.7, np.nan]])
     assert demosaic_blur_px(columns) == pytest.approx(0.7 * DEMOSAIC_SPREAD**0.5)
     assert demosaic_blur_px(np.full((2, 3), np.nan)) == 0.0
+
+
+@pytest.mark.parametrize("spectral", [COMB, COLOURS], ids=["grey", "colours"])
+def test_direct_light_is_the_most_that_falls_within_a_column_of_a_pixels(spectral: LineComb) -> None:
+    model, _, _ = some_model(spectral)
+    light = model.zero_light(torch.zeros(1, dtype=torch.float64))
+    column = torch.tensor([100.0, 101.3, 102.7, 250.4], dtype=torch.float64)
+    reflectance = torch.tensor([0.2, 0.4, 0.6, 0.8], dtype=torch.float64)
+    # A flat spectrum, so that its colour says what each LED adds.
+    moments = model.zero_moments(column).sum(-1)
+    found = model.direct_light(light, column, moments.sum(1)[:, None] * reflectance)
+    seen = torch.stack([light.at(column - 1), light.at(column), light.at(column + 1)])
+    wanted = torch.einsum("cl,plf->cfp", moments, seen.amax(0)) * reflectance
+    assert torch.allclose(found, wanted, rtol=1e-9)
+    # Neither half a column less nor more would do.
+    for reach in (0.5, 1.5):
+        other = torch.stack([light.at(column - reach), light.at(column), light.at(column + reach)]).amax(0)
+        assert not torch.allclose(other, seen.amax(0), rtol=1e-2)
+
+
+def test_light_of_a_dark_colour_is_none() -> None:
+    model, _, _ = some_model(COLOURS)
+    negative = torch.full((3, 2), -1.0, dtype=torch.float64)
+    assert float(model._by_led(negative).abs().max()) == 0.0
+
+
+def test_weights_without_frames_take_nothing_away() -> None:
+    values = random(4, 2)
+    none = torch.zeros((4, 1), dtype=torch.float64)
+    assert torch.equal(without_offset(values, none, torch.tensor(5.0, dtype=torch.float64)), values)
+
+
+def test_two_neighbours_of_three_columns_have_no_known_pitch() -> None:
+    assert demosaic_blur_px(np.array([0.0, np.nan, 2.0])) == 0.0
+    assert demosaic_blur_px(np.array([3.0, 1.0])) == pytest.approx(2 * 0.4**0.5)

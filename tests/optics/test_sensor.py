@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from dsl_core.model.rig import FlatField, Rig
-from dsl_core.optics.sensor import digitise, raw_variance, relative_gain
+from dsl_core.model.rig import FlatField, Rig, Sensor
+from dsl_core.optics.sensor import digitise, gain_at_pixels, raw_variance, relative_gain
 from dsl_core.reconstruction.surface import reconstruct_surface
 from dsl_core.simulation.published_rig import published_rig
 
@@ -78,3 +78,19 @@ def test_impossible_flat_fields_are_refused(changed: dict[str, object], message:
 def test_a_rig_with_flat_field_survives_json() -> None:
     there = rig(FIELD)
     assert Rig.model_validate_json(there.model_dump_json()) == there
+
+
+def test_gain_is_bilinear_between_nodes_and_cannot_be_written_to() -> None:
+    field = FlatField(rows_px=(0.0, 4.0), columns_px=(0.0, 2.0, 8.0), gain=((1.0, 1.2, 0.8), (1.4, 1.0, 0.6)))
+    gain = gain_at_pixels(field, 5, 9)
+    assert gain.shape == (5, 9)
+    assert not gain.flags.writeable
+    assert gain[0, [0, 1, 2, 5, 8]] == pytest.approx([1.0, 1.1, 1.2, 1.0, 0.8])
+    assert gain[:, 2] == pytest.approx([1.2, 1.15, 1.1, 1.05, 1.0])
+    assert gain[1, 5] == pytest.approx(0.75 * 1.0 + 0.25 * 0.8)
+
+
+def test_shot_noise_starts_at_black() -> None:
+    sensor = Sensor(read_noise_dn=2.0, electrons_per_dn=8.0)
+    found = raw_variance(sensor, np.array([-50.0, 0.0, 16.0]))
+    assert found == pytest.approx([4 + 1 / 12, 4 + 1 / 12, 6 + 1 / 12])

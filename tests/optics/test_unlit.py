@@ -56,3 +56,24 @@ def test_the_halo_falls_before_the_first_column() -> None:
 def test_a_coarse_film_leaves_none() -> None:
     near, far = unlit_px(rig_of(150), WIDTH_PX)
     assert far <= near
+
+
+def test_reach_of_first_orders_is_the_grating_equation_with_a_margin() -> None:
+    rig = rig_of(500)
+    fx = rig.projector.fx_px
+    # Lines 2000 nm apart: 390 and 710 nm leave at these angles.
+    near, far = (fx * np.tan(np.arcsin(nm / 2000)) for nm in (390, 710))
+    assert first_order_reach_px(rig) == pytest.approx((0.85 * near, 1.15 * far))
+    evanescent = first_order_reach_px(rig_of(1600))
+    assert evanescent[1] == pytest.approx(1.15 * fx * np.tan(np.arcsin(0.9)))
+
+
+def test_the_last_column_leaves_room_for_half_a_line_and_three_blurs() -> None:
+    rig = rig_of(500)
+    edge = WIDTH_PX / 2 + 3 * rig.projector_response.blur_px
+    far = unlit_px(rig, WIDTH_PX)[1]
+    assert far == pytest.approx(first_order_reach_px(rig)[0] - edge)
+    bare = rig.projector_response.model_copy(update={"halo_peak_per_px": 0.0})
+    assert unlit_px(rig.model_copy(update={"projector_response": bare}), WIDTH_PX)[0] == pytest.approx(
+        far / 2
+    )

@@ -90,7 +90,9 @@ def test_a_pixel_breaks_a_sum_by_a_share_of_its_contrast_and_by_its_noise(
 
 def darker(pair: Pair, pattern: float, inverse: float) -> Pair:
     """Light above black times a factor."""
-    return tuple(counts(np.round(100 + f * (p - 100.0))) for p, f in zip(pair, (pattern, inverse), strict=True))  # type: ignore[return-value]
+    return tuple(
+        counts(np.round(100 + f * (p - 100.0))) for p, f in zip(pair, (pattern, inverse), strict=True)
+    )  # type: ignore[return-value]
 
 
 def uneven(count: int = 1000) -> Pair:
@@ -134,7 +136,10 @@ def test_two_equal_pictures_and_light_taken_away_are_no_matter_of_brightness() -
     expected = known.sum()
     assert expected is not None
     assert known.brightness((pattern, pattern), expected) is None
-    assert known.brightness((pattern, inverse), 200 + (200 - expected) / 4) is None
+    assert (
+        known.brightness((pattern, inverse), np.float32(200) + (np.float32(200) - expected) / np.float32(4))
+        is None
+    )
 
 
 @pytest.mark.parametrize(("apart", "is_alike"), [(7, True), (9, False), (-7, True), (-9, False)])
@@ -166,7 +171,9 @@ def test_a_torn_picture_is_broken_at_one_end_alone() -> None:
     assert dominant(broken, counted) is Verdict.OTHER
     assert not end_of(broken[:19], counted[:19]), "too few to tell"
     # Only pixels that count make an end.
-    assert end_of(np.r_[np.zeros(30, bool), True, np.zeros(39, bool)], np.r_[np.zeros(30, bool), np.ones(40, bool)])
+    assert end_of(
+        np.r_[np.zeros(30, bool), True, np.zeros(39, bool)], np.r_[np.zeros(30, bool), np.ones(40, bool)]
+    )
 
 
 @pytest.mark.parametrize(("lower", "is_torn"), [(1, True), (2, False)])

@@ -63,7 +63,11 @@ def lit(count: int, contrast: float = 1000.0) -> Lit:
     """Every second pixel of a picture, each at a column and channel of its own."""
     even = np.full(count, contrast, np.float32)
     return Lit(
-        2 * np.arange(count), np.arange(count, dtype=np.int32), floats(np.full(count, 120)), even, floats(even / 20)
+        2 * np.arange(count),
+        np.arange(count, dtype=np.int32),
+        floats(np.full(count, 120)),
+        even,
+        floats(even / 20),
     )
 
 
@@ -96,14 +100,22 @@ def test_brightness_is_light_over_light_wanted_of_bright_pixels_that_are_not_sat
 @pytest.mark.parametrize(("count", "contrast", "is_told"), [(12, 1000, True), (11, 1000, False)])
 def test_brightness_needs_twelve_pixels(count: int, contrast: float, is_told: bool) -> None:
     seen = np.full(2 * count, 500, np.uint16)
-    assert (brightness_of_lines(seen, lit(count, contrast), floats(np.ones(count)), NOISE) is not None) == is_told
+    assert (
+        brightness_of_lines(seen, lit(count, contrast), floats(np.ones(count)), NOISE) is not None
+    ) == is_told
 
 
 @pytest.mark.parametrize(("light", "is_told"), [(24.5, False), (25.5, True)])
-def test_brightness_is_that_of_twenty_five_deviations_of_all_pixels_together(light: float, is_told: bool) -> None:
+def test_brightness_is_that_of_twenty_five_deviations_of_all_pixels_together(
+    light: float, is_told: bool
+) -> None:
     # Sixteen pixels of deviation one: four together.
     some = Lit(
-        np.arange(16), np.arange(16, dtype=np.int32), floats(np.zeros(16)), floats(np.full(16, light / 4)), floats(np.ones(16))
+        np.arange(16),
+        np.arange(16, dtype=np.int32),
+        floats(np.zeros(16)),
+        floats(np.full(16, light / 4)),
+        floats(np.ones(16)),
     )
     found = brightness_of_lines(np.full(16, 7, np.uint16), some, floats(np.ones(16)), NOISE)
     assert found == (pytest.approx(28 / light) if is_told else None)
@@ -119,7 +131,9 @@ def test_a_picture_of_another_setting_is_its_light_times_that_of_the_setting() -
     assert np.isinf(found.variance[3]), "nobody knows how bright a saturated pixel was"
 
 
-def pictures(apart: float, light: float, variance: float, count: int = 50) -> tuple[Expected, Expected, NDArray[np.float32]]:
+def pictures(
+    apart: float, light: float, variance: float, count: int = 50
+) -> tuple[Expected, Expected, NDArray[np.float32]]:
     """A picture with so much light, one darker by ``apart``, and black."""
     black = floats(np.full(count, 100))
     each = floats(np.full(count, variance))
@@ -142,7 +156,9 @@ def test_pictures_are_told_apart_by_three_tenths_of_their_light(apart: float, is
 def test_pictures_are_told_apart_by_six_deviations_of_all_three(apart: float, is_told: bool) -> None:
     # Seen 97 DN of black level and noise 0.35, both predictions 49.825: a deviation of ten together.
     wanted, rival, black = pictures(apart, apart, 49.825)
-    found = contest_of_pictures(np.full(50, 90, np.uint16), wanted, rival, black, floats(np.zeros(50)), NOISE, Raster((10, 5)))
+    found = contest_of_pictures(
+        np.full(50, 90, np.uint16), wanted, rival, black, floats(np.zeros(50)), NOISE, Raster((10, 5))
+    )
     assert (found.count == 50) == is_told
 
 
@@ -168,8 +184,13 @@ def test_brightness_of_a_picture_leaves_out_what_is_or_should_be_saturated() -> 
     counts[1] = 3690  # nine tenths of full scale are 3685.5
     assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(0.5)
     counts[1] = 3680
-    assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(19500 / 41580)
-    assert brightness_of_picture(seen[:11], Expected(counts[:11], wanted.variance[:11]), black[:11], NOISE) is None
+    assert brightness_of_picture(seen, Expected(counts, wanted.variance), black, NOISE) == pytest.approx(
+        19500 / 41580
+    )
+    assert (
+        brightness_of_picture(seen[:11], Expected(counts[:11], wanted.variance[:11]), black[:11], NOISE)
+        is None
+    )
 
 
 def test_brightness_of_a_picture_asks_for_light_beyond_both_noises() -> None:

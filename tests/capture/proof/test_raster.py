@@ -26,7 +26,7 @@ def test_a_raster_is_whole_rows_of_small_pictures_and_some_of_large_ones(
     raster = Raster(size)
     assert raster.shape == shape
     pixels = np.arange(size[0] * size[1], dtype=np.uint32).reshape(size[::-1])
-    taken = raster.take(pixels).reshape(shape)  # type: ignore[arg-type]
+    taken = raster.take(pixels).reshape(shape)
     rows, columns = np.divmod(taken, size[0])
     assert (rows[0, 0], rows[-1, 0]) == (0, size[1] - 1)
     assert np.ptp(np.diff(rows[:, 0].astype(int))) <= 1

@@ -65,3 +65,12 @@ def test_a_table_is_constant_beyond_its_ends_and_bears_what_is_no_number() -> No
     found = table.at(torch.tensor([-7.0, -0.75, 0.25, 99.0, torch.nan]))[0]
     assert found[:4].tolist() == pytest.approx([4.0, 3.0, 3.0, 6.0], abs=0.01)
     assert torch.isfinite(found).all()
+
+
+def test_slope_beside_a_line_is_that_of_its_halo_alone() -> None:
+    response = ProjectorResponse(blur_px=BLUR_PX, halo_peak_per_px=1e-3, halo_decay_px=20.0)
+    x = np.array([-9.0, -7.5, -6.0, 6.0, 7.5, 9.0])
+    _, slope = LineTable(5, response, 9.0, torch.as_tensor(x)).at(torch.as_tensor(x))
+    far, near = np.abs(x) + 2.5, np.abs(x) - 2.5
+    wanted = np.sign(x) * 1e-3 * (np.exp(-far / 20) - np.exp(-near / 20))
+    assert slope.numpy() == pytest.approx(wanted, rel=1e-3)

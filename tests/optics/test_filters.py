@@ -1,0 +1,37 @@
+"""Bandpass filters: the pass band of a data sheet, moved, and what the chain sees through it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dsl_core.optics.filters import FINE_NM, moved, nominal_filter, passed
+from dsl_core.optics.spectra import chain_response
+from dsl_core.simulation.published_rig import published_rig
+
+
+def test_a_nominal_filter_has_its_peak_and_half_of_it_half_a_width_away() -> None:
+    curve = nominal_filter(550.0, fwhm_nm=12.0, peak=0.7)
+    assert (curve.wavelengths_nm[0], curve.wavelengths_nm[-1]) == (490.0, 610.0)
+    assert np.diff(curve.wavelengths_nm) == pytest.approx(0.5)
+    at = curve.at(np.array([550.0, 544.0, 556.0, 538.0, 562.0]))
+    assert at == pytest.approx([0.7, 0.35, 0.35, 0.7 / 65, 0.7 / 65])
+    usual = nominal_filter(500.0)
+    assert usual.at(np.array([500.0, 495.0, 505.0])) == pytest.approx([0.8, 0.4, 0.4])
+
+
+def test_light_through_a_filter_is_that_of_white_times_its_transmission_and_none_outside_it() -> None:
+    rig, curve = published_rig(), nominal_filter(550.0)
+    found = passed(rig, curve)
+    white = chain_response(rig, 0, FINE_NM).sum(1)
+    through = np.where(np.abs(FINE_NM - 550) <= 60, curve.at(FINE_NM), 0.0)
+    assert (FINE_NM[0], FINE_NM[-1], FINE_NM.size) == (390.0, 710.0, 321)
+    assert found == pytest.approx(white * through)
+    flat = curve.model_copy(update={"values": (0.5,) * len(curve.values)})
+    assert passed(rig, flat)[:, FINE_NM < 490].max() == 0.0
+    assert passed(rig, flat)[:, FINE_NM > 610].max() == 0.0
+
+
+def test_a_moved_filter_passes_the_same_elsewhere() -> None:
+    curve = nominal_filter(550.0)
+    assert moved(curve, 3.0).at(np.array([553.0, 548.0])) == pytest.approx(curve.at(np.array([550.0, 545.0])))
