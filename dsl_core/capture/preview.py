@@ -24,6 +24,7 @@ _SITES: dict[BayerPattern, tuple[tuple[int, int], ...]] = {
     "BGGR": ((1, 1), (0, 1), (1, 0), (0, 0)),
     "GRBG": ((0, 1), (0, 0), (1, 1), (1, 0)),
     "GBRG": ((1, 0), (0, 0), (1, 1), (0, 1)),
+    "MONO": ((0, 0), (0, 1), (1, 0), (1, 1)),
 }
 #: Channel of each site above.
 _CHANNELS = (0, 1, 1, 2)
@@ -59,7 +60,9 @@ def quick_picture(
     table = _display_table(full_scale_dn)
     picture = np.empty((*sites[0].shape, 3), np.uint8)
     green = (sites[1].astype(np.uint32) + sites[2]) >> 1
-    for channel, values in ((0, sites[0]), (1, green), (2, sites[3])):
+    # Two pixels of one row are the same colour to a monochrome camera, and would show edges in false colours.
+    ends = (green, green) if bayer == "MONO" else (sites[0], sites[3])
+    for channel, values in ((0, ends[0]), (1, green), (2, ends[1])):
         picture[..., channel] = table[np.minimum(values, full_scale_dn)]
     if show_saturation:
         hit = np.maximum(np.maximum(sites[0], sites[1]), np.maximum(sites[2], sites[3])) >= full_scale_dn

@@ -16,12 +16,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
+from typing import get_args
 
 import numpy as np
 
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, Spectroradiometer, Stage
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
+from dsl_core.model.rig import BayerPattern
 
 
 class CameraConformance:
@@ -38,7 +40,8 @@ class CameraConformance:
         with self.open_camera() as camera:
             info = camera.info
             _require(info.width_px > 0 and info.height_px > 0, f"the image size of {info} is empty")
-            _require(info.bayer in ("RGGB", "BGGR", "GRBG", "GBRG"), f"{info.bayer} is not a Bayer mosaic")
+            known = get_args(BayerPattern)
+            _require(info.bayer in known, f"{info.bayer} is not a mosaic, nor MONO")
             _require(8 <= info.bit_depth <= 16, f"{info.bit_depth} bits are not between 8 and 16")
             low, high = info.exposure_range_ms
             _require(0 < low <= high < math.inf, f"the exposure range {low} to {high} ms is not a range")

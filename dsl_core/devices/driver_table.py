@@ -23,6 +23,10 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 GROUP = "dsl_scan.drivers"
 #: Name of each driver of this program, and the module under `dsl_core.devices.drivers` with its ``DRIVER``.
 _BUILT_IN = {
+    "camera.aravis": "aravis",
+    "camera.basler": "basler",
+    "camera.gentl": "gentl",
+    "camera.uvc": "uvc",
     "projector.none": "no_projector",
     "spectroradiometer.jeti": "jeti_specbos",
     "stage.thorlabs-lts": "thorlabs_lts",

@@ -7,8 +7,22 @@ from typing import Literal
 
 from dsl_core.model.base import Record
 
-BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG"]
+#: Order of the colours of a mosaic; ``MONO`` is a sensor without one, whose pixels all measure brightness.
+BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG", "MONO"]
 Region = tuple[int, int, int, int]
+
+
+def colour_sites(bayer: BayerPattern) -> tuple[int, int, int, int]:
+    """Colour, 0 to 2 for red, green and blue, of the four pixels of a cell in reading order.
+
+    The one response curve of a monochrome camera stands in the place of green.
+
+    >>> colour_sites("GRBG"), colour_sites("MONO")
+    ((1, 0, 2, 1), (1, 1, 1, 1))
+    """
+    first, second, third, fourth = "GGGG" if bayer == "MONO" else bayer
+    return "RGB".index(first), "RGB".index(second), "RGB".index(third), "RGB".index(fourth)
+
 
 #: Frame periods of one mode are measured; a mode of another rate differs by far more than this share.
 _SAME_PERIOD = 0.01

@@ -12,12 +12,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from dsl_core.model.rig import BayerPattern
+from dsl_core.model.rig import BayerPattern, colour_sites
 
 
 def bayer_colours(bayer: BayerPattern, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.intp]:
     """Colour, 0 to 2 for red, green and blue, of pixels at rows and columns of the picture."""
-    sites = np.array(["RGB".index(colour) for colour in bayer]).reshape(2, 2)
+    sites = np.array(colour_sites(bayer)).reshape(2, 2)
     return np.asarray(sites[rows % 2, columns % 2], np.intp)
 
 
@@ -41,17 +41,22 @@ class ColourNeighbours:
         self._samples = torch.as_tensor(y * self._width + x)
         y, x = (at - part.start for at, part in zip(pixels, (rows, columns), strict=True))
         self._pixels = torch.as_tensor(y * (self._width - 2) + x)
+        self._is_mono = bayer == "MONO"
         inner = np.mgrid[rows.start : rows.stop, columns.start : columns.stop]
         self._green = torch.as_tensor(bayer_colours(bayer, *inner) == 1)
 
     def sum(self, values: Tensor) -> Tensor:
         """Sums over own and neighbouring samples, (..., samples) -> (..., pixels).
 
-        A green pixel takes those beside, above and below it, a red or blue one also those at its corners.
+        A green pixel takes those beside, above and below it, a red or blue one also those at its corners,
+        one of a monochrome camera none.
         """
         grid = values.new_zeros((*values.shape[:-1], self._height * self._width))
         grid[..., self._samples.to(values.device)] = values
         grid = grid.reshape(*values.shape[:-1], self._height, self._width)
+        if self._is_mono:
+            own = grid[..., 1:-1, 1:-1].flatten(-2)
+            return own.index_select(-1, self._pixels.to(values.device))
         rows = grid[..., 1:-1] + grid[..., :-2]
         rows += grid[..., 2:]
         green = self._green.to(values.device)

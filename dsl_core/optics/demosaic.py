@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
-from dsl_core.model.rig import BayerPattern
+from dsl_core.model.rig import BayerPattern, colour_sites
 
 if TYPE_CHECKING:
     import torch
@@ -27,7 +27,8 @@ def demosaic(
 
     A missing colour is the mean of its two or four nearest samples; a measured one stays as it is.
     The mosaic is mirrored about its edge pixels, which keeps the Bayer phase. Tensors stay on their
-    device. Raises `DecodeError` for images smaller than 2 x 2.
+    device. A monochrome picture is grey: all three are its own values. Raises `DecodeError` for images
+    smaller than 2 x 2.
     """
     return _apply(mosaic, bayer, squared=False)
 
@@ -63,6 +64,10 @@ def _interpolate(mosaic: Any, new: Callable[..., Any], bayer: BayerPattern, squa
         raise DecodeError(
             f"Demosaicing needs an image of at least 2 x 2 pixels, given {tuple(mosaic.shape)}."
         )
+    if bayer == "MONO":
+        out = new((*mosaic.shape[:-2], 3, *mosaic.shape[-2:]), dtype=mosaic.dtype)
+        out[...] = mosaic[..., None, :, :]
+        return out
     out = new((*mosaic.shape[:-2], 3, *mosaic.shape[-2:]), dtype=mosaic.dtype)
     # Squared weights: the mean of two independent values has half their mean variance.
     half = 0.25 if squared else 0.5
@@ -93,4 +98,4 @@ def _mean_of_rows(image: Any, new: Callable[..., Any], half: float) -> Any:
 
 def _sites(bayer: BayerPattern) -> list[tuple[int, int, int]]:
     """Colour, row phase and column phase of the four pixels of a tile."""
-    return [("RGB".index(colour), i // 2, i % 2) for i, colour in enumerate(bayer)]
+    return [(colour, i // 2, i % 2) for i, colour in enumerate(colour_sites(bayer))]

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.rig import BayerPattern, FlatField, Rig, Sensor
+from dsl_core.model.rig import BayerPattern, FlatField, Rig, Sensor, colour_sites
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ def bayer_channels(bayer: BayerPattern, rows: int, columns: int) -> NDArray[np.i
     >>> bayer_channels("RGGB", 2, 3).tolist()
     [[0, 1, 0], [1, 2, 1]]
     """
-    tile = np.array(["RGB".index(c) for c in bayer]).reshape(2, 2)
+    tile = np.array(colour_sites(bayer)).reshape(2, 2)
     return np.tile(tile, (rows // 2 + 1, columns // 2 + 1))[:rows, :columns]
 
 

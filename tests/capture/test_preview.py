@@ -157,3 +157,11 @@ def test_who_watches_sees_stored_frames_and_cannot_stop_a_scan(caplog: pytest.Lo
     assert seen == [True]
     assert next(sink.missing()).index == 1
     assert "continues" in caplog.text
+
+
+def test_a_monochrome_picture_is_grey_at_edges_too() -> None:
+    picture = np.zeros((4, 8), np.uint16)
+    picture[:, 3:] = 4000
+    shown = quick_picture(picture, "MONO", 4095)
+    assert (shown == shown[..., :1]).all()
+    assert statistics(picture, "MONO", 4095).saturated == (0, 0, 0)

@@ -34,3 +34,12 @@ def test_sums_of_information_are_those_of_demosaicing(bayer: BayerPattern, tile:
         close = max(abs(py - y), abs(px - x)) <= 1
         uses = close and ((py, px) == (y, x) or colours[py, px] != colours[y, x])
         assert lost == float(uses), (py, px)
+
+
+def test_a_monochrome_pixel_has_no_sample_but_its_own() -> None:
+    samples, pixels = (
+        tuple(grid.ravel() for grid in np.mgrid[part]) for part in ((slice(0, 5),) * 2, (slice(1, 4),) * 2)
+    )
+    values = torch.arange(25.0)
+    found = ColourNeighbours("MONO", slice(1, 4), slice(1, 4), samples, pixels).sum(values)
+    np.testing.assert_array_equal(found.numpy(), values.reshape(5, 5)[1:4, 1:4].ravel())

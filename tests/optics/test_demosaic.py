@@ -14,7 +14,7 @@ from dsl_core.model.rig import BayerPattern
 from dsl_core.optics.demosaic import demosaic, demosaic_variance
 from dsl_core.optics.sensor import bayer_channels
 
-PATTERNS: tuple[BayerPattern, ...] = get_args(BayerPattern)
+PATTERNS: tuple[BayerPattern, ...] = tuple(p for p in get_args(BayerPattern) if p != "MONO")
 SIZES = [(6, 8), (5, 7), (2, 2), (3, 2)]
 
 
@@ -85,3 +85,9 @@ def test_gradients_pass_through() -> None:
 def test_too_small() -> None:
     with pytest.raises(DecodeError, match="at least 2 x 2"):
         demosaic(np.zeros((1, 8)), "RGGB")
+
+
+def test_a_monochrome_picture_is_grey_and_nothing_is_interpolated() -> None:
+    picture = np.random.default_rng(2).uniform(0, 1, (5, 7))
+    for operator in (demosaic, demosaic_variance):
+        np.testing.assert_array_equal(operator(picture, "MONO"), np.stack([picture] * 3))

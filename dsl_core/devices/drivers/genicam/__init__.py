@@ -1,0 +1,1 @@
+"""What all cameras of the GenICam standard share, whichever library reaches them."""
