@@ -37,5 +37,5 @@ class GenicamSettings(Record):
         default=1.0, gt=0, description="how long after its exposure a frame counts as lost"
     )
     reconnect_s: float = Field(
-        default=10.0, ge=0, description="how long a lost camera is searched for before a shot fails"
+        default=10.0, ge=0, le=20, description="how long a lost camera is searched for before a shot fails"
     )
