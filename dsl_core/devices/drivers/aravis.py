@@ -67,7 +67,7 @@ class AravisPort:
     def read(self, feature: str) -> float | str:
         """A feature's value."""
         value = self._call(f"arv_camera_get_{self._kind(feature)}", self._camera, feature.encode())
-        return value.decode() if isinstance(value, bytes) else value  # type: ignore[no-any-return]
+        return value.decode() if isinstance(value, bytes) else value
 
     def write(self, feature: str, value: float | str) -> None:
         """Set a feature."""

@@ -58,6 +58,7 @@ class PixelFormat:
                 " arrived. Lower the frame rate or the packet size."
             )
         raw = np.frombuffer(data, np.uint8, wanted)
+        values: NDArray[np.unsignedinteger]
         if self.packing:
             values = _bits(raw, count, self.bits) if self.packing == "p" else _pairs(raw, count, self.bits)
         else:

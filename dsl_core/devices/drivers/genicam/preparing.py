@@ -20,7 +20,7 @@ from dsl_core.errors import DeviceError
 #: Standard name first, then that of older cameras; both in microseconds.
 EXPOSURE = ("ExposureTime", "ExposureTimeAbs")
 TRIGGER = "TriggerSoftware"
-_OFF = {
+_OFF: dict[str, float | str] = {
     "ExposureMode": "Timed",
     "ExposureAuto": "Off",
     "GainAuto": "Off",

@@ -148,7 +148,7 @@ class FakePort:
         name = str(sensor.features["PixelFormat"])
         pixels = np.full((height, width), 16 * sensor.taken + int(sensor.wrong_pixels), "<u2")
         if name.endswith("12p"):
-            pixels = np.zeros(-(-width * height * 12 // 16), "<u2")
+            pixels = np.zeros((1, -(-width * height * 12 // 16)), "<u2")
         frame_id, sensor.next_id = sensor.next_id, sensor.next_id % 65535 + 1
         return RawFrame(
             pixels.tobytes(), width, height, name, frame_id, "packets are missing" if fault else ""

@@ -64,7 +64,7 @@ def test_a_frame_that_comes_late_does_not_pass_for_the_next() -> None:
     class Slow(FakePort):
         held = True
 
-        def fetch(self, timeout_s: float) -> None:  # type: ignore[override]
+        def fetch(self, timeout_s: float) -> None:
             held, Slow.held = Slow.held, False
             return None if held else super().fetch(timeout_s)  # type: ignore[return-value]
 
@@ -115,7 +115,7 @@ def test_a_camera_that_comes_back_while_it_is_searched_for_gives_the_frame() -> 
         clock.now_s += seconds
         sensor.is_gone = clock.now_s < 3.0
 
-    eye._sleep = sleep  # type: ignore[method-assign]
+    eye._sleep = sleep
     sensor.is_gone = True
     assert eye.snap().pixels.shape == (48, 64)
 
