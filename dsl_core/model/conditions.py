@@ -12,7 +12,7 @@ BayerPattern = Literal["RGGB", "BGGR", "GRBG", "GBRG", "MONO"]
 Region = tuple[int, int, int, int]
 
 
-def colour_sites(bayer: BayerPattern) -> tuple[int, int, int, int]:
+def colour_sites(bayer: str) -> tuple[int, int, int, int]:
     """Colour, 0 to 2 for red, green and blue, of the four pixels of a cell in reading order.
 
     The one response curve of a monochrome camera stands in the place of green.

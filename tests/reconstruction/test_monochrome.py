@@ -34,6 +34,8 @@ def test_depth_and_spectra_come_from_brightness_alone(monkeypatch: pytest.Monkey
     result = reconstruct(scan, devices.calibration, options)
     truth = twin_truth(devices, options.grid)
     assert truth is not None
+    assert truth.spectra is not None
+    assert truth.material is not None
     found = evaluate(result, truth)
     assert found.depth is not None
     assert found.depth.coverage > 0.9

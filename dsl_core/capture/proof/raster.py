@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.rig import BayerPattern, Sensor, colour_sites
+from dsl_core.model.rig import Sensor, colour_sites
 
 Floats = NDArray[np.float32]
 Counts = NDArray[np.uint16]
@@ -55,7 +55,7 @@ class Raster:
         down, across = (max(size // BLOCKS, 1) for size in self.shape)
         return down * across
 
-    def channels(self, bayer: BayerPattern) -> NDArray[np.int8]:
+    def channels(self, bayer: str) -> NDArray[np.int8]:
         """Channel of every compared pixel, flat: 0 red, 1 green, 2 blue."""
         table = np.array(colour_sites(bayer), np.int8)
         return np.asarray(table[self._mosaic].ravel())
