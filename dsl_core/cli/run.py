@@ -24,6 +24,7 @@ from dsl_core.cli import (
     files,
     gui,
     results,
+    rigs,
     scans,
     tradeoff,
 )
@@ -42,7 +43,6 @@ app = typer.Typer(
 )
 for command in (
     demo.demo,
-    scans.rigs,
     scans.scenes,
     effects.effects,
     scans.plan,
@@ -62,6 +62,7 @@ app.command("import")(files.import_)
 app.command()(files.info)
 app.command()(gui.gui)
 app.command()(calibrate.selftest)
+app.add_typer(rigs.rigs, name="rigs")
 app.add_typer(calibrate.calibrate, name="calibrate")
 app.add_typer(calibrations.calibrations, name="calibrations")
 

@@ -1,8 +1,7 @@
-"""Commands for capture: rigs, scenes, plan, scan, resume."""
+"""Commands for capture: scenes, plan, scan, resume."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,23 +34,6 @@ from dsl_core.io import MANIFEST_NAME
 if TYPE_CHECKING:
     from dsl_core.devices.base import DeviceRig
     from dsl_core.model.plan import CapturePlan
-
-
-def rigs(json: Json = False) -> None:
-    """List the installed rigs and their options."""
-    from dsl_core.devices.registry import list_rigs
-
-    output, entries = Output(json), list_rigs()
-    output.table(
-        ("rig", "package", "what it is"),
-        [(e.name, f"{e.package} {e.version}".strip(), e.error or e.description) for e in entries],
-    )
-    output.table(
-        ("rig", "option", "default", "meaning"),
-        [(e.name, option.name, option.default, option.meaning) for e in entries for option in e.options],
-    )
-    output.put(rigs=[asdict(entry) for entry in entries])
-    output.finish()
 
 
 def scenes(json: Json = False) -> None:

@@ -66,6 +66,11 @@ class Camera(Device):
     def configure(self, exposure_ms: float) -> float:
         """Set the exposure and return the one in force; raises `DeviceError` outside the range."""
 
+    @property
+    def temperature_c(self) -> float | None:
+        """Temperature of the sensor now, °C; None for a camera that does not say."""
+        return None
+
     def prepare(self, shot_index: int, attempt: int = 0) -> None:
         """Learn which shot of a plan, and which attempt at it, the next `snap` is for.
 

@@ -168,6 +168,10 @@ class _Camera(_Guard, Camera):
         self._exposure_ms = actual
         return actual
 
+    @property
+    def temperature_c(self) -> float | None:
+        return self._ask("say its temperature", lambda: self._camera.temperature_c)
+
     def prepare(self, shot_index: int, attempt: int = 0) -> None:
         self._ask("prepare for a shot", lambda: self._camera.prepare(shot_index, attempt))
 

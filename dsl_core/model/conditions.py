@@ -20,8 +20,8 @@ def colour_sites(bayer: str) -> tuple[int, int, int, int]:
     >>> colour_sites("GRBG"), colour_sites("MONO")
     ((1, 0, 2, 1), (1, 1, 1, 1))
     """
-    first, second, third, fourth = "GGGG" if bayer == "MONO" else bayer
-    return "RGB".index(first), "RGB".index(second), "RGB".index(third), "RGB".index(fourth)
+    first, second, third, fourth = ("RGB".index(each) for each in ("GGGG" if bayer == "MONO" else bayer))
+    return first, second, third, fourth
 
 
 #: Frame periods of one mode are measured; a mode of another rate differs by far more than this share.

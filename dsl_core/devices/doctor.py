@@ -1,0 +1,249 @@
+"""Every device of a rig tried by itself: all that is wrong at once, each with what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.devices.base import Camera, Device, Projector, Spectroradiometer, Stage
+from dsl_core.devices.device_thread import DeviceThread, DriverError, HangingError
+from dsl_core.devices.driver_table import Driver, FoundDevice, Kind, find_driver, list_drivers, open_device
+from dsl_core.devices.plausible import require_frame, require_spectrum
+from dsl_core.devices.profile import DevicePart, RigProfile
+from dsl_core.errors import DeviceError, DslError
+from dsl_core.model.frames import Frame
+
+T = TypeVar("T")
+#: How long a device may take to open, to answer, and to measure a spectrum, s.
+OPEN_S, ANSWER_S, MEASURE_S = 60.0, 40.0, 600.0
+_TRIAL_MS = 20.0
+_TRIAL_FRAMES = 3
+#: White has to be brighter than black by this share of full scale to count as seen.
+_SEEN = 0.02
+
+
+class Grade(StrEnum):
+    """What a finding means for a scan."""
+
+    GOOD = "good"
+    WARNING = "warning"
+    BAD = "bad"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A sentence about a device, with what to do unless all is well."""
+
+    device: str
+    grade: Grade
+    text: str
+
+
+def survey() -> list[Finding]:
+    """What each driver needs, and which devices it sees now; for a computer without a profile."""
+    found: list[Finding] = []
+    for entry in list_drivers():
+        notes = _Notes(f"{entry.kind} {entry.name}", found)
+        if entry.driver is None:
+            notes.add(Grade.BAD, entry.error)
+        elif entry.driver.find is not None:
+            _look(entry.driver.find, notes)
+    return found
+
+
+def examine(profile: RigProfile) -> list[Finding]:
+    """Open and try every device of a profile, whatever the others do; nothing is moved."""
+    found: list[Finding] = []
+    opened: dict[Kind, Device] = {}
+    notes = {kind: _Notes(f"{kind} {part.driver}", found) for kind, part in profile.parts().items()}
+    for kind, part in profile.parts().items():
+        device = notes[kind].ask(
+            partial(open_device, kind, part.driver, part.settings), OPEN_S, partial(_seen_instead, kind, part)
+        )
+        if device is not None:
+            opened[kind] = device
+            _try(device, notes[kind])
+    camera, projector = opened.get("camera"), opened.get("projector")
+    if isinstance(camera, Camera) and isinstance(projector, Projector):
+        _look_at_light(camera, projector, _Notes("camera and projector", found, notes["camera"].thread))
+    for kind, device in opened.items():
+        notes[kind].ask(device.close, ANSWER_S)
+        notes[kind].thread.end()
+    return found
+
+
+class _Notes:
+    """What is found about one device, which is called on a thread of its own."""
+
+    def __init__(self, name: str, found: list[Finding], thread: DeviceThread | None = None) -> None:
+        self.name, self._found, self.thread = name, found, thread or DeviceThread(name)
+
+    def add(self, grade: Grade, text: str) -> None:
+        self._found.append(Finding(self.name, grade, text))
+
+    def ask(self, action: Callable[[], T], patience_s: float, more: Callable[[], str] = str) -> T | None:
+        """What an action returns; None when it fails, which is noted together with what ``more`` says."""
+        try:
+            return self.thread.call(self.name, action, patience_s)
+        except HangingError as error:
+            text = (
+                f"It has not answered for {error.seconds:g} s. Switch it off and on again, and check that no"
+                " other program uses it."
+            )
+        except DriverError as error:
+            cause = error.__cause__
+            text = str(cause)
+            if not isinstance(cause, DslError):
+                text = f"Its driver failed ({type(cause).__name__}: {cause}). Check its cable and settings."
+        self.add(Grade.BAD, f"{text} {more()}".strip())
+        return None
+
+
+def _look(find: Callable[[], list[FoundDevice]], notes: _Notes) -> None:
+    """Note the devices that a driver sees; that it cannot look is a warning, as it may not be needed."""
+    try:
+        devices = notes.thread.call(notes.name, find, OPEN_S)
+    except HangingError as error:
+        notes.add(Grade.WARNING, f"Looking for devices has not ended for {error.seconds:g} s.")
+    except DriverError as error:
+        notes.add(Grade.WARNING, str(error.__cause__))
+    else:
+        for device in devices:
+            notes.add(Grade.GOOD, f"{device.words}; settings {dict(device.settings)}")
+        if not devices:
+            notes.add(Grade.WARNING, "No device is connected, as far as this driver sees.")
+    notes.thread.end()
+
+
+def _seen_instead(kind: Kind, part: DevicePart) -> str:
+    """Which devices the driver sees, for one that cannot be opened; empty where that cannot be said."""
+    try:
+        driver: Driver = find_driver(kind, part.driver)
+        devices = driver.find() if driver.find is not None else []
+    except DeviceError:
+        return ""
+    return f"The driver sees: {'; '.join(each.words for each in devices)}." if devices else ""
+
+
+def _try(device: Device, notes: _Notes) -> None:
+    """Note what a device says and does."""
+    if isinstance(device, Camera):
+        _try_camera(device, notes)
+    elif isinstance(device, Projector):
+        _try_projector(device, notes)
+    elif isinstance(device, Stage):
+        where = notes.ask(lambda: (device.range_mm, device.position_mm), ANSWER_S)
+        if where is not None:
+            (low, high), position_mm = where
+            notes.add(Grade.GOOD, f"at {position_mm:g} mm of {low:g} to {high:g} mm; it was not moved")
+    elif isinstance(device, Spectroradiometer):
+        _try_spectroradiometer(device, notes)
+
+
+def _try_camera(camera: Camera, notes: _Notes) -> None:
+    info = camera.info
+    low, high = info.exposure_range_ms
+    region = f", region {info.region_px}" if info.region_px else ""
+    notes.add(
+        Grade.GOOD,
+        f"{info.model} {info.serial}: {info.width_px} x {info.height_px} px{region}, {info.bayer},"
+        f" {info.bit_depth} bits, binning {info.binning}, gain {info.gain_db:g} dB, exposure {low:g} to"
+        f" {high:g} ms{_warmth(camera, notes)}",
+    )
+    frames = notes.ask(lambda: _frames(camera), ANSWER_S)
+    if frames is None:
+        return
+    unused = _unused_bits(frames[-1].pixels)
+    if info.bit_depth == 16 and 0 < unused <= 8:
+        notes.add(
+            Grade.WARNING,
+            f"The lowest {unused} of 16 bits are always 0: its pixels are {16 - unused} bits moved up. Set"
+            f" adc_bits to {16 - unused} in the profile.",
+        )
+    took_s = (frames[-1].timestamp_s - frames[0].timestamp_s) / (len(frames) - 1)
+    notes.add(Grade.GOOD, f"{len(frames)} frames of {frames[0].exposure_ms:g} ms, one every {took_s:.3f} s")
+
+
+def _frames(camera: Camera) -> list[Frame]:
+    """A few frames of a short exposure, each what the camera promises; raises `DeviceError`."""
+    low, high = camera.info.exposure_range_ms
+    actual_ms = camera.configure(min(max(_TRIAL_MS, low), high))
+    frames = []
+    for shot in range(_TRIAL_FRAMES):
+        camera.prepare(shot)
+        frames.append(camera.snap(actual_ms + 3000.0))
+        require_frame(frames[-1], camera.info, actual_ms)
+    ids = [frame.frame_id for frame in frames]
+    if ids != sorted(set(ids)):
+        raise DeviceError(f"The camera numbers its frames {ids}, which must rise. Update its driver.")
+    return frames
+
+
+def _unused_bits(pixels: NDArray[np.uint16]) -> int:
+    """How many of the lowest bits no pixel uses; 0 for a picture that is black throughout."""
+    used = int(np.bitwise_or.reduce(pixels, axis=None))
+    return (used & -used).bit_length() - 1 if used else 0
+
+
+def _warmth(camera: Camera, notes: _Notes) -> str:
+    celsius = notes.ask(lambda: camera.temperature_c, ANSWER_S)
+    return "" if celsius is None else f", {celsius:.1f} °C"
+
+
+def _try_projector(projector: Projector, notes: _Notes) -> None:
+    info = projector.info
+    black = np.zeros((info.height_px, info.width_px), np.uint8)
+    if notes.ask(lambda: projector.show(black) or True, ANSWER_S):
+        notes.add(
+            Grade.GOOD,
+            f"{info.model} {info.serial}: {info.width_px} x {info.height_px} px, {info.frame_period_ms:.2f}"
+            f" ms a frame, visible after {info.latency_ms:g} ms; the self-test measures that",
+        )
+
+
+def _try_spectroradiometer(instrument: Spectroradiometer, notes: _Notes) -> None:
+    curve = notes.ask(instrument.measure, MEASURE_S)
+    if curve is None:
+        return
+    try:
+        require_spectrum(curve, "The spectroradiometer")
+    except DeviceError as error:
+        notes.add(Grade.WARNING, str(error))
+    else:
+        nm = curve.wavelengths_nm
+        notes.add(Grade.GOOD, f"{len(nm)} values from {nm[0]:g} to {nm[-1]:g} nm, in {curve.unit}")
+
+
+def _look_at_light(camera: Camera, projector: Projector, notes: _Notes) -> None:
+    """Note whether the camera sees the projector's white against its black."""
+    if projector.info.model == "none":
+        notes.add(Grade.WARNING, "There is no projector, so nothing can be scanned. Name one in the profile.")
+        return
+    means = notes.ask(lambda: [_mean(camera, projector, level) for level in (0, 255)], ANSWER_S)
+    if means is None:
+        return
+    full = 2**camera.info.bit_depth - 1
+    black, white = (mean / full for mean in means)
+    if white - black < _SEEN:
+        notes.add(
+            Grade.WARNING,
+            f"White reads {white:.1%} of full scale and black {black:.1%}: the camera does not see the"
+            " projector's light. Take off lens caps, open the aperture, and aim both at one surface.",
+        )
+    else:
+        notes.add(Grade.GOOD, f"white reads {white:.1%} of full scale, black {black:.1%}")
+
+
+def _mean(camera: Camera, projector: Projector, level: int) -> float:
+    info = projector.info
+    projector.show(np.full((info.height_px, info.width_px), level, np.uint8))
+    low, high = camera.info.exposure_range_ms
+    actual_ms = camera.configure(min(max(3 * info.frame_period_ms, low), high))
+    camera.prepare(level)
+    return float(camera.snap(actual_ms + 3000.0).pixels.mean())
