@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import threading
+from collections.abc import Callable
 from importlib.metadata import EntryPoint
+from typing import TypeVar
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pydantic import Field
 
 from dsl_core.devices import doctor, driver_table
 from dsl_core.devices.base import Camera, CameraInfo, Projector, ProjectorInfo, Spectroradiometer, Stage
+from dsl_core.devices.device_thread import DeviceThread, HangingError
 from dsl_core.devices.doctor import Grade, examine, survey
 from dsl_core.devices.driver_table import Driver, FoundDevice
 from dsl_core.devices.profile import DevicePart, RigProfile
@@ -19,6 +21,8 @@ from dsl_core.errors import DeviceError
 from dsl_core.model.base import Record
 from dsl_core.model.frames import Frame
 from dsl_core.model.spectral import SpectralCurve
+
+T = TypeVar("T")
 
 
 class Trouble(Record):
@@ -36,8 +40,6 @@ class TryCamera(Camera):
         self.trouble, self.count = settings.trouble, 0
         if self.trouble == "absent":
             raise DeviceError("No camera is connected. Check its cable.")
-        if self.trouble == "hangs":
-            threading.Event().wait()
 
     def configure(self, exposure_ms: float) -> float:
         self.exposure_ms = exposure_ms
@@ -109,7 +111,6 @@ def _drivers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(TryCamera, "level", 0)
     lines = [EntryPoint(name, f"{__name__}:{value}", "x") for name, value in values.items()]
     monkeypatch.setattr(driver_table, "BUILT_IN", lines)
-    monkeypatch.setattr(doctor, "OPEN_S", 0.2)
 
 
 def profile(camera: str = "", instrument: str = "", **changes: object) -> RigProfile:
@@ -147,7 +148,6 @@ def test_a_sound_rig_is_described_and_nothing_is_moved() -> None:
     ("camera", "grade", "words"),
     [
         ("absent", "bad", "Check its cable. The driver sees: eye 7 on port 3."),
-        ("hangs", "bad", "It has not answered for"),
         ("crashes", "bad", "ValueError: driver state 17"),
         ("stuck", "bad", "which must rise"),
         ("left", "warning", "lowest 6 of 16 bits are always 0"),
@@ -159,6 +159,19 @@ def test_a_broken_camera_is_told_and_the_others_still_tried(camera: str, grade: 
     assert worst["camera try"] == grade
     assert (worst["projector try"], worst["stage try"]) == ("good", "good")
     assert any(words in finding.text for finding in found), found
+
+
+def test_a_device_that_never_answers_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Impatient(DeviceThread):
+        def call(self, device: str, action: Callable[[], T], patience_s: float) -> T:
+            if device == "camera try":
+                raise HangingError(patience_s)
+            return super().call(device, action, patience_s)
+
+    monkeypatch.setattr(doctor, "DeviceThread", Impatient)
+    found = examine(profile())
+    assert grades(found)["stage try"] == "good"
+    assert found[0].text.startswith("It has not answered for 60 s. Switch it off and on")
 
 
 def test_a_camera_that_does_not_see_the_light_is_told() -> None:
