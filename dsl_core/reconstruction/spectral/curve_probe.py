@@ -63,7 +63,7 @@ def curve_changes(rows: Tensor, spectra: Tensor, centres_nm: Floats) -> Tensor:
     ``rows`` of the model are (samples, k, bands), ``spectra`` (samples, bands), ``centres_nm`` (bands,).
     """
     hats = np.stack([np.interp(centres_nm, KNOTS_NM, unit) for unit in np.eye(len(KNOTS_NM))], 1)
-    return (rows * spectra[:, None]) @ torch.as_tensor(hats)
+    return rows @ (spectra[..., None] * torch.as_tensor(hats))
 
 
 def of_all_curves(values: Tensor, others: int) -> Tensor:

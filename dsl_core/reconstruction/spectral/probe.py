@@ -201,13 +201,13 @@ def _probe_some(scan: ProbedScan, targets: Indices) -> dict[str, NDArray[Any]]:
 
     lit, weight = shading[owners], light.weight
     rows = light.rows * lit[:, None, None]
-    heavy = (rows * weight[..., None]).mT
-    matrix, right = gather(heavy @ rows), gather((heavy @ light.values[..., None])[..., 0])
+    heavy = rows * weight[:, None]
+    matrix, right = gather(heavy @ rows.mT), gather((heavy @ light.values[..., None])[..., 0])
     found = solve_dense(matrix, right, scan.prior)
     nodes = found.nodes.T.contiguous()
     own = nodes[owners]
-    residual = light.values - (rows @ own[..., None])[..., 0]
-    curves = curve_changes(rows, own, scan.model.bands.centres_nm)
+    residual = light.values - (own[:, None] @ rows)[:, 0]
+    curves = curve_changes(rows.mT, own, scan.model.bands.centres_nm)
     changes, others = torch.cat([light.changes(own) * lit[:, None, None], curves], 2), len(PARAMETERS)
     cross = of_all_curves(of_curves(heavy @ changes), others)
     prior = banded.to_dense(roughness(nodes.shape[1], matrix)[..., None])[0] * found.tau[:, None, None] ** -2
@@ -248,14 +248,15 @@ def _correlation(standard: Tensor, gather: Callable[[Tensor], Tensor]) -> Tensor
 
 @dataclass(frozen=True)
 class _OrderLight:
-    """Lines near one order: the model's rows (samples, lines, bands), data, weight and time of each.
+    """Lines near one order: the model's rows (samples, bands, lines), data, weight and time of each.
 
-    Changes of the rows, of the light ``white`` (samples, bands), are ``changes[index]``.
+    Each band is lit by a few lines, numbered ``near`` (samples, bands, n): what their rows gain, of the light
+    ``white`` (samples, bands), is ``changes`` (samples, bands, n, kinds).
     """
 
     rows: Tensor
     white: Tensor
-    index: Tensor
+    near: Tensor
     changes: Tensor
     values: Tensor
     weight: Tensor
@@ -282,7 +283,7 @@ def _changed_profiles(width_px: float, spread: Spread, band_px: float, like: Ten
 class _Light:
     """Data of samples, and the rows of the model of unit shading and of its changes.
 
-    ``values`` and ``weight`` (samples, k), ``rows`` (samples, k, bands): the lines near each order, one order
+    ``values`` and ``weight`` (samples, k), ``rows`` (samples, bands, k): the lines near each order, one order
     after the other, and last the zero order.
     """
 
@@ -299,10 +300,10 @@ class _Light:
         known = self._known
         traced = scan.model.trace(torch.as_tensor(samples), known["depth_mm"], known["column_px"], ORDERS)
         self._orders = [self._order(order, traced.orders[order]) for order in ORDERS]
-        zero = like(scan.model.bands.moments[0].sum(1), known["shading"])[self.colour][:, None]
+        zero = like(scan.model.bands.moments[0].sum(1), known["shading"])[self.colour][..., None]
         amplitude, std = known["amplitude"][:, None], known["amplitude_std"][:, None]
         weight = 1 / (std**2 + (ZERO_ERROR * amplitude) ** 2)
-        self.rows = torch.cat([*(order.rows for order in self._orders), zero], 1)
+        self.rows = torch.cat([*(order.rows for order in self._orders), zero], 2)
         self.values = torch.cat([*(order.values for order in self._orders), amplitude], 1)
         self.weight = torch.cat([*(order.weight for order in self._orders), weight], 1)
         self.weight = self.weight.nan_to_num(0.0, 0.0, 0.0)
@@ -322,10 +323,16 @@ class _Light:
         first = torch.where(any_inside, lines.position(low - reach).ceil(), 0.0).long()
         index = first[:, None] + torch.arange(math.ceil((span + 2 * reach) / lines.step_px) + 1)
         used = lines.exists(index) & any_inside[:, None]
-        distance = columns.T[:, None] - lines.centre_px(index).to(columns)[..., None]
         white = like(scan.model.bands.moments[order].sum(1), columns)[self.colour] * inside.T
+        # Only these lines light a band: all others are too far away.
+        near = (lines.position(columns.T - reach).ceil().long() - first[:, None])[..., None]
+        near = near + torch.arange(math.floor(2 * reach / lines.step_px) + 1)
+        distance = columns.T[..., None] - lines.centre_px(near + first[:, None, None]).to(columns)
         at = ((distance + reach) * SAMPLES).add_(0.5).clip_(0, len(table) - 1).int()
-        own = table[:, 0].contiguous().index_select(0, at.reshape(-1)).reshape(at.shape) * white[:, None]
+        light = table.index_select(0, at.reshape(-1)).reshape(*at.shape, -1)
+        near = near.clip_(0, index.shape[1] - 1)
+        own = columns.new_zeros((*white.shape, index.shape[1]))
+        own.scatter_add_(2, near, light[..., 0] * white[..., None])
         frame = lines.frame(index).numpy()
         rows, columns_at = (at[:, None] for at in self._place)
         y = torch.as_tensor(scan.radiance[frame, rows, columns_at]).double()
@@ -336,12 +343,12 @@ class _Light:
             away, lines.width_px, scan.model.rig.projector_response
         )
         values, weight = weighted(y - known["offset"][:, None] - halo, std**2)
-        lit = (own > 0).any(2) & used
+        lit = (own > 0).any(1) & used
         return _OrderLight(
             own,
             white,
-            at,
-            table[:, 1:].contiguous(),
+            near,
+            light[..., 1:],
             values,
             weight * lit,
             index / lines.lines - 0.5,
@@ -355,20 +362,19 @@ class _Light:
         parts = []
         along = torch.as_tensor(along_bands(self._scan.model), dtype=nodes.dtype)
         for number, light in enumerate(self._orders):
-            own = (light.rows @ nodes[..., None])[..., 0]
-            kinds = light.changes.shape[1]
-            rows = light.changes.index_select(0, light.index.reshape(-1)).reshape(*light.index.shape, kinds)
-            light_of = light.white * nodes
-            shifted, blurred, tailed = torch.einsum("slbk,sb->ksl", rows, light_of)
+            own = (nodes[:, None] @ light.rows)[:, 0]
+            gained = light.changes * (light.white * nodes)[..., None, None]
+            gained = torch.cat([gained, gained[..., :1] * along[:, None, None]], -1).flatten(1, 2)
+            line = light.near.flatten(1)[..., None].expand_as(gained)
+            of_lines = own.new_zeros((*own.shape, gained.shape[-1])).scatter_add_(1, line, gained)
             part = torch.zeros((*own.shape, len(PARAMETERS)), dtype=own.dtype)
+            shifted, part[..., 4], part[..., 5], part[..., 7 + number] = of_lines.unbind(-1)
             part[..., number], part[..., 2 + number] = shifted, own
-            part[..., 4], part[..., 5] = blurred, tailed
             part[..., 6] = own * light.time
-            part[..., 7 + number] = torch.einsum("slb,sb->sl", rows[..., 0], light_of * along)
             parts.append(part)
         zero = torch.zeros_like(parts[0][:, :1])
         lines = self._scan.model.lines
         assert lines is not None
         time = lines.position(self._known["column_px"]) / lines.lines - 0.5
-        zero[:, 0, 6] = (self.rows[:, -1] * nodes).sum(1) * time
+        zero[:, 0, 6] = (self.rows[..., -1] * nodes).sum(1) * time
         return torch.cat([*parts, zero], 1)
