@@ -196,12 +196,11 @@ def first_order_equations(
                 continue
             columns = footprint.columns[:, torch.as_tensor(usable)]
             part = part.at(usable).between(float(columns.min()), float(columns.max()))
-            light = _light(rig, part, columns)
-            scale = part.amplitude / expected[colour]
             total = total + _of_colour(
                 rig,
                 part,
-                light * scale[:, None],
+                _light(rig, part, columns),
+                part.amplitude / expected[colour],
                 white[colour],
                 np.column_stack([hats, steep[colour]]),
                 unknowns,
@@ -232,35 +231,55 @@ def _usable(footprint: Footprint, rig: Rig) -> NDArray[np.bool_]:
     return np.asarray(reached.any(0) & ~outside.any(0))
 
 
-def _light(rig: Rig, scan: LineScan, columns: torch.Tensor) -> Floats:
-    """Light of each line on each band of each pixel, (frames, P, bands)."""
+def _light(rig: Rig, scan: LineScan, columns: torch.Tensor) -> tuple[NDArray[np.bool_], Floats]:
+    """Which lines light a pixel, (P, frames), and the light of each of those on all bands, (lit, bands).
+
+    ``columns`` (bands, P) rise or fall with the wavelength, so that a line lights a few bands in a row.
+    """
     slope = float((columns[-1] - columns[0]).abs().median()) / float(BANDS_NM[-1] - BANDS_NM[0])
     spread = rig.projector_response.line_spread
     table = ProfileTable(scan.lines.width_px, spread, slope * STEP_NM, columns.device, columns.dtype)
-    centres = torch.as_tensor(scan.centres_px)[:, None, None].to(columns.dtype)
-    return table.at(columns.T - centres).numpy()
+    bands, rises = len(columns), bool(columns[-1].mean() > columns[0].mean())
+    places = (columns if rises else columns.flip(0)).T.contiguous()
+    centres = torch.as_tensor(scan.centres_px).to(columns.dtype).expand(len(places), -1)
+    first, end = (
+        torch.searchsorted(places, (centres + by).contiguous())
+        for by in (-table.support_px, table.support_px)
+    )
+    near = first[..., None] + torch.arange(int((end - first).max()))
+    inside, near = near < end[..., None], near.clip_(max=bands - 1)
+    light = table.at(places.gather(1, near.flatten(1)).reshape(near.shape) - centres[..., None]) * inside
+    lit = (light > 0).any(-1)
+    near = near if rises else bands - 1 - near
+    of_bands = light.new_zeros((int(lit.sum()), bands)).scatter_add_(1, near[lit], light[lit])
+    return lit.numpy(), of_bands.numpy()
 
 
 def _of_colour(
     rig: Rig,
     scan: LineScan,
-    light: Floats,
+    light: tuple[NDArray[np.bool_], Floats],
+    scale: Floats,
     white: Floats,
     changes: Floats,
     unknowns: Unknowns,
     order: int,
     colour: int,
 ) -> Equations:
-    """Equations of the pixels of one colour through one order; ``light`` (frames, P, bands) with shading.
+    """Equations of the pixels of one colour through one order; ``light`` as of `_light`.
 
-    ``changes`` (bands, nodes + 1) are relative changes of the bands by the nodes and by the scale.
+    ``scale`` (P,) is the shading of the light, ``changes`` (bands, nodes + 1) are relative changes of the
+    bands by the nodes and by the scale.
     """
-    expected = light * white
+    lit, of_bands = light
+    pixel, frame = np.nonzero(lit)
+    known = np.isfinite(scan.std[frame, pixel])
+    pixel, frame = pixel[known], frame[known]
+    expected = of_bands[known] * white * scale[pixel, None]
     predicted = expected.sum(-1)
     direct = scan.radiance - scan.offset - scan.amplitude * _halo(rig, scan)
-    lit = (light.max(-1) > 0) & np.isfinite(scan.std)
-    std = np.hypot(scan.std[lit], MODEL_ERROR * predicted[lit])
-    part = Equations.of(expected[lit] @ changes, (direct - predicted)[lit], std)
+    std = np.hypot(scan.std[frame, pixel], MODEL_ERROR * predicted)
+    part = Equations.of(expected @ changes, direct[frame, pixel] - predicted, std)
     # Efficiency, response and white scale act alike on these signals.
     nodes = changes.shape[1] - 1
     spread = np.zeros((nodes + 1, unknowns.count + 1))

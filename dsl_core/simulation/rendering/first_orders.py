@@ -20,7 +20,7 @@ from torch import Tensor
 
 from dsl_core.optics.correspondence import chebyshev_nodes, interpolation_matrix, like
 from dsl_core.simulation.rendering.order_tables import OrderTables
-from dsl_core.simulation.rendering.pattern_table import Edge, PatternTable, between
+from dsl_core.simulation.rendering.pattern_table import Edge, PatternTable, between, without_colour
 from dsl_core.simulation.rendering.spectral_tables import NM, Slicing
 
 #: Slices times pixels that are worked out at once: they stay in the cache of a core.
@@ -31,10 +31,10 @@ Runs = list[tuple[float, float, float]]
 
 def white_runs(colour: NDArray[np.uint8]) -> Runs | None:
     """Lit bands of a grey, column-only image as (start px, stop px, level 0..1); None for other images."""
-    line = colour[0]
-    if not ((line == line[:, :1]).all() and (colour == line).all()):
+    grey = without_colour(colour)
+    if grey.shape[2] != 1 or not (grey == grey[:1]).all():
         return None
-    levels = line[:, 0].astype(int)
+    levels = grey[0, :, 0].astype(int)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], levels, [0]])))
     return [(a - 0.5, b - 0.5, levels[a] / 255) for a, b in pairwise(edges) if levels[a]]
 

@@ -51,10 +51,10 @@ class PatternTable:
         cls, colour: NDArray[np.uint8], response: ProjectorResponse, device: torch.device
     ) -> PatternTable:
         """Table of drive levels, (height, width, 3); those of patterns that vary one way only are kept."""
-        levels = colour[..., :1] if (colour == colour[..., :1]).all() else colour
+        levels = without_colour(colour)
         if (levels == levels[:1]).all():
             levels = levels[:1]
-        elif (levels == levels[:, :1]).all():
+        elif (levels[:, 1:] == levels[:, :-1]).all():
             levels = levels[:, :1]
         else:
             return cls.of(_radiance(levels, response), response, device)
@@ -158,6 +158,13 @@ class PatternTable:
         """Index of the first sample of the row nearest to positions (px)."""
         nearest = ((row + 0.5) * self.oversample[1]).clip(0, table.shape[0] - 1).int()
         return nearest.mul_(table.shape[1])
+
+
+def without_colour(levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Drive levels (height, width, 3) as (height, width, 1) if all of them are grey, as they are if not."""
+    red, green, blue = np.moveaxis(levels, 2, 0)
+    grey = levels.strides[2] == 0 or ((red == green).all() and (red == blue).all())
+    return levels[..., :1] if grey else levels
 
 
 def between(start: Edge, stop: Edge) -> tuple[Tensor, Tensor]:
