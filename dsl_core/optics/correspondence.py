@@ -200,6 +200,22 @@ class GratingModel:
             columns[:, part], rows[:, part] = seen
         return Footprint(columns, rows)
 
+    def columns_of(
+        self, pixels: Tensor, depth_mm: Tensor, orders: NDArray[np.int64], wavelengths_nm: NDArray[np.float64]
+    ) -> Tensor:
+        """Projector columns (px) of light of one order and wavelength at each pixel; all are (n,)."""
+        path_nm = like(orders * wavelengths_nm, depth_mm)
+        columns = torch.empty_like(depth_mm)
+        for i in range(0, len(pixels), CHUNK):
+            part = slice(i, i + CHUNK)
+            point = projector_points(self.rig, pixels[part], depth_mm[part])
+            seen = project(self.rig.projector, *incoming_direction(self.film, point, 1, path_nm[part]))
+            if self.rig.lateral_colour is not None:
+                magnified = like(self.rig.lateral_colour.projector(wavelengths_nm[part]), depth_mm)
+                seen = _magnified(self.rig, *seen, magnified)
+            columns[part] = seen[0]
+        return columns
+
     def trace(
         self, pixels: Tensor, depth_mm: Tensor, order: int, wavelengths_nm: NDArray[np.float64]
     ) -> Footprint:

@@ -151,14 +151,8 @@ class FilmFit:
 
 def grating_columns(rig: Rig, samples: OrderSamples) -> Floats:
     """Columns (px) that the rig's grating equation gives for samples, shape (n,)."""
-    model, found = GratingModel(rig), np.empty(len(samples))
-    keys = np.stack([samples.order, samples.wavelength_nm], 1)
-    unique, which = np.unique(keys, axis=0, return_inverse=True)
-    for k, (order, nm) in enumerate(unique):
-        mine = which.ravel() == k
-        pixels, depth = torch.as_tensor(samples.pixel[mine]), torch.as_tensor(samples.depth_mm[mine])
-        found[mine] = model.exact(pixels, depth, int(order), np.array([nm])).columns[0].numpy()
-    return found
+    pixels, depth = torch.as_tensor(samples.pixel), torch.as_tensor(samples.depth_mm)
+    return GratingModel(rig).columns_of(pixels, depth, samples.order, samples.wavelength_nm).numpy()
 
 
 def columns_per_share(rig: Rig, samples: OrderSamples) -> Floats:

@@ -115,11 +115,13 @@ def move(motions: Floats, points: Floats) -> tuple[Floats, Floats]:
     """Points (n, 3) moved by motions (n, 6), and the derivative by the motion, (n, 3, 6)."""
     import cv2
 
-    unique, which = np.unique(motions, axis=0, return_inverse=True)
-    turned = [cv2.Rodrigues(motion[:3].copy().reshape(3, 1)) for motion in unique]
-    rotations = np.array([rotation for rotation, _ in turned])[which.ravel()]
+    # Points of a pose follow each other.
+    new = np.append(True, (motions[1:] != motions[:-1]).any(1))
+    which = np.cumsum(new) - 1
+    turned = [cv2.Rodrigues(motion[:3].copy().reshape(3, 1)) for motion in motions[new]]
+    rotations = np.array([rotation for rotation, _ in turned])[which]
     # OpenCV: row k is the derivative of the matrix, row by row, by component k of the vector.
-    slopes = np.array([slope.reshape(3, 3, 3) for _, slope in turned])[which.ravel()]
+    slopes = np.array([slope.reshape(3, 3, 3) for _, slope in turned])[which]
     moved = np.einsum("nij,nj->ni", rotations, points) + motions[:, 3:]
     by_motion = np.empty((len(points), 3, 6))
     by_motion[:, :, :3] = np.einsum("nkij,nj->nik", slopes, points)
@@ -244,7 +246,7 @@ def _summary(
     scale[scale == 0] = 1
     inverse = np.linalg.pinv((rows / scale).T @ (rows / scale), hermitian=True) / np.outer(scale, scale)
     # A corner draws the fit towards itself: without it, its errors would be larger (Bell and McCaffrey 2002).
-    leverage = np.einsum("nkp,pq,nlq->nkl", slopes, inverse, slopes)
+    leverage = slopes @ inverse @ slopes.swapaxes(1, 2)
     unseen = np.linalg.solve((1 + 1e-6) * np.eye(4) - leverage, errors[..., None])[..., 0]
     pulls = np.einsum("nk,nkp->np", unseen, slopes)
     covariance = MARGIN**2 * inverse @ (pulls.T @ pulls) @ inverse
