@@ -17,6 +17,10 @@ from dsl_core.simulation.published_rig import published_rig
 WIDTH, HEIGHT, SCALE = 160, 96, 4
 #: Colour of each LED (rows) in the camera's channels, DN per ms.
 MIX = np.array([[165.0, 44.0, 6.0], [40.0, 307.0, 73.0], [8.0, 32.0, 206.0]])
+#: The same in the colour of each pixel, (LEDs, rows, columns); the last rows see beside the picture.
+SEEN = MIX[:, np.array([[0, 1], [1, 2]])[np.arange(HEIGHT)[:, None] % 2, np.arange(WIDTH) % 2]]
+SEEN[:, -16:] = 0
+ELECTRONS_PER_DN, BLACK_DN = published_rig().sensor.electrons_per_dn, published_rig().sensor.black_level_dn
 
 
 @dataclass
@@ -41,18 +45,24 @@ class LightWorld:
     hot: int = 0
     jitter_ms: float = 0.0
     now_ms: float = 0.0
-    shown: list[tuple[float, NDArray[np.uint8]]] = field(default_factory=list)
+    shown: list[tuple[float, NDArray[np.float64]]] = field(default_factory=list)
+
+    def light(self, picture: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """What each LED brings of a picture in a ms, (LEDs, rows, columns), DN."""
+        levels = np.arange(256)
+        level = np.where(levels >= self.drop, 0.8, 1.0) * levels / 255
+        light = self.black + (1 - self.black) * level ** np.array(self.gamma)[:, None]
+        return np.asarray(np.stack([light[led][picture[..., led]] for led in range(3)]) * SEEN)
 
     def drive(self, start_ms: float, stop_ms: float) -> NDArray[np.float64]:
-        """Mean light of each LED over an exposure, (rows, columns, LEDs), relative to full drive."""
+        """Light over an exposure, (rows, columns), DN."""
         edges = [*(time for time, _ in self.shown if start_ms < time < stop_ms), stop_ms]
-        total = np.zeros((HEIGHT, WIDTH, 3))
+        total = np.zeros((HEIGHT, WIDTH))
         for edge in edges:
-            before = [image for time, image in self.shown if time <= start_ms]
-            picture = before[-1] if before and self.connected else np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-            level = np.where(picture >= self.drop, 0.8, 1.0) * picture / 255
-            light = self.black + (1 - self.black) * level ** np.array(self.gamma)
-            total += light * self.on(start_ms, edge)
+            before = [light for time, light in self.shown if time <= start_ms]
+            dark = not (before and self.connected)
+            light = self.light(np.zeros((HEIGHT, WIDTH, 3), np.uint8)) if dark else before[-1]
+            total += np.tensordot(self.on(start_ms, edge), light, 1)
             start_ms = edge
         return total
 
@@ -85,20 +95,16 @@ class LightCamera(Camera):
         self.shot, self.attempt = shot_index, attempt
 
     def snap(self, timeout_ms: float = 5000.0) -> Frame:
-        world, sensor = self.world, published_rig().sensor
+        world = self.world
         rng = np.random.default_rng((world.seed, self.shot, self.attempt))
         start = world.now_ms + world.jitter_ms * rng.random()
-        light = world.drive(start, start + self.exposure_ms) @ MIX * world.brightness
-        # The last rows see beside the picture.
-        light[-16:] = 0
-        channel = np.array([[0, 1], [1, 2]])[np.arange(HEIGHT)[:, None] % 2, np.arange(WIDTH) % 2]
-        signal = np.take_along_axis(light, channel[..., None], 2)[..., 0]
+        signal = world.drive(start, start + self.exposure_ms) * world.brightness
         signal = signal - world.bend * np.minimum(signal, 4095) ** 2 / 4095 + world.ambient * self.exposure_ms
         signal = signal + rng.standard_normal(signal.shape) * np.sqrt(
-            np.maximum(signal, 0) / sensor.electrons_per_dn + 1
+            np.maximum(signal, 0) / ELECTRONS_PER_DN + 1
         )
         signal.flat[: world.hot * 7 : 7] += 300
-        pixels = np.clip(np.rint(signal + sensor.black_level_dn), 0, world.clip_dn).astype(np.uint16)
+        pixels = np.clip(np.rint(signal + BLACK_DN), 0, world.clip_dn).astype(np.uint16)
         delivered = self.before if world.stale and self.before is not None else pixels
         self.before = pixels
         world.now_ms += self.exposure_ms
@@ -119,8 +125,11 @@ class LightProjector(Projector):
     def show(self, image: NDArray[np.uint8]) -> None:
         colour = image if image.ndim == 3 else np.repeat(image[..., None], 3, 2)
         self.world.now_ms += self.world.blocking_ms
-        small = colour[::SCALE, ::SCALE].copy()
-        self.world.shown = [*self.world.shown[-3:], (self.world.now_ms + self.world.late_ms, small)]
+        small = colour[::SCALE, ::SCALE]
+        self.world.shown = [
+            *self.world.shown[-3:],
+            (self.world.now_ms + self.world.late_ms, self.world.light(small)),
+        ]
 
 
 def light_rig(world: LightWorld) -> DeviceRig:

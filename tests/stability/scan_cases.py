@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 import torch
@@ -62,9 +62,9 @@ def scan_case(
     return Case(name, hard, run, ends, says)  # type: ignore[arg-type]
 
 
-@lru_cache(maxsize=1)
+@cache
 def _staged(patch: Callable[[], Patch]) -> tuple[Patch, Staged]:
-    """Scanned once for both precisions."""
+    """Scanned once for both precisions, and for all cases of the same patch."""
     made = patch()
     return made, staged(made)
 

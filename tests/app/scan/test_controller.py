@@ -25,6 +25,7 @@ from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
 from dsl_core.workflows import scans
 from tests.app.support.scan_bench import (
+    BRIEF,
     FRAMES,
     PATTERNS,
     SHORT,
@@ -68,11 +69,12 @@ def test_a_plan_is_fitted_to_the_rig_and_its_cost_is_known(bench: ScanBench) -> 
     assert facts is not None
     assert bench.state.plan.value.camera_size_px == (64, 48)
     assert (facts.frames, facts.obstacles, facts.remarks) == (FRAMES, (), ())
-    assert facts.seconds == pytest.approx(SHORT.duration_s(50.0))
+    assert facts.seconds == pytest.approx(BRIEF.duration_s(50.0))
     assert 0 < facts.needed_bytes < facts.free_bytes
 
 
 def test_presets_can_be_chosen_and_taken_back(bench: ScanBench) -> None:
+    bench.plan(SHORT)
     bench.scans.plans.choose_preset("reference")
     assert bench.state.preset is PRESETS[-1]
     bench.undo.undo()
@@ -80,6 +82,7 @@ def test_presets_can_be_chosen_and_taken_back(bench: ScanBench) -> None:
 
 
 def test_the_plan_of_a_scan_at_hand_is_not_taken_back(bench: ScanBench) -> None:
+    bench.plan(SHORT)
     bench.scans.plans.choose_preset("reference")
     bench.state.phase.set(Phase.RUNNING)
     assert "keeps its plan" in bench.undo.undo()
@@ -90,6 +93,7 @@ def test_the_plan_of_a_scan_at_hand_is_not_taken_back(bench: ScanBench) -> None:
 
 
 def test_a_plan_that_comes_back_suits_the_rig_that_is_connected_now(bench: ScanBench) -> None:
+    bench.plan(SHORT)
     bench.scans.plans.choose_preset("reference")
     bench.rig.connect(SMALL)
     bench.undo.undo()
@@ -101,6 +105,7 @@ def test_a_plan_that_comes_back_suits_the_rig_that_is_connected_now(bench: ScanB
 
 
 def test_a_plan_that_comes_back_has_whole_cycles_of_the_projector_of_now(bench: ScanBench) -> None:
+    bench.plan(SHORT)
     bench.scans.plans.choose_preset("reference")
     bench.state.period_ms.set(20.0)
     bench.undo.undo()
@@ -130,7 +135,7 @@ def test_the_graph_of_a_pixel_shows_the_lines_that_are_there(bench: ScanBench) -
     bench.scans.start()
     graph = bench.state.graph.value
     assert graph is not None
-    assert graph.mean_dn.shape == (len(SHORT.settings), PATTERNS, 3)
+    assert graph.mean_dn.shape == (len(BRIEF.settings), PATTERNS, 3)
     brightest = graph.mean_dn[-1]
     assert (brightest.max(0) > brightest.min(0) + 20).all()
 

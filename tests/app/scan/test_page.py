@@ -31,7 +31,6 @@ from dsl_core.model.plan import LineComb
 from dsl_core.model.presets import PRESETS
 from dsl_core.simulation.sim_devices import SimCamera
 from tests.app.support.scan_bench import (
-    FRAMES,
     SHORT,
     TWIN,
     ScanBench,
@@ -66,7 +65,7 @@ def ready(qtbot: QtBot, tmp_path: Path) -> Iterator[Bench]:
     page.show()
     bench.rig.connect(TWIN)
     qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=60_000)
-    bench.plan()
+    bench.plan(SHORT)
     qtbot.waitUntil(lambda: runner.active == ())
     yield page, bench, opened
     page.release()
@@ -104,7 +103,7 @@ def test_pause_go_on_and_finish(qtbot: QtBot, ready: Bench, slow: None, tmp_path
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
     assert ScanReader(tmp_path / "first.dsl").missing() == []
     assert page.plan.isEnabled()
-    assert f"{FRAMES} of {FRAMES}" in page.run.frames.text()
+    assert f"{SHORT.shot_count} of {SHORT.shot_count}" in page.run.frames.text()
 
 
 def test_cancel_keeps_frames_and_offers_to_resume(qtbot: QtBot, ready: Bench, slow: None) -> None:
@@ -169,7 +168,7 @@ def test_closing_the_window_during_a_scan_loses_no_frame(qtbot: QtBot, tmp_path:
     bench = make_bench(tmp_path, runner)
     bench.rig.connect(TWIN)
     qtbot.waitUntil(lambda: bench.rig.state.devices.value is not None, timeout=60_000)
-    bench.plan()
+    bench.plan(SHORT)
     bench.scans.start()
     seen = 0
 
@@ -275,7 +274,7 @@ def test_dragging_the_marker_shows_what_is_expected_and_dropping_chooses(
     page, bench, _ = ready
     state = begin(qtbot, page)
     curve = page.forecast.curve.content
-    assert figures(page, 1)["Frames"] == str(FRAMES)
+    assert figures(page, 1)["Frames"] == str(SHORT.shot_count)
     assert figures(page, 2)["Frames"] == "748"
     assert figures(page, 2)["Capture"] == "3.7 min"
     published = state.published
@@ -348,7 +347,7 @@ def test_after_a_scan_its_figures_stand_beside(qtbot: QtBot, ready: Bench) -> No
     page, bench, _ = ready
     click(page.run.start)
     qtbot.waitUntil(in_phase(bench, Phase.DONE), timeout=60_000)
-    assert figures(page, 3)["Frames"] == str(FRAMES)
+    assert figures(page, 3)["Frames"] == str(SHORT.shot_count)
     # The twin does not wait for exposures.
     assert figures(page, 3)["Capture"] == "–"
 

@@ -29,8 +29,10 @@ TWIN = RigChoice("twin", (("scene", "color-checker"), ("size", "64x48")))
 #: A rig of another size.
 SMALL = RigChoice("twin", (("scene", "color-checker"), ("size", "32x24")))
 SHORT = PRESETS[0].plan
-#: All frames of the short plan, and its patterns.
-FRAMES, PATTERNS = SHORT.shot_count, SHORT.spectral_count
+#: The same at one setting: half of the frames tell as much of who captures them.
+BRIEF = SHORT.model_copy(update={"settings": SHORT.settings[1:], "code_settings": (0,)})
+#: All frames of the brief plan, and its patterns.
+FRAMES, PATTERNS = BRIEF.shot_count, BRIEF.spectral_count
 COMB = CapturePlan(name="comb 5x2x64", spectral=LineComb(period_px=64))
 
 
@@ -53,8 +55,8 @@ class ScanBench:
         assert devices.calibration is not None
         return devices.calibration
 
-    def plan(self, plan: CapturePlan = SHORT) -> None:
-        """Plan a short scan without reconstruction."""
+    def plan(self, plan: CapturePlan = BRIEF) -> None:
+        """Plan a brief scan without reconstruction."""
         self.state.then_reconstruct.set(False)
         self.scans.plans.change_plan(plan)
 
@@ -72,7 +74,7 @@ def make_bench(folder: Path, runner: JobRunner | None = None) -> ScanBench:
 
 
 def planned_bench(folder: Path) -> ScanBench:
-    """A bench with its rig connected and a short scan planned."""
+    """A bench with its rig connected and a brief scan planned."""
     made = make_bench(folder)
     made.rig.connect(TWIN)
     made.plan()
