@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import time
 from collections.abc import Callable
@@ -64,11 +65,12 @@ class ShotTaker:
         self._last: Frame | None = None
         self._noiseless = False
 
-    def take(self, shot: Shot, earlier_rounds: int = 0, settle_ms: float = 0.0) -> Frame:
+    def take(self, shot: Shot, earlier_rounds: int = 0, settle_ms: float = 0.0, twice: bool = False) -> Frame:
         """The frame of a shot; raises `DeviceError` when all attempts failed, or `Cancelled`.
 
         ``earlier_rounds`` counts how often it was taken before in vain: then the pattern is sent again, and
-        ``settle_ms`` waited until the exposure.
+        ``settle_ms`` waited until the exposure. ``twice`` sends and exposes everything twice and keeps the
+        second picture, for projectors and cameras that are one picture late.
         """
         if earlier_rounds:
             self._shown = None
@@ -77,7 +79,7 @@ class ShotTaker:
         first = earlier_rounds * self._policy.attempts
         for attempt in range(self._policy.attempts):
             try:
-                frame = self._attempt(shot, first + attempt, settle_ms)
+                frame = self._attempt(shot, first + attempt, settle_ms, twice)
                 frame = replace(frame, attempts=first + attempt + 1)
             except DeviceError as error:
                 self._recover(shot, attempt, error)
@@ -105,26 +107,32 @@ class ShotTaker:
         self._shown = None
         self._rig.projector.show(np.zeros((info.height_px, info.width_px), np.uint8))
 
-    def _attempt(self, shot: Shot, attempt: int, settle_ms: float) -> Frame:
-        self._set(shot)
-        if settle_ms:
-            self._sleep(settle_ms / 1000.0)
+    def _attempt(self, shot: Shot, attempt: int, settle_ms: float, twice: bool) -> Frame:
+        for _ in range(2 if twice else 1):
+            self._set(shot, send=twice)
+            if settle_ms:
+                self._sleep(settle_ms / 1000.0)
         self._rig.camera.prepare(shot.index, attempt)
-        frame = self._rig.camera.snap(shot.exposure_ms + self._policy.timeout_ms)
+        timeout_ms = shot.exposure_ms + self._policy.timeout_ms
+        if twice:
+            # A camera that is one picture late delivers an old one now.
+            with contextlib.suppress(StaleFrameError):
+                self._order.take(self._rig.camera.snap(timeout_ms))
+        frame = self._rig.camera.snap(timeout_ms)
         require_mosaic(frame.pixels, self._plan.camera_size_px, "The camera")
         require_exposure(frame.exposure_ms, shot.exposure_ms, "The camera")
         frame = replace(self._order.take(frame), shown_s=self._shown_s)
         self._last = frame
         return frame
 
-    def _set(self, shot: Shot) -> None:
-        """Send pattern and exposure where they differ from what the devices have."""
+    def _set(self, shot: Shot, send: bool = False) -> None:
+        """Send pattern and exposure where they differ from what the devices have, or the pattern anyway."""
         if shot.exposure_ms != self._exposure_ms:
             actual = self._rig.camera.configure(shot.exposure_ms)
             require_exposure(actual, shot.exposure_ms, "The camera")
             self._exposure_ms = shot.exposure_ms
         pattern = (shot.role, shot.pattern, shot.level)
-        if pattern != self._shown:
+        if send or pattern != self._shown:
             self._shown = None
             self._rig.projector.show(self._pattern_image(self._plan, shot))
             self._shown, self._shown_s = pattern, self._now()

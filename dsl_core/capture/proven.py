@@ -11,13 +11,15 @@ from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.errors import Cancelled, DeviceError
 from dsl_core.model.frames import Frame, FrameSink, FrameSource
-from dsl_core.model.plan import Shot
+from dsl_core.model.plan import Shot, describe_shot
 from dsl_core.progress import CancelToken
 
 #: How often a shot is taken again before the scan stops, and how long the pattern may settle before that, ms.
 SETTLE_MS = (100.0, 300.0, 900.0)
-#: After so many failures on end, shots that show too little to be judged are taken twice as well.
+#: After so many wrong pictures on end, projector or camera count as late.
 FAILURES = 2
+#: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
+MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
 
 
@@ -30,6 +32,8 @@ class ProvenShots:
         """Keep the parts."""
         self._taker, self._proof, self._sink, self._token = taker, proof, sink, token
         self._failures = 0
+        self._is_late = False
+        self._untold: list[Shot] = []
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
@@ -39,7 +43,8 @@ class ProvenShots:
         if not self.corrected:
             return ""
         what = "1 was" if self.corrected == 1 else f"{self.corrected} were"
-        return f" {what} captured again, because a picture did not show its pattern."
+        late = " Everything was captured twice, since pictures came one late." if self._is_late else ""
+        return f" {what} captured again, because a picture did not show its pattern.{late}"
 
     def take(self, shot: Shot) -> None:
         """Take a shot and save it.
@@ -47,27 +52,73 @@ class ProvenShots:
         Raises `DeviceError` when it does not show its pattern however often it is taken, `StoreError` when it
         cannot be saved, `Cancelled` when someone requested the end.
         """
-        frame = self._taker.take(shot)
+        frame = self._taker.take(shot, twice=self._is_late)
         if self._proof is None:
             self._sink.write(shot, frame)
             return
         found = self._proof.judge(shot, frame.pixels)
-        if found.verdict is not Verdict.UNTOLD:
-            self._failures = self._failures + 1 if found.is_wrong else 0
-        elif self._failures >= FAILURES:
-            frame = self._taker.take(shot, 1, SETTLE_MS[0])
-            found = self._proof.judge(shot, frame.pixels)
+        if found.is_doubtful and not self._is_late:
+            frame, found = self._ask_again(shot, frame, self._proof)
         if shot not in found.again:
             self._sink.write(shot, frame)
+        if found.is_wrong:
+            self._failures += 1
+        elif found.verdict is Verdict.RIGHT:
+            self._failures = 0
+            self._untold.clear()
+        elif shot.role == "spectral":
+            self._untold.append(shot)
         self._correct(found, self._proof)
+        if self._failures >= FAILURES and not self._is_late:
+            self._be_late(shot, self._proof)
+
+    def _ask_again(self, shot: Shot, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
+        """A second picture of a shot that may be wrong, and whether the first one was."""
+        second = self._taker.take(shot, 1, SETTLE_MS[0], twice=True)
+        if proof.differ(frame.pixels, second.pixels):
+            self._failures += 1
+            self.corrected += 1
+            second = replace(second, corrected="it was unlike those before it")
+        return second, proof.judge(shot, second.pixels)
+
+    def _be_late(self, shot: Shot, proof: FrameProof) -> None:
+        """Expect every picture to be late from now on, and so of those before that could not be told."""
+        self._is_late = True
+        _log.warning(
+            "Pictures are wrong one after the other, as if projector or camera were one picture late. From %s"
+            " on, everything is shown and captured twice, and the second picture is kept.",
+            describe_shot(shot),
+        )
+        for each in self._untold:
+            frame = replace(self._taker.take(each, 1, SETTLE_MS[0], twice=True), corrected="it may be late")
+            found = proof.judge(each, frame.pixels)
+            if each not in found.again:
+                self._sink.write(each, frame)
+                self.corrected += 1
+            self._correct(found, proof)
+        self._untold.clear()
 
     def learn(self, stored: FrameSource, missing: Collection[int]) -> None:
-        """Judge the frames of earlier runs, all but those ``missing``; wrong ones are taken again."""
+        """Judge the frames of earlier runs, all but those ``missing``; wrong ones are taken again.
+
+        So are the last ones before a missing shot that cannot be told: what stopped the scan may have begun
+        with them.
+        """
         if self._proof is None:
             return
+        tail: list[Shot] = []
+        again: list[Shot] = []
         for shot in stored.plan.shots():
-            if shot.index not in missing:
-                self._correct(self._proof.judge(shot, stored.read(shot)), self._proof)
+            if shot.index in missing:
+                again += tail[-MOST_UNTOLD:]
+                tail = []
+                continue
+            found = self._proof.judge(shot, stored.read(shot))
+            is_untold = found.verdict is Verdict.UNTOLD and shot.role == "spectral"
+            tail = [*tail, shot] if is_untold else []
+            self._correct(found, self._proof)
+        for shot in again:
+            self.take(shot)
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
         for earlier, settle_ms in enumerate(SETTLE_MS):
@@ -79,7 +130,7 @@ class ProvenShots:
             reason, wrong = found.seen, found.again
             taken: list[tuple[Shot, Frame]] = []
             for shot in wrong:
-                frame = replace(self._taker.take(shot, earlier + 1, settle_ms), corrected=reason)
+                frame = replace(self._taker.take(shot, earlier + 1, settle_ms, twice=True), corrected=reason)
                 taken.append((shot, frame))
                 found = proof.judge(shot, frame.pixels)
             for shot, frame in taken:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -101,7 +101,7 @@ def info(
 
     output, facts = Output(json), describe(path, verify)
     if verify and facts["kind"] == "session":
-        facts["wrong_pictures"] = _wrong_pictures(path)
+        facts |= _proof_of(path)
     for name, value in facts.items():
         if isinstance(value, dict):
             value = "; ".join(f"{key}: {item}" for key, item in value.items())
@@ -112,7 +112,8 @@ def info(
     output.finish()
 
 
-def _wrong_pictures(path: Path) -> list[str]:
+def _proof_of(path: Path) -> dict[str, Any]:
     from dsl_core.workflows.scans import prove_scan
 
-    return list(prove_scan(path))
+    found = prove_scan(path)
+    return {"wrong_pictures": list(found.sentences), "pictures_not_judged": found.not_judged or "none"}

@@ -58,7 +58,7 @@ def reconstruct(
     from dsl_core.io.result.result_file import RESULT_FOLDER, save_result
     from dsl_core.model.options import MODELS, SOLVERS, names
     from dsl_core.pipeline import Options
-    from dsl_core.workflows.scans import DOUBTS, reconstruct_scan
+    from dsl_core.workflows.scans import DOUBTS, NOT_JUDGED, reconstruct_scan
 
     output, timer, target = Output(json), StageTimer(), target or session.with_suffix(".zarr")
     _require_one_of("--model", model, names(MODELS))
@@ -84,10 +84,13 @@ def reconstruct(
     doubts = loads(result.attrs.get(DOUBTS, "[]"))
     for sentence in doubts:
         output.say(f"{sentence} The result may be wrong; scan again, or see 'dsl-scan info --verify'.")
+    not_judged = result.attrs.get(NOT_JUDGED, "")
+    if not_judged:
+        output.say(f"{not_judged} pictures show too little to be compared with their pattern.")
     share = coverage(result)
     print_fit(output, result)
     output.say(f"{share:.1%} of the pixels have a depth. The result is saved in {target}")
-    output.put(result=target, pixels_with_depth=share, wrong_pictures=doubts)
+    output.put(result=target, pixels_with_depth=share, wrong_pictures=doubts, pictures_not_judged=not_judged)
     output.finish()
 
 

@@ -51,10 +51,21 @@ def require_frame(frame: object, camera: CameraInfo, exposure_ms: float | None) 
             f"{name} delivered a value of {brightest}; with {camera.bit_depth} bits, {most} is the largest."
             " Check its pixel format: values belong in the lower bits."
         )
+    _require_whole(frame.pixels, name)
     if not (math.isfinite(frame.exposure_ms) and frame.exposure_ms > 0):
         raise DeviceError(f"{name} says that it exposed for {frame.exposure_ms:g} ms. Update its driver.")
     if exposure_ms is not None:
         require_exposure(frame.exposure_ms, exposure_ms, name)
+
+
+def _require_whole(pixels: NDArray[np.uint16], name: str) -> None:
+    """Raise `DeviceError` for rows without any count, where all others have a black level: a torn transfer."""
+    empty = pixels.max(axis=1) == 0
+    if empty.any() and not empty.all() and pixels[~empty].min() > 0:
+        raise DeviceError(
+            f"{name} delivered {int(empty.sum())} of {empty.size} rows empty. Check its cable; on a slow"
+            " connection lower its frame rate."
+        )
 
 
 def require_mosaic(pixels: NDArray[np.uint16], size_px: tuple[int, int], name: str) -> None:

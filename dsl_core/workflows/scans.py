@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dsl_core.capture.movement import check_movement, pick_reference_shots
+from dsl_core.capture.proof.finding import ProofReport
 from dsl_core.capture.proof.report import WatchedSource, prove
 from dsl_core.capture.runner import Status
 from dsl_core.devices.base import DeviceRig
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
 #: Attribute of a result: sentences about pictures that do not show their pattern, as a list in JSON.
 DOUBTS = "frames_in_doubt"
+#: Attribute of a result: how many frames show too little to be judged by their pattern, as "26 of 150".
+NOT_JUDGED = "frames_not_judged"
 
 
 def reopen_rig(folder: Path) -> DeviceRig:
@@ -104,10 +107,11 @@ def reconstruct_scan(
     watched = WatchedSource(reader)
     result = reconstruct(watched, rig, options, progress, timer)
     with timer.stage("compare frames with their patterns"):
-        doubts = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer).sentences
+        proof = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer)
     return result.assign_attrs(
         {
-            **({DOUBTS: json.dumps(doubts)} if doubts else {}),
+            **({DOUBTS: json.dumps(proof.sentences)} if proof.wrong else {}),
+            **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
             **reader.manifest.notes,
             **model_notes(rig, options.correspondence),
             "captured": reader.manifest.created,
@@ -119,12 +123,15 @@ def reconstruct_scan(
     )
 
 
-def prove_scan(folder: Path) -> tuple[str, ...]:
-    """A sentence for every picture of a scan that does not show its pattern; raises `StoreError`."""
+def prove_scan(folder: Path) -> ProofReport:
+    """Which pictures of a scan do not show their pattern, and of how many nothing can be told.
+
+    Raises `StoreError`.
+    """
     reader = ScanReader(folder)
     camera = reader.manifest.camera
     settings = (camera.bit_depth, camera.bayer) if camera else ()
-    return prove(reader, reader.calibration, *settings).sentences
+    return prove(reader, reader.calibration, *settings)
 
 
 def calibration_of(source: FrameSource, given: Rig | None = None) -> Rig:

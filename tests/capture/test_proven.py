@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from dsl_core.capture.proof.finding import Finding, Verdict
+from dsl_core.capture.proof.raster import Counts
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven import SETTLE_MS
 from dsl_core.capture.runner import Runner, State
 from dsl_core.errors import DeviceError
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from tests.cases.memory_sink import MemorySink
 from tests.cases.pattern_faults import PatternFault, PatternFaults
 from tests.cases.rendered_rig import RenderedScene, render, token_image
@@ -62,13 +64,15 @@ def test_right_pictures_are_taken_once(scene: RenderedScene) -> None:
 
 
 @pytest.mark.parametrize("kind", ["projector late", "camera late"])
+@pytest.mark.parametrize("at", [5, 8, 21, 24, 30])
 def test_devices_that_are_always_one_picture_late_still_give_a_right_scan(
-    scene: RenderedScene, kind: str
+    scene: RenderedScene, kind: str, at: int
 ) -> None:
     sink = MemorySink(scene.plan)
-    runner, spoiled = _run(scene, sink, PatternFault(kind, 24))
-    runner.run()
+    runner, spoiled = _run(scene, sink, PatternFault(kind, at))
+    status = runner.run()
     assert _wrong(sink, spoiled) == []
+    assert "Everything was captured twice" in status.message
 
 
 @pytest.mark.parametrize(
@@ -104,3 +108,21 @@ def test_a_resumed_scan_learns_from_saved_frames_and_takes_wrong_ones_again(scen
     assert sink.frames[25].corrected
     assert sink.frames[30].corrected
     assert sink.frames[26].frame_id == -1
+
+
+def test_shots_nobody_can_judge_before_the_stop_are_taken_again_on_resuming(
+    scene: RenderedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = MemorySink(scene.plan)
+    _run(scene, whole)[0].run()
+    sink = MemorySink(scene.plan)
+    sink.frames.update({index: replace(whole.frames[index], frame_id=-1) for index in range(30)})
+    judge = FrameProof.judge_raster
+
+    def blind(self: FrameProof, shot: Shot, seen: Counts) -> Finding:
+        found = judge(self, shot, seen)
+        return replace(found, verdict=Verdict.UNTOLD) if shot.index >= 27 else found
+
+    monkeypatch.setattr(FrameProof, "judge_raster", blind)
+    _run(scene, sink)[0].run()
+    assert [index for index in range(30) if sink.frames[index].frame_id != -1] == [27, 28, 29]

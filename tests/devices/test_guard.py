@@ -221,6 +221,7 @@ def test_opening_passes_errors_on_and_is_bounded_too() -> None:
         (replace(FRAME, pixels=np.zeros((4, 5), np.uint16)), r"uint16 of shape \(4, 5\)"),
         (replace(FRAME, pixels=np.zeros((4, 6), np.uint8)), "delivered uint8"),
         (replace(FRAME, pixels=np.full((4, 6), 4096, np.uint16)), "a value of 4096; with 12 bits, 4095"),
+        (replace(FRAME, pixels=np.repeat([[9], [9], [9], [0]], 6, 1).astype(np.uint16)), "1 of 4 rows empty"),
         (replace(FRAME, exposure_ms=5.0), "exposes for 5 ms instead of 10 ms"),
         (replace(FRAME, exposure_ms=float("nan")), "exposed for nan ms"),
         (replace(FRAME, frame_id=None), "the number of a frame is None"),  # type: ignore[arg-type]

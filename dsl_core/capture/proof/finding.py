@@ -50,13 +50,15 @@ class Finding:
     """What the picture of ``shot`` was found to show.
 
     ``again`` are the shots to take again, in the order of the plan: more than one where only together they
-    are known to be wrong. ``detail`` says what was seen in more words, such as which other shot.
+    are known to be wrong. ``detail`` says what was seen in more words, such as which other shot. A picture
+    that cannot be told ``is_doubtful`` if it is unlike its neighbours; a second one says if it was right.
     """
 
     shot: Shot
     verdict: Verdict
     again: tuple[Shot, ...] = ()
     detail: str = ""
+    is_doubtful: bool = False
 
     @property
     def is_wrong(self) -> bool:
@@ -101,3 +103,8 @@ class ProofReport:
     def sentences(self) -> tuple[str, ...]:
         """A sentence for everything that is wrong."""
         return tuple(each.sentence for each in self.wrong)
+
+    @property
+    def not_judged(self) -> str:
+        """Of how many pictures nothing can be told, such as ``26 of 150``; empty if of none."""
+        return f"{self.untold} of {self.judged}" if self.untold else ""

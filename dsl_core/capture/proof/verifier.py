@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
+from dsl_core.capture.proof.neighbours import LineNeighbours
 from dsl_core.capture.proof.prediction import (
     APART,
     Expected,
@@ -82,6 +83,7 @@ class FrameProof:
         self.reviewed: list[Finding] = []
         self._light: dict[tuple[str, int], deque[float]] = {}
         self._scale: dict[int, float] = {}
+        self._neighbours = LineNeighbours(self._noise, self._raster.shape[1])
 
     def judge(self, shot: Shot, pixels: NDArray[np.uint16]) -> Finding:
         """What the raw mosaic of a shot shows; remembers it for the shots after it, unless it is wrong."""
@@ -93,6 +95,10 @@ class FrameProof:
         found = self._judge(shot, seen)
         if found.is_wrong and before is not None and np.array_equal(seen, before[1]):
             found = Finding(shot, Verdict.REPEATED, found.again)
+        if shot.role == "spectral" and not found.is_wrong:
+            black = self._kept.get(self._blacks[shot.setting])
+            doubtful = self._neighbours.is_doubtful(shot.index, seen, black)
+            found = replace(found, is_doubtful=doubtful and found.verdict is Verdict.UNTOLD)
         self._last = (shot, seen)
         for wrong in found.again:
             self._kept.pop(wrong.index, None)
@@ -100,6 +106,10 @@ class FrameProof:
             self._kept[shot.index] = seen
             (self._untold.discard if found.verdict is Verdict.RIGHT else self._untold.add)(shot.index)
         return found
+
+    def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
+        """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
+        return self._neighbours.differ(self._raster.take(one), self._raster.take(other))
 
     @property
     def lacking_pairs(self) -> tuple[int, ...]:

@@ -1,0 +1,82 @@
+"""Pictures of lines whose pixels nobody can name: a wrong one is unlike its neighbours in the plan.
+
+From line to line, pictures differ by about as much as from the line before. One that suddenly does not, in
+any part of its height, may be late, repeated or torn; one whose light suddenly changes may be dark or wrongly
+exposed. That is a doubt, not a proof: surfaces end as suddenly.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.capture.proof.raster import Counts, Noise
+
+Bands = NDArray[np.float64]
+#: Parts of the height that are compared, and lines that say what is usual.
+BANDS, USUAL_OF, FEWEST_USUAL = 4, 7, 3
+#: Variance of a difference beyond noise, in units of that of noise: the least that says anything.
+LEAST_CHANGE = 0.4
+#: A picture changes suddenly less if it changes by this share of the usual.
+LITTLE = 0.3
+#: Light relative to that of the lines before that is no surprise.
+SAME_LIGHT = (0.6, 1.6)
+#: Light counts from so many deviations on.
+BRIGHT_SIGMAS = 25.0
+#: Differences count up to so many deviations.
+_CLIP = 10.0
+
+
+class LineNeighbours:
+    """Compares pictures of lines with those right before them."""
+
+    def __init__(self, noise: Noise, columns: int) -> None:
+        """For rasters with so many ``columns``."""
+        self._noise, self._columns = noise, columns
+        self._before: tuple[int, Counts] | None = None
+        self._changes: deque[Bands] = deque(maxlen=USUAL_OF)
+        self._light: deque[float] = deque(maxlen=USUAL_OF)
+
+    def is_doubtful(self, index: int, seen: Counts, black: Counts | None) -> bool:
+        """Whether the picture of shot ``index`` is unlike those before it; remembers it for the next."""
+        before, self._before = self._before, (index, seen)
+        if before is None or before[0] + 1 != index:
+            if before is None or before[0] != index:
+                self._changes.clear()
+                self._light.clear()
+            return False
+        change = self.change(seen, before[1])
+        usual = self._usual()
+        doubtful = bool(((change < LITTLE * usual) & (usual > LEAST_CHANGE)).any())
+        self._changes.append(change)
+        return self._has_other_light(seen, black) or doubtful
+
+    def differ(self, one: Counts, other: Counts) -> bool:
+        """Whether two pictures of one shot show different patterns."""
+        usual = self._usual()
+        change = self.change(one, other)
+        return bool(((change > 0.5 * usual) & (usual > LEAST_CHANGE) & (change > LEAST_CHANGE)).any())
+
+    def change(self, one: Counts, other: Counts) -> Bands:
+        """Variance of the difference beyond noise, in units of that of noise, in every part of the height."""
+        step = one.astype(np.float32) - other.astype(np.float32)
+        step2 = np.minimum(step**2 / (self._noise.variance(one) + self._noise.variance(other)), _CLIP**2)
+        rows = step2.reshape(-1, self._columns).mean(1)
+        return np.array([float(part.mean()) - 1.0 for part in np.array_split(rows, BANDS)])
+
+    def _usual(self) -> Bands:
+        if len(self._changes) < FEWEST_USUAL:
+            return np.zeros(BANDS)
+        return np.asarray(np.median(self._changes, axis=0))
+
+    def _has_other_light(self, seen: Counts, black: Counts | None) -> bool:
+        if black is None:
+            return False
+        light = float(seen.sum(dtype=np.float64) - black.sum(dtype=np.float64))
+        sigma = float(np.sqrt(2 * self._noise.variance(black).sum(dtype=np.float64)))
+        usual = float(np.median(self._light)) if len(self._light) >= FEWEST_USUAL else 0.0
+        self._light.append(light)
+        low, high = SAME_LIGHT
+        return usual > BRIGHT_SIGMAS * sigma and not low * usual < light < high * usual

@@ -1,0 +1,322 @@
+"""How scans and measurements end on rigs whose devices fail in every way we could think of.
+
+    python -m tests.benchmarks.bench_faults [--quick] [--seeds 20] [--size 64x48] [--kinds late,torn]
+
+The rig is a package of its own, installed into a temporary folder, around the twin. Every scan is held
+against the clean one of the same scene, plan and seed: its frames, and where one looks different, its result.
+A scan that stopped is resumed with sound devices and judged again, so that wrong frames kept before show.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import shutil
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core import pipeline
+from dsl_core.campaign.common.recipe import Bench, Step
+from dsl_core.campaign.spectralon.emission_readings import load_readings, read_emission
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.registry import open_rig
+from dsl_core.errors import DslError
+from dsl_core.io.scan.folder import ScanReader
+from dsl_core.model.options import Options
+from dsl_core.model.placement import Placement
+from dsl_core.model.plan import CapturePlan, GrayCode, ScanLines, Setting
+from dsl_core.progress import NoProgress
+from dsl_core.simulation.scenes.catalogue import scene_catalogue
+from tests.benchmarks.common import options, print_table, write_json
+from tests.cases.faulty_lab import CAMERA, OTHER, PROJECTOR, SPECTRUM, STAGE, installed
+from tests.cases.pattern_faults import LASTING, SINGLE
+
+#: Pixels that differ from the clean frame by so many deviations, and how many of them make a frame different.
+DIFFERENT_SIGMAS, DIFFERENT_PIXELS = 6.0, 12
+#: A result is wrong if depth is lost or moved, or reflectance differs, by more than this: mm, share, -.
+DEPTH_MM, DEPTH_SHARE, REFLECTANCE = 0.5, 0.01, 0.01
+#: What a sentence of a stopped scan has to say, by kind; other kinds are judged by the pictures.
+REASONS = {
+    "cannot be opened": "No such device",
+    "bit depth changes": "bit_depth from 12 to 8",
+    "exposure rounded by a third": "instead of",
+    "camera hangs": "camera .* has not returned",
+    "projector hangs": "projector .* has not returned",
+    "camera hangs when closed": "close, but has not returned",
+    "camera fails to close": "could not close",
+    "driver raises for good": "Input/output error",
+    "driver ends the program": "SystemExit",
+    "left-aligned": "is the largest",
+    "another size": "of shape",
+    "another type": "uint8",
+    "exposure told": "instead of",
+    "projector raises for good": "context lost",
+    "projector changes its size": "width_px from",
+    "stage sticks": "was sent to",
+    "stage sticks and denies it": "was sent to",
+    "stage overshoots": "was sent to",
+    "stage says NaN": "nan",
+}
+_PICTURES = r"does not show its pattern|delivered the picture of the previous"
+_SPECTRUM = "spectrum|measure"
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is scanned: the twin's options and a plan, kept in a file."""
+
+    scene: str
+    size: str
+    seed: int
+    plan_kind: int
+
+    @property
+    def options(self) -> dict[str, str]:
+        return {"scene": self.scene, "size": self.size, "seed": str(self.seed)}
+
+    def plan(self) -> CapturePlan:
+        bright, dim = Setting(exposure_ms=333.3, level=0.8), Setting(exposure_ms=166.7, level=0.2)
+        settings = (dim, bright) if self.plan_kind == 1 else (Setting(exposure_ms=166.7, level=0.2),)
+        return CapturePlan(
+            code=GrayCode(rows=self.plan_kind == 2),
+            spectral=ScanLines(step_px=5),
+            settings=settings,
+            code_settings=tuple(range(len(settings))),
+        )
+
+
+@dataclass
+class Work:
+    """Where scans of this run are, and what the clean ones gave."""
+
+    folder: Path
+    count: int = 0
+    clean: dict[Case, Path] = field(default_factory=dict)
+
+    def new(self) -> Path:
+        self.count += 1
+        return self.folder / f"{self.count}.dsl"
+
+
+def open_lab(case: Case, kind: str = "", at: int = 0, tear: float = 0.5, plan_file: str = "") -> DeviceRig:
+    """The rig of the package, its pictures of sound patterns remembered from scan to scan."""
+    fault = {"fault": kind, "at": str(at), "tear": f"{tear:.3f}", "plan": plan_file}
+    rig = open_rig("faulty-lab", case.options | fault)
+    _remember_pictures(rig, case)
+    return rig
+
+
+@cache
+def _pictures(case: Case) -> dict[bytes, NDArray[np.float32]]:
+    return {}
+
+
+def _remember_pictures(rig: DeviceRig, case: Case) -> None:
+    camera: Any = rig.camera
+    while not hasattr(camera, "world"):
+        camera = getattr(camera, "_camera", None) or camera.camera
+    world, known = camera.world, _pictures(case)
+    render = world.rate
+
+    def rate() -> NDArray[np.float32]:
+        key = (
+            b""
+            if world.image is None
+            else np.packbits(world.image > 0).tobytes() + world.image.max().tobytes()
+        )
+        if key not in known:
+            known[key] = render()
+        return known[key]
+
+    world.rate = rate
+
+
+def judge_scan(work: Work, case: Case, kind: str, at: int, tear: float) -> tuple[str, str]:
+    """How a scan with a fault ended, and what it said."""
+    clean, folder = work.clean[case], work.new()
+    plan = ScanReader(clean).plan
+    plan_file = work.folder / f"plan{case.plan_kind}.json"
+    plan_file.write_text(plan.model_dump_json())
+    said, corrected = "", 0
+    try:
+        with (
+            open_lab(case, kind, at, tear, str(plan_file)) as rig,
+            pipeline.open_scan(rig, plan, folder) as runner,
+        ):
+            corrected = runner.run().corrected
+    except DslError as error:
+        said = str(error)
+    except Exception as error:
+        return "WRONG", f"not a sentence: {type(error).__name__}: {error}"
+    end = "corrected" if corrected else "right"
+    if said:
+        wanted = REASONS.get(kind, _PICTURES)
+        end = "stopped" if re.search(wanted, said) else "reason?"
+        if kind == "cannot be opened":
+            return end, said
+        try:
+            with open_lab(case) as sound, pipeline.open_scan(sound, plan, folder) as runner:
+                runner.run()
+        except DslError as error:
+            return "not resumed", f"{said} || {error}"
+    wrong = _wrong(clean, folder)
+    shutil.rmtree(folder)
+    return ("WRONG", f"{wrong} {said}") if wrong else (end, said)
+
+
+def _wrong(clean: Path, folder: Path) -> str:
+    """What differs from the clean scan's result; empty if nothing that matters does."""
+    ours, theirs = ScanReader(folder), ScanReader(clean)
+    calibration = theirs.calibration
+    assert calibration is not None
+    different = []
+    for shot in theirs.plan.shots():
+        one, other = (reader.read(shot).astype(np.float64) for reader in (ours, theirs))
+        light = np.maximum(other - calibration.sensor.black_level_dn, 0)
+        sensor = calibration.sensor
+        sigma = np.sqrt(2 * (light / sensor.electrons_per_dn + sensor.read_noise_dn**2))
+        if int((np.abs(one - other) > DIFFERENT_SIGMAS * (sigma + 0.3)).sum()) >= DIFFERENT_PIXELS:
+            different.append(shot.index)
+    if not different:
+        return ""
+    names = f"{len(different)} frames differ, {different[:6]}"
+    try:
+        result, wanted = (pipeline.reconstruct(each, calibration, Options()) for each in (ours, theirs))
+    except DslError as error:
+        return f"{names}; {error}"
+    depth = np.abs(result["depth_mm"].values - wanted["depth_mm"].values)
+    known = np.isfinite(wanted["depth_mm"].values)
+    bad = float((~(depth[known] < DEPTH_MM)).mean())
+    apart = result["reflectance"].values - wanted["reflectance"].values
+    spectra = float(np.sqrt(np.nanmean(apart**2)))
+    if bad > DEPTH_SHARE or spectra > REFLECTANCE:
+        return f"{names}; depth of {bad:.1%} wrong, reflectance off by {spectra:.3f}"
+    return ""
+
+
+def judge_stage(case: Case, kind: str) -> tuple[str, str]:
+    """Whether the stage is where it says after three moves."""
+    with open_lab(case, kind) as rig:
+        assert rig.stage is not None
+        stage = rig.stage
+        inner = stage._stage.stage  # type: ignore[attr-defined]
+        try:
+            for wanted in (620.0, 740.0, 850.0):
+                reached = stage.move_to(wanted)
+                if not abs(reached - inner.position_mm) < stage.tolerance_mm:
+                    return "WRONG", f"says {reached}, is at {inner.position_mm}"
+        except DslError as error:
+            return ("stopped" if re.search(REASONS.get(kind, " "), str(error)) else "reason?"), str(error)
+    return "corrected", ""
+
+
+def judge_spectrum(case: Case, kind: str, folder: Path) -> tuple[str, str]:
+    """Whether readings of the emission that are kept are those of a sound instrument."""
+    with open_lab(case, kind) as rig:
+        assert rig.calibration is not None
+        bench = Bench(rig, folder, rig.calibration)
+        step = Step("light", "Light", "Nothing.", Placement(target="spectralon"))
+        bench.step_folder(step).mkdir(parents=True)
+        try:
+            read_emission(bench, step, 1, None, NoProgress())
+        except DslError as error:
+            return ("stopped" if re.search(_SPECTRUM, str(error)) else "reason?"), str(error)
+        readings = load_readings(bench, step).readings
+    peaks = [max(readings[colour][0].values) for colour in ("red", "green", "blue", "white")]
+    return ("corrected", "") if min(peaks) > 0 and len(set(peaks)) == 4 else ("WRONG", f"peaks {peaks}")
+
+
+def run(chosen_kinds: Sequence[str], cases: Sequence[Case], work: Work) -> dict[str, Counter[str]]:
+    """All kinds over all cases."""
+    table: dict[str, Counter[str]] = defaultdict(Counter)
+    for case in cases:
+        for number, kind in enumerate(chosen_kinds):
+            rng = np.random.default_rng((case.seed, number))
+            count = ScanReader(work.clean[case]).plan.shot_count
+            at = 2 if kind in ("counter wraps",) else int(rng.integers(2, count - 2))
+            if kind in STAGE:
+                end, said = judge_stage(case, kind)
+            elif kind in SPECTRUM:
+                end, said = judge_spectrum(case, kind, work.new())
+            else:
+                end, said = judge_scan(work, case, kind, at, float(rng.uniform(0.1, 0.9)))
+            table[kind][end] += 1
+            if end in ("WRONG", "reason?", "not resumed"):
+                print(f"  {case} {kind} at {at} of {count}: {end}: {said[:420]}", flush=True)
+    return table
+
+
+def scan_clean(cases: Sequence[Case], work: Work) -> int:
+    """Scan every case without a fault; how many of them raised an alarm."""
+    alarms = 0
+    for case in cases:
+        folder = work.new()
+        with open_lab(case) as rig:
+            plan = pipeline.fit_plan(case.plan(), rig)
+            try:
+                with pipeline.open_scan(rig, plan, folder) as runner:
+                    corrected = runner.run().corrected
+            except DslError as error:
+                corrected = -1
+                print(f"  false alarm: {case}: {error}", flush=True)
+                alarms += 1
+        if corrected > 0:
+            alarms += 1
+            print(f"  false alarm: {case}: {corrected} taken again", flush=True)
+        work.clean[case] = folder
+    return alarms
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the tables."""
+    parser = options(__doc__)
+    parser.add_argument("--size", default="64x48")
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument("--kinds", default="")
+    parser.add_argument("--clean", type=int, default=0, help="further clean scans, to count false alarms")
+    chosen = parser.parse_args(arguments)
+    logging.disable(logging.CRITICAL)
+    every = (*SINGLE, *LASTING, *CAMERA, *PROJECTOR, *OTHER, *STAGE, *SPECTRUM)
+    kinds = chosen.kinds.split(",") if chosen.kinds else every[::7] if chosen.quick else every
+    scenes = [entry.name for entry in scene_catalogue()]
+    with tempfile.TemporaryDirectory() as spare:
+        sys.path.insert(0, str(installed(Path(spare) / "site")))
+        work = Work(Path(spare))
+        cases = [
+            Case(scenes[seed % len(scenes)], chosen.size, seed, seed % 3)
+            for seed in range(chosen.first, chosen.first + chosen.seeds)
+        ]
+        alarms = scan_clean(cases, work)
+        print(f"{len(cases)} clean scans: {alarms} false alarms", flush=True)
+        table: dict[str, Counter[str]] = defaultdict(Counter)
+        for case in cases:
+            for kind, ends in run(kinds, [case], work).items():
+                table[kind] += ends
+            _pictures.cache_clear()
+        columns = ("right", "corrected", "stopped", "reason?", "not resumed", "WRONG")
+        rows = [(kind, *(row[end] for end in columns)) for kind, row in table.items()]
+        print_table(("fault", *columns), rows)
+        total = sum(table.values(), Counter())
+        print_table(("all", *columns), [(f"{total.total()} scans", *(total[end] for end in columns))])
+        if chosen.clean:
+            more = [
+                Case(scenes[seed % len(scenes)], size, 5000 + seed, seed % 3)
+                for seed in range(chosen.clean)
+                for size in (("64x48", "112x72")[seed % 2],)
+            ]
+            print(f"{len(more)} more clean scans: {scan_clean(more, work)} false alarms")
+        write_json(chosen.json, {"faults": {kind: dict(row) for kind, row in table.items()}, "clean": alarms})
+
+
+if __name__ == "__main__":
+    main()
