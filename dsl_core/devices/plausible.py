@@ -59,7 +59,7 @@ def require_frame(frame: object, camera: CameraInfo, exposure_ms: float | None) 
 
 
 def _require_whole(pixels: NDArray[np.uint16], name: str) -> None:
-    """Raise `DeviceError` for rows without any count, where all others have a black level: a torn transfer."""
+    """Raise `DeviceError` for rows without any count where all others have a black level: a cut transfer."""
     empty = pixels.max(axis=1) == 0
     if empty.any() and not empty.all() and pixels[~empty].min() > 0:
         raise DeviceError(
