@@ -28,6 +28,7 @@ _BUILT_IN = {
     "camera.gentl": "gentl",
     "camera.uvc": "uvc",
     "projector.none": "no_projector",
+    "projector.screen": "screen",
     "spectroradiometer.jeti": "jeti_specbos",
     "stage.thorlabs-lts": "thorlabs_lts",
 }

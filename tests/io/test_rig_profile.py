@@ -6,11 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from dsl_core.devices.driver_table import driver_names, read_settings
 from dsl_core.devices.profile import DevicePart, RigProfile
 from dsl_core.devices.registry import is_built_in, list_rigs, open_rig, rig_names
 from dsl_core.errors import CalibrationError, DeviceError
 from dsl_core.io.rig_profile import load_profile, profile_path, profiles_folder, save_profile
 from dsl_core.io.scan.origin import rig_notes, rig_of_notes
+from dsl_core.resources import resource_path
 
 NOWHERE = DevicePart(driver="none", settings={"size_px": [64, 48]})
 
@@ -66,3 +68,14 @@ def test_a_scan_remembers_its_profile_from_any_folder(home: Path, monkeypatch: p
     monkeypatch.chdir(home)
     assert rig_of_notes(rig_notes("lab.json", {})) == (str(home / "lab.json"), {})
     assert rig_of_notes(rig_notes("lab", {})) == ("lab", {})
+
+
+def test_the_example_of_the_help_is_valid_for_its_drivers() -> None:
+    text = resource_path("help/connecting-devices.md").read_text(encoding="utf-8")
+    example = RigProfile.model_validate_json(text.split("```json")[1].split("```")[0])
+    assert set(example.parts()) == {"camera", "projector", "stage"}
+    for kind, part in example.parts().items():
+        assert read_settings(kind, part.driver, part.settings)
+    for kind in ("camera", "projector"):
+        for name in driver_names(kind):
+            assert f"| `{name}` |" in text

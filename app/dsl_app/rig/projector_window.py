@@ -98,10 +98,13 @@ class ProjectorWindow(QWidget):
         application.screenRemoved.connect(self._screen_removed)
         application.screenAdded.connect(self._screen_added)
 
-    def arm(self, screen: QScreen) -> None:
-        """Cover a screen in black; raises `DeviceError` for a mirrored screen or the only one."""
+    def arm(self, screen: QScreen, alone: bool = False) -> None:
+        """Cover a screen in black; raises `DeviceError` for a mirrored screen, or the only one.
+
+        With ``alone``, the only screen may be covered: nobody works at this computer.
+        """
         others = QGuiApplication.screens()
-        if len(others) < 2:
+        if len(others) < 2 and not alone:
             raise DeviceError(
                 "There is only one screen. Connect the projector and extend the desktop onto it;"
                 " do not mirror it."

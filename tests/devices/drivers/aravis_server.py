@@ -60,7 +60,14 @@ class AravisServer:
             self._library.g_object_unref(server)
 
 
+def shown_in(path: str, width: int, height: int) -> Paint:
+    """Pictures that are whatever a file of raw pixels holds at the time."""
+    picture = np.memmap(path, np.uint16, "r", shape=(height, width))
+    return lambda down, across: picture
+
+
 if __name__ == "__main__":
-    kept = AravisServer(sys.argv[1])
+    serial, *source = sys.argv[1:]
+    kept = AravisServer(serial, shown_in(source[0], int(source[1]), int(source[2])) if source else None)
     print("ready", flush=True)
     sys.stdin.read()
