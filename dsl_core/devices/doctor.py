@@ -24,6 +24,8 @@ T = TypeVar("T")
 OPEN_S, ANSWER_S, MEASURE_S = 60.0, 40.0, 600.0
 _TRIAL_MS = 20.0
 _TRIAL_FRAMES = 3
+#: With as many values, bits that none of them uses are not there.
+_FEWEST_VALUES = 24
 #: White has to be brighter than black by this share of full scale to count as seen.
 _SEEN = 0.02
 
@@ -160,7 +162,7 @@ def _try_camera(camera: Camera, notes: _Notes) -> None:
     if frames is None:
         return
     unused = _unused_bits(frames[-1].pixels)
-    if info.bit_depth == 16 and 0 < unused <= 8:
+    if info.bit_depth == 16 and unused:
         notes.add(
             Grade.WARNING,
             f"The lowest {unused} of 16 bits are always 0: its pixels are {16 - unused} bits moved up. Set"
@@ -186,9 +188,11 @@ def _frames(camera: Camera) -> list[Frame]:
 
 
 def _unused_bits(pixels: NDArray[np.uint16]) -> int:
-    """How many of the lowest bits no pixel uses; 0 for a picture that is black throughout."""
+    """How many of the lowest bits no pixel uses; 0 where too few different values would be a chance."""
+    if len(np.unique(pixels)) < _FEWEST_VALUES:
+        return 0
     used = int(np.bitwise_or.reduce(pixels, axis=None))
-    return (used & -used).bit_length() - 1 if used else 0
+    return (used & -used).bit_length() - 1
 
 
 def _warmth(camera: Camera, notes: _Notes) -> str:

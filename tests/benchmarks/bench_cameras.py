@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
-from dsl_core.devices.drivers import aravis, basler
+from dsl_core.devices.drivers import aravis, aravis_library, basler
 from dsl_core.devices.drivers.genicam.camera import GenicamCamera
 from dsl_core.devices.drivers.genicam.settings import GenicamSettings
 from dsl_core.devices.registry import open_rig
@@ -102,9 +102,10 @@ def work(library: str, size: str, quick: bool, folder: Path, file: Path) -> None
     if library == "aravis":
         picture = np.memmap(file, np.uint16, "r+", shape=(height, width))
 
-        def feed(pixels: NDArray[np.uint16]) -> None:
+        def fill(pixels: NDArray[np.uint16]) -> None:
             picture[:] = pixels << _SHIFT
 
+        feed: Callable[[NDArray[np.uint16]], None] = fill
         camera = aravis.open_camera(chosen.model_copy(update={"id": SERIAL}))
     else:
         camera, feed = emulated(chosen, file)
@@ -253,7 +254,7 @@ def through(library: str, arguments: argparse.Namespace, home: Path, known: Path
 def installed() -> list[str]:
     """Libraries to measure; says which are missing, and what brings them."""
     found = []
-    for name, load in (("aravis", aravis.aravis), ("pylon", basler.pylon)):
+    for name, load in (("aravis", aravis_library.aravis), ("pylon", basler.pylon)):
         try:
             load()
             found.append(name)
