@@ -29,6 +29,8 @@ GRID = WavelengthGrid(start_nm=430.0, stop_nm=675.0, step_nm=5.0)
 #: First orders may be displaced by this much for the slopes of the prediction, projector px.
 _SLOPE_PX = 0.5
 _MIN_SIGNALS = 200
+#: Deviations from which a signal pulls no harder.
+_HUBER = 1.345
 _EVERY = (0, *ORDERS, *SECOND_ORDERS)
 
 
@@ -145,15 +147,16 @@ def _shift(data: Floats, model: Floats, slope: Floats, std: Floats) -> tuple[flo
     """Displacement (px) and gain by least squares, Huber weights, with standard deviations."""
     design = np.stack([slope, model], 1)
     # An error of the model in proportion to the signal keeps bright pixels from deciding alone.
-    weight = 1 / (std**2 + (0.03 * model) ** 2)
+    known = weight = 1 / (std**2 + (0.03 * model) ** 2)
     for _ in range(5):
         normal = design.T @ (weight[:, None] * design)
         answer = np.linalg.solve(normal, design.T @ (weight * data))
         off = data - design @ answer
-        spread = 1.4826 * np.median(np.abs(off) * np.sqrt(weight))
-        sigmas = np.abs(off) * np.sqrt(weight) / max(spread, 1e-12)
-        weight = weight * np.minimum(1, 1.345 / np.maximum(sigmas, 1.345))
-    inverse = np.linalg.inv(design.T @ (weight[:, None] * design))
+        spread = 1.4826 * np.median(np.abs(off) * np.sqrt(known))
+        sigmas = np.abs(off) * np.sqrt(known) / max(spread, 1e-12)
+        weight = known * np.minimum(1, _HUBER / np.maximum(sigmas, _HUBER))
+    # A little more light changes the pull of a signal within the limit only (Huber 1981, section 7.6).
+    inverse = np.linalg.inv(design.T @ ((known * (sigmas < _HUBER))[:, None] * design))
     bread = design * (weight * off)[:, None]
     covariance = inverse @ (bread.T @ bread) @ inverse
     gain = float(answer[1])

@@ -72,3 +72,49 @@ def test_too_few_pixels_and_a_line_of_pixels_are_refused(rig: Rig) -> None:
     usable[30:32, :] = True
     with pytest.raises(CalibrationError, match="form a line"):
         fit_plane(rig, PLANE.depth_mm(rig), usable)
+
+
+@pytest.mark.parametrize(("pixels", "enough"), [(200, True), (199, False)])
+def test_two_hundred_pixels_are_enough(rig: Rig, pixels: int, enough: bool) -> None:
+    usable = np.zeros((72, 112), bool)
+    usable[20:40:2, 10:110:5] = True
+    usable[np.unravel_index(np.flatnonzero(usable)[pixels:], usable.shape)] = False
+    depth = PLANE.depth_mm(rig)
+    if enough:
+        assert fit_plane(rig, depth, usable).plane.distance_mm == pytest.approx(700.0)
+    else:
+        with pytest.raises(CalibrationError, match="Only 199 pixels"):
+            fit_plane(rig, depth, usable)
+
+
+@pytest.mark.parametrize(
+    ("share", "on_plane"), [(0.011, True), (0.013, False), (-0.011, True), (-0.013, False)]
+)
+def test_without_noise_a_pixel_is_on_the_plane_within_a_little_more_than_a_percent(
+    rig: Rig, share: float, on_plane: bool
+) -> None:
+    depth = PLANE.depth_mm(rig)
+    depth[40, 50] /= 1 + share
+    depth[40, 50] = PLANE.depth_mm(rig)[40, 50] * (1 + share)
+    assert fit_plane(rig, depth, np.ones((72, 112), bool)).on_plane[40, 50] == on_plane
+
+
+@pytest.mark.parametrize(("sigmas", "on_plane"), [(3.7, True), (4.3, False)])
+def test_with_noise_it_is_within_four_deviations(rig: Rig, sigmas: float, on_plane: bool) -> None:
+    noise = 0.01 * np.random.default_rng(0).standard_normal((72, 112))
+    noise[40, 50] = 0.01 * sigmas
+    depth = PLANE.depth_mm(rig) * (1 + noise)
+    assert fit_plane(rig, depth, np.ones((72, 112), bool)).on_plane[40, 50] == on_plane
+
+
+@pytest.mark.parametrize(("rows", "is_wide"), [(1, False), (3, True)])
+def test_pixels_have_to_spread_by_a_fiftieth_of_their_extent(rig: Rig, rows: int, is_wide: bool) -> None:
+    """Of rows one apart over 112 columns, two spread by 0.015, three by 0.025 of it."""
+    usable = np.zeros((72, 112), bool)
+    usable[30 : 30 + rows + 1] = True
+    usable[30, ::2] = True
+    if is_wide:
+        assert fit_plane(rig, PLANE.depth_mm(rig), usable).plane.tilt_deg == pytest.approx(PLANE.tilt_deg)
+    else:
+        with pytest.raises(CalibrationError, match="form a line"):
+            fit_plane(rig, PLANE.depth_mm(rig), usable)

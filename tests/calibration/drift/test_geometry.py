@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import torch
 
 from dsl_core.calibration.common.plane import TargetPlane
+from dsl_core.calibration.common.tiles import tile_of_pixels
 from dsl_core.calibration.drift.geometry import LIMIT_PX, geometry_drift, smooth_part
+from dsl_core.errors import CalibrationError
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.shading import Plane
 from dsl_core.simulation.published_rig import published_rig
@@ -52,3 +56,52 @@ def test_each_direction_has_a_figure(off: tuple[float, float], name: str) -> Non
     assert by_name.pop(name).value == pytest.approx(0.4, abs=1e-6)
     assert all(figure.passed and figure.value < 1e-6 for figure in by_name.values())
     assert all(figure.high == LIMIT_PX and figure.advice for figure in figures)
+
+
+def tiled(values: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of all pixels of a picture of 160 by 120, and where they are known."""
+    rows, columns = np.mgrid[:120, :160]
+    known = np.ones((120, 160), bool)
+    return values(2 * columns / 160 - 1, 2 * rows / 120 - 1)[known], known
+
+
+def test_what_varies_as_a_quadratic_is_drift_and_its_noise_is_taken_out() -> None:
+    def smooth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return 0.3 - 0.2 * x + 0.4 * y + 0.5 * x * x - 0.6 * x * y + 0.1 * y * y
+
+    residual, known = tiled(smooth)
+    rms, std = smooth_part(residual, known)
+    assert rms == pytest.approx(np.sqrt(np.mean(residual**2)), rel=0.05)
+    assert std < 0.02
+
+
+def test_noise_alone_is_no_drift_and_its_deviation_is_that_of_six_terms() -> None:
+    tiles = tile_of_pixels((160, 120)).ravel()
+    count = np.bincount(tiles)
+    known = np.ones((120, 160), bool)
+    squares, stated = [], []
+    for seed in range(60):
+        noise = np.random.default_rng(seed).standard_normal(len(count))
+        rms, std = smooth_part(noise[tiles], known)
+        squares.append(rms**2)
+        stated.append(std**2)
+    # One deviation a tile: six of so many terms are left in the smooth part.
+    assert np.mean(stated) == pytest.approx(6 / len(count), rel=0.15)
+    assert np.mean(squares) < np.mean(stated)
+
+
+def test_a_tile_counts_from_half_of_its_pixels_on_and_eighteen_are_needed() -> None:
+    tiles = tile_of_pixels((160, 120))
+    number = np.unique(tiles)
+    known = np.isin(tiles, number[:18])
+    assert smooth_part(np.zeros(int(known.sum())), known) == (0.0, 0.0)
+    few = np.isin(tiles, number[:17])
+    with pytest.raises(CalibrationError, match="only 17 tiles"):
+        smooth_part(np.zeros(int(few.sum())), few)
+    place = np.argwhere(tiles == number[17])
+    half = known.copy()
+    half[tuple(place[: len(place) // 2 - 1].T)] = False
+    assert smooth_part(np.zeros(int(half.sum())), half) == (0.0, 0.0)
+    half[tuple(place[: len(place) // 2 + 2].T)] = False
+    with pytest.raises(CalibrationError, match="only 17 tiles"):
+        smooth_part(np.zeros(int(half.sum())), half)

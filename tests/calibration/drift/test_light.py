@@ -10,7 +10,7 @@ import pytest
 import torch
 from scipy.ndimage import gaussian_filter1d
 
-from dsl_core.calibration.drift.light import PlaneSignals, film_drift, light_drift
+from dsl_core.calibration.drift.light import PlaneSignals, _film_figures, _shift, film_drift, light_drift
 from dsl_core.errors import CalibrationError
 from dsl_core.model.figure import Figure
 from dsl_core.optics.correspondence import GratingModel, zero_order
@@ -147,3 +147,49 @@ def test_saturated_pixels_do_not_count_and_too_few_are_told() -> None:
         light_drift(RIG, replace(seen, std=np.full(seen.std.shape, np.inf)), REFLECTANCE)
     with pytest.raises(CalibrationError, match="light only 0 of the chosen pixels directly"):
         film_drift(RIG, replace(signals(), std=np.full((16, 3000), np.inf)), REFLECTANCE)
+
+
+def shifted(shift_px: float, gain: float, noise: float, seed: int) -> tuple[np.ndarray, ...]:
+    """Signals of a peak that is displaced and brighter, their model, its slope and their deviations."""
+    x = np.linspace(-4, 4, 400)
+    model, slope = 5 * np.exp(-(x**2) / 2), 5 * x * np.exp(-(x**2) / 2)
+    data = gain * (model + shift_px * slope) + noise * np.random.default_rng(seed).standard_normal(400)
+    return data, model, slope, np.full(400, noise)
+
+
+def test_displacement_and_gain_are_told_apart() -> None:
+    data, model, slope, std = shifted(0.2, 1.5, 1e-9, 0)
+    shift, gain, *_ = _shift(data, model, slope, std + 1e-3)
+    assert shift == pytest.approx(0.2)
+    assert gain == pytest.approx(1.5)
+    # A few signals that are far off count for little.
+    data[::40] += 5.0
+    shift, gain, *_ = _shift(data, model, slope, np.full(400, 0.05))
+    assert shift == pytest.approx(0.2, abs=0.02)
+    assert gain == pytest.approx(1.5, abs=0.03)
+
+
+def test_displacement_and_gain_scatter_by_what_is_stated() -> None:
+    found = np.array([_shift(*shifted(0.1, 1.5, 0.3, seed)) for seed in range(150)])
+    assert found[:, 0].mean() == pytest.approx(0.1, abs=3 * found[:, 0].std() / 150**0.5)
+    assert found[:, 1].mean() == pytest.approx(1.5, abs=3 * found[:, 1].std() / 150**0.5)
+    assert found[:, 0].std() == pytest.approx(found[:, 2].mean(), rel=0.2)
+    assert found[:, 1].std() == pytest.approx(found[:, 3].mean(), rel=0.2)
+
+
+def test_bright_signals_do_not_decide_alone() -> None:
+    """An error of the model of three percent is granted: without it the noise alone would weigh."""
+    data, model, slope, std = shifted(0.0, 1.0, 1e-6, 0)
+    data = data * (1 + 0.1 * (model > 4))
+    _, gain, *_ = _shift(data, model, slope, std)
+    weight = np.where(model > 1e-4, 1.0, 0.0)
+    even = (weight * data / np.where(model > 0, model, 1)).sum() / weight.sum()
+    assert abs(gain - even) < 0.02
+
+
+def test_figures_have_limits_on_both_sides() -> None:
+    shift, gain = _film_figures(-1, 0.05, 0.01, 0.98, 0.02)
+    assert (shift.low, shift.high, shift.unit) == (-0.2, 0.2, "px")
+    assert (gain.low, gain.high) == (0.95, 1.05)
+    assert (shift.value, shift.std, gain.value, gain.std) == (0.05, 0.01, 0.98, 0.02)
+    assert "order -1" in shift.name

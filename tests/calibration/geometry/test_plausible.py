@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
-from dsl_core.calibration.geometry.plausible import implausible
+from dsl_core.calibration.geometry.plausible import _corner_share, _of_lens, implausible
 from dsl_core.calibration.geometry.pose_series import doubts
 from dsl_core.calibration.geometry.solve import calibrate_geometry
 from dsl_core.model.calibration.geometry import GeometryCalibration
+from dsl_core.model.geometry import Lens
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.random_rig import random_rig
 from tests.cases import board_poses as case
@@ -51,3 +52,53 @@ def test_devices_that_are_a_wall_apart_are_a_doubt(found: GeometryCalibration) -
     pose = found.pose.model_copy(update={"translation_mm": (9000.0, 0.0, 0.0)})
     (sentence,) = implausible(found.model_copy(update={"pose": pose}))
     assert "9000 mm apart; 5 to 5000 mm are plausible" in sentence
+
+
+def plain_lens(**changes: Any) -> Lens:
+    given = {
+        "width_px": 1000,
+        "height_px": 500,
+        "fx_px": 1000.0,
+        "fy_px": 1000.0,
+        "cx_px": 500.0,
+        "cy_px": 250.0,
+    }
+    return Lens(**{**given, **changes})
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside"),
+    [
+        ({"fx_px": 301.0}, {"fx_px": 299.0}),
+        ({"fx_px": 9990.0}, {"fx_px": 10010.0}),
+        ({"cx_px": -499.0}, {"cx_px": -501.0}),
+        ({"cx_px": 1499.0}, {"cx_px": 1501.0}),
+        ({"cy_px": -249.0}, {"cy_px": -251.0}),
+        ({"cy_px": 749.0}, {"cy_px": 751.0}),
+    ],
+)
+def test_both_sides_of_what_a_lens_can_be(inside: dict[str, Any], outside: dict[str, Any]) -> None:
+    assert _of_lens("camera", plain_lens(**inside)) == []
+    (sentence,) = _of_lens("camera", plain_lens(**outside))
+    assert "camera" in sentence
+
+
+def test_distortion_counts_at_the_farthest_corner_of_both_devices() -> None:
+    off = plain_lens(cx_px=400.0, cy_px=200.0, distortion=(0.5, -0.3, 9.0, 9.0, 0.2))
+    square = (0.599**2) + (0.299**2)
+    assert _corner_share(off) == pytest.approx(abs(0.5 * square - 0.3 * square**2 + 0.2 * square**3))
+    far = 0.5**2 + 0.25**2
+    for share, told in ((0.49, False), (0.51, True), (-0.51, True)):
+        lens = plain_lens(cx_px=499.5, cy_px=249.5, distortion=(share / (0.4995**2 + 0.2495**2), 0, 0, 0, 0))
+        assert bool(_of_lens("projector", lens)) == told
+    assert far > 0.3
+
+
+@pytest.mark.parametrize(
+    ("distance_mm", "told"), [(4.9, True), (5.1, False), (4990.0, False), (5010.0, True)]
+)
+def test_both_sides_of_how_far_devices_can_be_apart(
+    found: GeometryCalibration, distance_mm: float, told: bool
+) -> None:
+    pose = found.pose.model_copy(update={"translation_mm": (0.6 * distance_mm, 0.0, 0.8 * distance_mm)})
+    assert bool(implausible(found.model_copy(update={"pose": pose}))) == told

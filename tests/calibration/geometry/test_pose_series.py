@@ -9,14 +9,19 @@ import pytest
 
 from dsl_core.calibration.geometry.bundle import rotation_of
 from dsl_core.calibration.geometry.pose_series import (
+    _bent,
+    _blurred,
+    _check_axes,
     board_normal,
     check_poses,
     coverage,
     doubts,
+    exposure_warning,
     largest_angle_deg,
     largest_tilt_deg,
     picture_gamma,
 )
+from dsl_core.calibration.geometry.projector_corners import PoseObservation
 from dsl_core.calibration.geometry.solve import calibrate_geometry
 from dsl_core.errors import CalibrationError
 from dsl_core.model.board import corner_positions_mm
@@ -135,3 +140,104 @@ def test_poses_five_degrees_apart_are_enough(tilt_deg: float, enough: bool) -> N
     else:
         with pytest.raises(CalibrationError, match="nearly parallel"):
             check_poses(poses, case.CAMERA_PX)
+
+
+def pose_of(name: str, blur_px: float) -> PoseObservation:
+    none = np.zeros((1, 2))
+    return PoseObservation(name, np.zeros(1, np.int64), np.zeros((1, 3)), none, none, blur_px=blur_px)
+
+
+@pytest.mark.parametrize(
+    ("usual_px", "blur_px", "told"),
+    [(1.0, 2.1, True), (1.0, 1.9, False), (0.3, 0.85, True), (0.3, 0.75, False)],
+)
+def test_a_pose_is_blurred_twice_as_much_as_others_and_visibly(
+    usual_px: float, blur_px: float, told: bool
+) -> None:
+    series = [pose_of(str(k), usual_px) for k in range(4)] + [pose_of("odd", blur_px)]
+    sentences = _blurred(series)
+    assert [sentence.startswith("odd is blurred") for sentence in sentences] == [True] * told
+    assert _blurred([]) == []
+
+
+@pytest.mark.parametrize(("gamma", "told"), [(1.14, False), (1.16, True), (0.86, False), (0.84, True)])
+def test_pictures_are_bent_from_a_gamma_off_by_fifteen_percent(gamma: float, told: bool) -> None:
+    sentences = _bent(np.array([np.nan, gamma, gamma + 0.5, gamma - 0.5]))
+    assert bool(sentences) == told
+    assert not told or f"{gamma:.2f}" in sentences[0]
+    assert _bent(np.array([np.nan])) == []
+
+
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [
+        ([[-1.0, 0.0], [0.0, 1.0]], "mirrored left to right"),
+        ([[1.0, 0.0], [0.0, -1.0]], "mirrored top to bottom"),
+        ([[0.0, 1.0], [1.0, 0.0]], "axes are swapped"),
+        ([[1.0, 0.0], [0.0, 1.0]], ""),
+        ([[-1.0, 0.0], [0.0, -1.0]], ""),
+    ],
+)
+def test_a_mirror_image_is_told_by_its_axis(axes: list[list[float]], words: str) -> None:
+    camera = np.array([[0.0, 0.0], [100.0, 5.0], [0.0, 80.0], [90.0, 90.0]])
+    projector = 0.7 * camera @ np.array(axes).T + [20.0, -3.0]
+    good = PoseObservation("good", np.arange(4), np.zeros((4, 3)), camera, camera)
+    odd = PoseObservation("odd", np.arange(4), np.zeros((4, 3)), camera, projector)
+    if words:
+        with pytest.raises(CalibrationError, match=f"In odd the images.*{words}"):
+            _check_axes([good, odd])
+    else:
+        _check_axes([good, odd])
+
+
+@pytest.mark.parametrize(("saturated", "told"), [(4, False), (5, True)])
+def test_a_board_is_over_exposed_from_a_percent_of_its_pixels_on(
+    monkeypatch: pytest.MonkeyPatch, saturated: int, told: bool
+) -> None:
+    # Corners from (10, 5) to (29, 24): 20 by 20 pixels, of which four are a percent.
+    picture = np.ones((60, 60), bool)
+    picture[5:25, 10:30] = False
+    picture[5, 10 : 10 + saturated] = True
+    monkeypatch.setattr("dsl_core.calibration.geometry.pose_series.saturated", lambda _: picture)
+    corners = np.array([[10.4, 5.7], [29.2, 24.9], [12.0, 20.0]])
+    pose = replace(pose_of("pose", 1.0), camera_px=corners)
+    sentence = exposure_warning(replace(case.board_frames(), name="pose"), pose)
+    assert (sentence is not None) == told
+    assert sentence is None or "pose is over-exposed: 1%" in sentence
+
+
+def test_fewer_than_three_poses_and_corners_that_are_not_finite_are_refused() -> None:
+    poses = list(case.poses_seen())
+    with pytest.raises(CalibrationError, match="2 usable poses"):
+        check_poses(poses[:2], case.CAMERA_PX)
+    bad = replace(poses[1], projector_px=np.full_like(poses[1].projector_px, np.nan))
+    with pytest.raises(CalibrationError, match=f"{bad.name} has corners that are not finite"):
+        check_poses([poses[0], bad, *poses[2:]], case.CAMERA_PX)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"camera_coverage": 0.31}, {"camera_coverage": 0.29}),
+        ({"projector_coverage": 0.31}, {"projector_coverage": 0.29}),
+    ],
+)
+def test_both_sides_of_how_much_of_a_picture_corners_cover(
+    found: GeometryCalibration, changes: dict[str, float], words: dict[str, float]
+) -> None:
+    good = found.model_copy(update={"camera_coverage": 0.6, "projector_coverage": 0.6})
+    assert not any("cover" in each for each in doubts(good.model_copy(update=changes), 40.0, None))
+    assert any("cover 29%" in each for each in doubts(good.model_copy(update=words), 40.0, None))
+
+
+def test_both_sides_of_the_tilt_of_the_focal_length_and_of_the_error(found: GeometryCalibration) -> None:
+    def told(words: str, tilt_deg: float = 40.0, **changes: object) -> bool:
+        return any(words in each for each in doubts(found.model_copy(update=changes), tilt_deg, None))
+
+    assert told("tilted by", 19.0)
+    assert not told("tilted by", 21.0)
+    assert told("reprojection error", rms_px=0.51)
+    assert not told("reprojection error", rms_px=0.49)
+    for share, expected in ((0.011, True), (0.009, False)):
+        unsure = found.camera_deviation.model_copy(update={"fx_px": share * found.camera.fx_px})
+        assert told("focal length of the camera is known only", camera_deviation=unsure) == expected

@@ -9,9 +9,12 @@ import pytest
 
 from dsl_core.calibration.selftest.camera import (
     Dark,
+    ExposureLine,
     Transfer,
+    _saturation,
     check_camera,
     count_hot_pixels,
+    exposure_line,
     fit_dark,
     fit_transfer,
 )
@@ -120,3 +123,59 @@ def test_noise_that_does_not_grow_with_light_is_refused() -> None:
     readings = replace(pairs(10.0, 2.0), pair_variance_dn2=np.full((12, 3), 4.0))
     with pytest.raises(CalibrationError, match="not raw photon counts"):
         fit_transfer(readings, BLACK_DN, SIZES)
+
+
+@pytest.mark.parametrize(
+    ("excess_dn", "noise_dn", "hot"), [(5, 0.5, 0), (6, 0.5, 1), (12, 2.0, 0), (13, 2.0, 1)]
+)
+def test_a_hot_pixel_stands_out_by_six_deviations_and_five_counts(
+    excess_dn: int, noise_dn: float, hot: int
+) -> None:
+    frame = np.full((20, 20), 260, np.uint16)
+    # A neighbour of the same colour glows by a count.
+    frame[6, 10] = 261
+    frame[8, 10] = 261 + excess_dn
+    assert count_hot_pixels(frame, frame, noise_dn) == hot
+    assert count_hot_pixels(frame, np.full((20, 20), 260, np.uint16), noise_dn) == 0
+    # Pixels of another colour do not count as neighbours.
+    frame[8, 11] = 4000
+    assert count_hot_pixels(frame, frame, noise_dn) == hot + 1
+
+
+@pytest.mark.parametrize(("exposures", "enough"), [(5, True), (4, False)])
+def test_a_line_needs_five_exposures(exposures: int, enough: bool) -> None:
+    exposure = np.repeat(np.arange(1.0, exposures + 1), 2)
+    series = table(exposure, BLACK_DN + 100 * exposure[:, None] * np.ones(3))
+    level = Dark(Measured(value=BLACK_DN, std=0.1), *[np.zeros(3)] * 4)
+    transfer = Transfer(Measured(value=10.0, std=0.1), Measured(value=2.0, std=0.1))
+    if not enough:
+        with pytest.raises(CalibrationError, match="green channel clips at all but 4"):
+            exposure_line(series, 1, level, transfer, SIZES)
+        return
+    line = exposure_line(series, 1, level, transfer, SIZES)
+    assert line.intercept.value == pytest.approx(BLACK_DN)
+    # Shot, read and rounding noise over the region, and light that is steady to one part in ten thousand.
+    shot = np.sqrt((4 + 1 / 12 + 100 * exposure / 10) / SIZES.pixels[1])
+    assert line.std_dn == pytest.approx(np.hypot(shot, 0.01 * exposure))
+
+
+def test_the_largest_distance_from_a_line_is_stated_in_percent_of_full_scale() -> None:
+    line = ExposureLine(
+        np.arange(3.0),
+        np.zeros(3),
+        np.array([1.0, -4.0, 2.0]),
+        np.array([0.1, 0.2, 0.3]),
+        Measured(value=0, std=1),
+    )
+    found = line.largest_percent(1000.0)
+    assert (found.value, found.std) == (pytest.approx(0.4), pytest.approx(0.02))
+
+
+def test_the_scale_ends_where_regions_clip_or_beyond_the_largest_signal() -> None:
+    readings = table(np.arange(2.0), np.array([[4090.0, 4000.0, 3000.0], [4094.0, 4095.0, 2000.0]]))
+    readings.clipped[:] = [[0.99, 0.97, 0.0], [1.0, 1.0, 0.0]]
+    found = _saturation(readings, SIZES)
+    assert found.value == pytest.approx((4090 + 4094 + 4095) / 3)
+    assert found.std == pytest.approx(np.std([4090, 4094, 4095]))
+    readings.clipped[:] = 0.0
+    assert _saturation(readings, SIZES).value == 4095.0

@@ -6,13 +6,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
+from dsl_core.calibration.selftest.camera import Transfer
 from dsl_core.calibration.selftest.cycle import (
+    _cost_of,
+    _design,
+    _parameters,
+    _residual,
+    _spreads,
+    _step,
     advised_exposures,
+    check_beats,
     find_cycle,
     find_cycle_by_spread,
     has_trusted_times,
 )
+from dsl_core.calibration.selftest.readings import RegionSizes
+from dsl_core.model.calibration.selftest import Measured
 from tests.cases.cycle_readings import BLACK_DN, MIX, led_time_ms, short_exposures, table
 
 
@@ -97,3 +108,78 @@ def test_time_stamps_are_trusted_only_where_they_follow_the_waits() -> None:
 
 def test_advised_exposures_hold_whole_cycles() -> None:
     assert advised_exposures(20.0, (160.0, 329.0, 1.0)) == (160.0, 320.0, 20.0)
+
+
+def test_harmonics_of_a_frequency_leave_what_least_squares_leave() -> None:
+    rng = np.random.default_rng(2)
+    time_s, signal = np.sort(rng.random(40)), rng.standard_normal((40, 3))
+    trial = np.array([21.0, 55.5])
+    for hz, found in zip(trial, _residual(time_s, signal, trial, 3), strict=True):
+        phase = 2 * np.pi * hz * time_s[:, None] * [1, 2, 3]
+        design = np.hstack([np.ones((40, 1)), np.cos(phase), np.sin(phase)])
+        assert _design(time_s, np.array([hz]), 3)[0] == pytest.approx(design)
+        wanted = np.linalg.lstsq(design, signal, rcond=None)[1].sum()
+        assert found == pytest.approx(wanted, rel=1e-6)
+    assert _parameters(3) == 3 * 7 + 1
+
+
+def test_spreads_are_relative_variances_of_repeats_in_all_channels() -> None:
+    exposures = np.repeat([10.0, 20.0], 4)
+    light = np.array([1.0, 1.1, 0.9, 1.0, 1.02, 0.98, 1.0, 1.0])[:, None] * [1.0, 2.0, 3.0]
+    found, spreads, counts = _spreads(table(exposures, BLACK_DN + exposures[:, None] * light), BLACK_DN)
+    assert found.tolist() == [10.0, 20.0]
+    assert counts.tolist() == [4, 4]
+    assert spreads == pytest.approx([0.02 / 3, 0.0008 / 3], abs=2e-7)
+
+
+def test_the_cost_of_spreads_is_the_likelihood_of_sample_variances() -> None:
+    spreads, counts = np.array([0.03, 0.04]), np.array([4, 9])
+
+    def likelihood(model: np.ndarray) -> float:
+        # (n - 1) s / m has a chi-square distribution of n - 1 degrees of freedom.
+        factor = (counts - 1) / model
+        return float((chi2.logpdf(factor * spreads, counts - 1) + np.log(factor)).sum())
+
+    one, other = np.array([0.02, 0.05]), np.array([0.04, 0.03])
+    found = _cost_of(one, spreads, counts) - _cost_of(other, spreads, counts)
+    assert found == pytest.approx((likelihood(other) - likelihood(one)) / (3 / 2 + 8 / 2))
+
+
+def test_a_step_of_the_search_moves_the_longest_exposure_by_a_sixteenth_of_a_cycle() -> None:
+    assert _step(np.array([10.0, 200.0])) == pytest.approx(1 / 16 / (300 * 0.2))
+
+
+def test_a_beat_is_the_scatter_of_repeats_with_its_deviation_and_floor() -> None:
+    light = np.array([[100.0, 200.0, 50.0], [104.0, 200.0, 50.0], [96.0, 200.0, 53.0]])
+    exposures = np.array([30.0, 10.0, 30.0, 30.0])
+    readings = table(exposures, BLACK_DN + np.vstack([light[:1], light[:1], light[1:]]))
+    transfer = Transfer(Measured(value=10.0, std=0.1), Measured(value=2.0, std=0.1))
+    sizes = RegionSizes(np.array([100, 400, 100]), np.zeros(3, np.int64), 12)
+    repeated = readings[np.array([0, 1, 1, 2, 3])]
+    first, second = check_beats(repeated, BLACK_DN, transfer, sizes)
+    assert (first.exposure_ms, second.exposure_ms) == (30.0, 10.0)
+    assert [each.value for each in first.channels_percent] == pytest.approx([4.0, 0.0, 100 * 3**0.5 / 51])
+    assert [each.std for each in first.channels_percent] == pytest.approx([2.0, 0.0, 50 * 3**0.5 / 51])
+    ratio = light[:, 2] / light[:, 1]
+    wanted = max(100 * ratio.std(ddof=1) / ratio.mean(), 4.0)
+    assert first.ratio_percent.value == pytest.approx(wanted)
+    assert first.ratio_percent.std == pytest.approx(wanted / 2)
+    floor = [100 * np.sqrt((4 + 1 / 12 + s / 10) / n) / s for s, n in ((100, 100), (200, 400), (51, 100))]
+    assert first.floor_percent == pytest.approx(max(floor))
+
+
+@pytest.mark.parametrize(("steps", "trusted"), [(3, True), (2, False)])
+def test_three_steps_of_time_are_needed(steps: int, trusted: bool) -> None:
+    gaps = np.array([5.0, 20.0, 35.0, 12.0])[: steps + 1]
+    readings = table(np.ones(steps + 1), np.ones((steps + 1, 3)), np.cumsum(gaps) / 1000, gaps)
+    assert has_trusted_times(readings) == trusted
+
+
+def test_the_depth_of_a_cycle_is_half_the_height_of_the_strongest_channels_wave() -> None:
+    readings = short_exposures(60.0)
+    phase = 2 * np.pi * 60 * readings.timestamp_s
+    light = 1 + np.sin(phase)[:, None] * [0.1, 0.3, 0.2]
+    noise = 1e-4 * np.random.default_rng(1).standard_normal((96, 3))
+    found = find_cycle(replace(readings, mean_dn=BLACK_DN + 300 * (light + noise)), BLACK_DN)
+    assert found.modulation.value == pytest.approx(0.3, rel=0.02)
+    assert found.period_ms is not None

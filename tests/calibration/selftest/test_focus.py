@@ -7,7 +7,16 @@ import pytest
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from dsl_core.calibration.selftest.focus import BAR_PX, BarFrames, bar_levels, check_focus
+from dsl_core.calibration.selftest.focus import (
+    BAR_PX,
+    BarFrames,
+    Floats,
+    _blur,
+    _Edges,
+    _shares,
+    bar_levels,
+    check_focus,
+)
 from dsl_core.errors import CalibrationError
 
 BLACK_DN = 260.0
@@ -52,3 +61,58 @@ def test_bars_and_inverse_fill_the_picture() -> None:
     bars, inverse = bar_levels(640, 200, False), bar_levels(640, 200, True)
     assert (bars.astype(int) + inverse == 200).all()
     assert (np.diff(bars.astype(int)) != 0).sum() == 15
+
+
+def edges_of(blur_px: Floats, row: NDArray[np.int64] | None = None) -> _Edges:
+    count = len(blur_px)
+    rows = np.arange(count) if row is None else row
+    return _Edges(rows, np.zeros(count, np.int64), blur_px, 20.0)
+
+
+def test_blur_is_a_mean_whose_deviation_comes_from_eight_bands_of_rows() -> None:
+    values = np.random.default_rng(3).normal(0.8, 0.3, 80)
+    found = _blur(edges_of(values), np.ones(80, bool))
+    bands = values.reshape(8, 10).mean(1)
+    assert found.value == pytest.approx(values.mean())
+    assert found.std == pytest.approx(bands.std(ddof=1) / np.sqrt(8))
+    # Bands are of rows, in whatever order edges were found.
+    order = np.random.default_rng(4).permutation(80)
+    assert _blur(edges_of(values[order], order), np.ones(80, bool)).std == pytest.approx(found.std)
+    chosen = np.arange(80) % 2 == 0
+    assert _blur(edges_of(values), chosen).value == pytest.approx(values[::2].mean())
+    assert _blur(edges_of(values[:1]), np.ones(1, bool)).std == 0.0
+    assert _blur(edges_of(-values), np.ones(80, bool)).value == 0.0
+
+
+def test_shares_of_light_are_those_of_each_pair_where_there_is_a_fifth_of_the_usual_light() -> None:
+    bars, inverse = np.full((10, 10), 700.0), np.full((10, 10), 300.0)
+    bars[0], inverse[0] = 100 + 142, 100.0
+    bars[1], inverse[1] = 100 + 146, 100.0
+    frame = [np.asarray(each, np.uint16) for each in (bars, inverse)]
+    first, second, light = _shares(
+        BarFrames((frame[0], frame[0] + np.uint16(40)), (frame[1], frame[1])), 100.0
+    )
+    assert light[:, 0].tolist() == [False, True] + [True] * 8
+    # White is 800 and 840 in turn, 820 in the mean of both.
+    assert first[5, 5] == pytest.approx((600 + 820 - 200) / 1640)
+    assert second[5, 5] == pytest.approx((640 + 820 - 200) / 1640)
+
+
+def test_thirds_of_a_picture_are_told_apart_and_the_worst_is_named() -> None:
+    soft, sharp = bar_frames(1.6, 20.0, noise=False), bar_frames(0.8, 20.0, noise=False)
+
+    def half(each: NDArray[np.uint16], other: NDArray[np.uint16]) -> NDArray[np.uint16]:
+        return np.concatenate([each[:, :200], other[:, 200:]], 1)
+
+    frames = BarFrames(
+        (half(sharp.bars[0], soft.bars[0]), half(sharp.bars[1], soft.bars[1])),
+        (half(sharp.inverse[0], soft.inverse[0]), half(sharp.inverse[1], soft.inverse[1])),
+    )
+    found = check_focus(frames, BLACK_DN)
+    assert found.worst_px.value == pytest.approx(1.6 * BAR_PX / 20, rel=0.04)
+    assert found.camera_px.value == pytest.approx((0.8 * 2 + 1.6) / 3, rel=0.05)
+
+
+def test_bars_are_forty_columns_wide_and_the_inverse_begins_dark() -> None:
+    assert bar_levels(100, 7, False).tolist() == [7] * 40 + [0] * 40 + [7] * 20
+    assert bar_levels(100, 7, True).tolist() == [0] * 40 + [7] * 40 + [0] * 20

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dsl_core.calibration.selftest.latency import check_latency
+from dsl_core.calibration.selftest.latency import check_latency, first_failing, is_right, trials
 from dsl_core.calibration.selftest.readings import Readings
 from dsl_core.errors import DeviceError
 from tests.cases.cycle_readings import table
@@ -52,3 +52,47 @@ def test_a_stale_frame_is_counted_and_a_dead_projector_named() -> None:
     dark = latency_readings(0.0, [400])
     with pytest.raises(DeviceError, match="black and white still look the same"):
         check_latency(replace(dark, mean_dn=np.full_like(dark.mean_dn, 260.0)), 25.0, True, 0.0)
+
+
+def test_a_picture_is_right_within_three_percent_of_its_light() -> None:
+    readings = latency_readings(0.0, [400, 100])
+    mean = readings.mean_dn.copy()
+    # Black is 3 x 260 DN in all channels together, white 3000 DN more.
+    mean[8] += 1000 * 0.029
+    mean[9] += 1000 * 0.031
+    right = is_right(replace(readings, mean_dn=mean))
+    assert np.flatnonzero(~right).tolist() == [9]
+    mean[8] -= 1000 * 0.058
+    assert np.flatnonzero(~is_right(replace(readings, mean_dn=mean))).tolist() == [9]
+
+
+@pytest.mark.parametrize(("step_dn", "responds"), [(1.6, False), (1.7, True)])
+def test_a_projector_responds_when_three_channels_change_by_five_counts(
+    step_dn: float, responds: bool
+) -> None:
+    readings = latency_readings(0.0, [400])
+    dim = replace(readings, mean_dn=260 + (readings.mean_dn - 260) * step_dn / 1000)
+    if responds:
+        assert is_right(dim).all()
+    else:
+        with pytest.raises(DeviceError, match="does not respond"):
+            is_right(dim)
+
+
+def test_the_longest_wait_that_failed_and_trials_without_the_reference() -> None:
+    readings = latency_readings(40.0, [400, 100, 50, 45, 25])
+    right = is_right(readings)
+    assert first_failing(readings, right) == 25.0
+    good = latency_readings(0.0, [400, 25])
+    assert first_failing(good, is_right(good)) is None
+    judged, asked, stale = trials(readings, right)
+    assert judged.min() == 6
+    assert (len(judged), stale) == (30, 0)
+    assert sorted(set(asked)) == [25, 45, 50, 100, 400]
+
+
+def test_the_deviation_of_a_wait_is_that_between_two_waits_and_of_what_a_frame_can_tell() -> None:
+    found = check_latency(latency_readings(40.0, [400, 100, 50, 45, 25]), 25.0, True, 0.0)
+    assert found.wait_ms.std == pytest.approx(np.hypot(20 / np.sqrt(12), 0.03 * 10))
+    safe = check_latency(latency_readings(0.0, [400, 0]), 25.0, True, 0.0)
+    assert safe.wait_ms.std == pytest.approx(0.3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dsl_core.calibration.selftest.camera import Dark, Transfer
-from dsl_core.calibration.selftest.projector import RAMPS, check_projector, ramp_of
+from dsl_core.calibration.selftest.projector import RAMPS, _black_fraction, _falls, check_projector, ramp_of
 from dsl_core.calibration.selftest.readings import Readings, RegionSizes
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.selftest import Measured
@@ -99,3 +99,76 @@ def test_the_distance_from_the_power_law_is_stated_in_percent_with_its_deviation
         # Noise of two percent at nine levels in three channels.
         assert 1.0 < ramp.residual_percent.value < 3.0
         assert 0.05 < ramp.residual_percent.std / ramp.residual_percent.value < 0.25
+
+
+def test_gamma_scatters_by_what_is_stated() -> None:
+    """Fifty ramps whose noise is that of steady light: three parts in ten thousand and a little more."""
+    rng = np.random.default_rng(7)
+    clean = ramps(noise=0.0)
+    seen, stated = [], []
+    for _ in range(50):
+        signal = (clean.mean_dn - BLACK_DN) * (1 + 5e-3 * rng.standard_normal(clean.mean_dn.shape))
+        found, _ = check_projector(replace(clean, mean_dn=BLACK_DN + signal), dark(), TRANSFER, SIZES)
+        seen.append(found.gamma.value)
+        stated.append(found.gamma.std)
+    assert np.std(seen) == pytest.approx(np.mean(stated), rel=0.35)
+    assert np.mean(seen) == pytest.approx(2.2, abs=3 * np.mean(stated))
+
+
+def test_the_distance_from_the_power_law_has_the_deviation_of_so_many_values() -> None:
+    found, _ = check_projector(ramps(noise=0.02), dark(), TRANSFER, SIZES)
+    for ramp in found.ramps:
+        values = ramp.residual_percent.std**-2 * ramp.residual_percent.value**2 / 2
+        # Nine levels in three channels, of which some channels see too little of a colour.
+        assert values == pytest.approx(round(values), abs=1e-6)
+        assert 9 <= round(values) <= 27
+
+
+@pytest.mark.parametrize(("drop", "falls"), [(4.9, 0), (5.1, 1)])
+def test_a_step_falls_by_five_deviations_of_both_levels(drop: float, falls: int) -> None:
+    drive, rate, std = np.array([0.2, 0.6, 0.4]), np.ones((3, 3)), np.full((3, 3), 0.3)
+    rate[1, 0] -= drop * 0.3 * np.sqrt(2)
+    used = np.ones((3, 3), bool)
+    # In order of drive: from 0.4 to 0.6 it falls, in one channel.
+    assert _falls(drive, rate, std, used) == falls
+    used[1, 0] = False
+    assert _falls(drive, rate, std, used) == 0
+
+
+def test_the_black_of_a_projector_is_a_share_of_white_and_doubtful_under_ambient_light() -> None:
+    white, white_std = np.array([10.0, 20.0, 0.0]), np.array([0.1, 0.1, 0.1])
+    rate = np.array([0.3, 0.5, 9.0])
+    level = Measured(value=BLACK_DN, std=0.01)
+    lit = Dark(level, rate, np.full(3, 0.01), np.array([0.1, 0.1, 0.1]), np.full(3, 0.01))
+    found, has_ambient = _black_fraction(lit, white, white_std, SIZES)
+    share = np.array([0.2 / 10.2, 0.4 / 20.4])
+    each = np.array(
+        [np.hypot(np.sqrt(2) * 0.01, 0.2 * 0.01) / 10, np.hypot(np.sqrt(2) * 0.01, 0.4 * 0.005) / 20]
+    )
+    weight = each**-2 / (each**-2).sum()
+    assert not has_ambient
+    assert found.value == pytest.approx(weight @ share)
+    assert found.std == pytest.approx((each**-2).sum() ** -0.5, rel=1e-6)
+    nothing = RegionSizes(SIZES.pixels, np.array([5, 0, 5]), 12)
+    doubtful, has_ambient = _black_fraction(lit, white, white_std, nothing)
+    assert has_ambient
+    each = np.array([np.hypot(0.01, 0.3 * 0.01) / 10, np.hypot(0.01, 0.5 * 0.005) / 20])
+    weight = each**-2 / (each**-2).sum()
+    value = weight @ np.array([0.3 / 10.3, 0.5 / 20.5])
+    assert doubtful.value == pytest.approx(value)
+    scatter = max(1.0, float((((np.array([0.3 / 10.3, 0.5 / 20.5]) - value) / each) ** 2).sum()))
+    assert doubtful.std == pytest.approx(np.hypot(np.sqrt(scatter / (each**-2).sum()), value / np.sqrt(3)))
+
+
+@pytest.mark.parametrize(("levels", "enough"), [(4, True), (3, False)])
+def test_a_ramp_needs_four_levels_that_are_neither_dark_nor_clipped(levels: int, enough: bool) -> None:
+    readings = ramps()
+    clipped = np.array(readings.clipped)
+    for rows in np.array_split(np.arange(len(readings)), 4):
+        clipped[rows[levels:]] = 1.0
+    part = replace(readings, clipped=clipped)
+    if enough:
+        assert check_projector(part, dark(), TRANSFER, SIZES)[0].gamma.value == pytest.approx(2.2, abs=0.01)
+    else:
+        with pytest.raises(CalibrationError, match="3 of 9 frames"):
+            check_projector(part, dark(), TRANSFER, SIZES)

@@ -1,0 +1,65 @@
+"""Notes from which the rig of a scan is opened again, and what a result was made with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dsl_core.io.scan.origin import (
+    calibration_digest,
+    is_of_this_computer,
+    model_notes,
+    model_of_notes,
+    rig_notes,
+    rig_of_notes,
+)
+from dsl_core.simulation.published_rig import published_rig
+
+
+def test_the_rig_of_a_scan_is_found_again_wherever_it_is_resumed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    notes = rig_notes("replay", {"session": "scans/a.dsl", "speed": "2"})
+    monkeypatch.chdir(tmp_path.parent)
+    assert rig_of_notes(notes) == ("replay", {"session": str(tmp_path / "scans/a.dsl"), "speed": "2"})
+
+
+@pytest.mark.parametrize(
+    "notes", [{}, {"scanned_with": 3}, {"scanned_with": "a", "scanned_with_options": "{"},
+              {"scanned_with": "a", "scanned_with_options": "[1]"}],
+)  # fmt: skip
+def test_notes_that_name_no_rig_legibly_name_none(notes: dict[str, object]) -> None:
+    assert rig_of_notes(notes) is None
+
+
+def test_options_that_nobody_noted_are_none() -> None:
+    assert rig_of_notes({"scanned_with": "twin"}) == ("twin", {})
+    assert rig_of_notes({"scanned_with": "twin", "scanned_with_options": '{"noise": 1}'}) == (
+        "twin",
+        {"noise": "1"},
+    )
+
+
+def test_a_scan_knows_its_computer_and_user_without_naming_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    notes = rig_notes("twin", {})
+    assert is_of_this_computer(notes)
+    assert len(notes["scanned_on"]) == 16
+    assert not is_of_this_computer({})
+    monkeypatch.setattr("platform.node", lambda: "another")
+    assert not is_of_this_computer(notes)
+
+
+def test_a_calibration_is_the_same_whatever_it_is_called() -> None:
+    rig = published_rig()
+    digest = calibration_digest(rig)
+    assert len(digest) == 32
+    assert calibration_digest(rig.model_copy(update={"name": "another"})) == digest
+    assert calibration_digest(rig.model_copy(update={"white_scale": 2 * rig.white_scale})) != digest
+
+
+def test_a_result_says_which_model_it_was_made_with() -> None:
+    rig = published_rig()
+    assert model_of_notes(model_notes(rig, "grid")) == (calibration_digest(rig), "grid")
+    assert model_of_notes({}) == (None, "auto")
