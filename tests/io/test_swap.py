@@ -46,7 +46,11 @@ def test_each_system_is_asked_in_its_own_words(
 
     class Library:
         def __getattr__(self, name: str) -> Any:
-            return lambda *given: (asked.append((name, given)), code)[1]
+            def answer(*given: Any) -> int:
+                asked.append((name, given))
+                return code
+
+            return answer
 
     monkeypatch.setattr("ctypes.CDLL", lambda *_, **__: Library())
     monkeypatch.setattr(sys, "platform", platform)

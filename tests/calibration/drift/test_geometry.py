@@ -7,10 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 from dsl_core.calibration.common.plane import TargetPlane
 from dsl_core.calibration.common.tiles import tile_of_pixels
-from dsl_core.calibration.drift.geometry import LIMIT_PX, geometry_drift, smooth_part
+from dsl_core.calibration.drift.geometry import LIMIT_PX, Floats, geometry_drift, smooth_part
 from dsl_core.errors import CalibrationError
 from dsl_core.optics.correspondence import zero_order
 from dsl_core.optics.shading import Plane
@@ -58,15 +59,14 @@ def test_each_direction_has_a_figure(off: tuple[float, float], name: str) -> Non
     assert all(figure.high == LIMIT_PX and figure.advice for figure in figures)
 
 
-def tiled(values: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def tiled(values: Callable[[Floats, Floats], Floats]) -> tuple[Floats, NDArray[np.bool_]]:
     """Residuals of all pixels of a picture of 160 by 120, and where they are known."""
     rows, columns = np.mgrid[:120, :160]
-    known = np.ones((120, 160), bool)
-    return values(2 * columns / 160 - 1, 2 * rows / 120 - 1)[known], known
+    return values(2 * columns / 160 - 1, 2 * rows / 120 - 1).ravel(), np.ones((120, 160), bool)
 
 
 def test_what_varies_as_a_quadratic_is_drift_and_its_noise_is_taken_out() -> None:
-    def smooth(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def smooth(x: Floats, y: Floats) -> Floats:
         return 0.3 - 0.2 * x + 0.4 * y + 0.5 * x * x - 0.6 * x * y + 0.1 * y * y
 
     residual, known = tiled(smooth)

@@ -168,7 +168,8 @@ def test_the_largest_distance_from_a_line_is_stated_in_percent_of_full_scale() -
         Measured(value=0, std=1),
     )
     found = line.largest_percent(1000.0)
-    assert (found.value, found.std) == (pytest.approx(0.4), pytest.approx(0.02))
+    assert found.value == pytest.approx(0.4)
+    assert found.std == pytest.approx(0.02)
 
 
 def test_the_scale_ends_where_regions_clip_or_beyond_the_largest_signal() -> None:

@@ -112,7 +112,7 @@ def test_gamma_scatters_by_what_is_stated() -> None:
         seen.append(found.gamma.value)
         stated.append(found.gamma.std)
     assert np.std(seen) == pytest.approx(np.mean(stated), rel=0.35)
-    assert np.mean(seen) == pytest.approx(2.2, abs=3 * np.mean(stated))
+    assert np.mean(seen) == pytest.approx(2.2, abs=3 * float(np.mean(stated)))
 
 
 def test_the_distance_from_the_power_law_has_the_deviation_of_so_many_values() -> None:
