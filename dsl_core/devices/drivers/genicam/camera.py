@@ -119,13 +119,12 @@ class GenicamCamera(Camera):
             failed_before, self._failed = self._failed, True
             if self._is_closed:
                 raise
-            # A camera that was restarted meanwhile can be read, but takes no orders from an old connection.
+            # A camera that was restarted meanwhile can be read, but gives an old connection no frames.
             if not failed_before and self._answers():
                 raise
             _log.warning("the camera %s is lost (%s); searching for it", self._info.model, error)
             self._reopen(error)
             result = action(self._ready_port())
-        self._failed = False
         return result
 
     def _answers(self) -> bool:
@@ -185,6 +184,8 @@ class GenicamCamera(Camera):
             raw = port.fetch(min(wait_s, left_s))
             if raw is not None and not raw.fault:
                 self.counts = replace(self.counts, delivered=self.counts.delivered + 1)
+                # Only a frame shows that a camera obeys: some accept settings from an old connection.
+                self._failed = False
                 return self._frame(raw, exposure_ms, triggered_s)
             if raw is None:
                 self.counts = replace(self.counts, late=self.counts.late + 1)
