@@ -22,7 +22,10 @@ class FrameCounter:
     def number(self, frame_id: int) -> int:
         """The number of the frame with this id."""
         before, self._before = self._before, frame_id
-        if before is not None and frame_id < before:
+        if before is None:
+            # The first of a connection follows the last of the one before, as if nothing had been missed.
+            self._offset = self._highest + 1 - frame_id if self._highest >= 0 else 0
+        elif frame_id < before:
             wrapped = before > 0.75 * self._last and frame_id < 0.25 * self._last
             self._offset = self._offset + self._last if wrapped else self._highest + 1 - frame_id
             # Counters that start at 0 give it after the last, too.
@@ -32,6 +35,5 @@ class FrameCounter:
         return number
 
     def restart(self) -> None:
-        """The camera was opened anew: whatever id comes next follows all before."""
+        """The camera was opened anew: whatever id comes next follows the last."""
         self._before = None
-        self._offset = self._highest + 1
