@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Protocol, Self
 from pydantic import Field, model_validator
 
 from dsl_core.model.base import Record
+from dsl_core.model.captured_code import CapturedCode
 
 #: More than any camera or projector has a side, and than anybody takes of one scene in a day.
 MOST_PX, MOST_SHOTS = 65_535, 200_000
@@ -101,7 +102,7 @@ class Columns(Record):
 
 
 BinaryCode = GrayCode | XorCode | EnsembleCode
-CodeSet = Annotated[GrayCode | XorCode | EnsembleCode | NoCode, Field(discriminator="kind")]
+CodeSet = Annotated[GrayCode | XorCode | EnsembleCode | CapturedCode | NoCode, Field(discriminator="kind")]
 SpectralSet = Annotated[ScanLines | LineComb | Columns | NoSpectral, Field(discriminator="kind")]
 
 
@@ -204,8 +205,8 @@ class CapturePlan(Record):
 
     @property
     def code_bits(self) -> tuple[int, int]:
-        """Column bits and row bits (0 where they are not coded)."""
-        if isinstance(self.code, NoCode):
+        """Column bits and row bits of our own codes (0 where they are not coded)."""
+        if isinstance(self.code, NoCode | CapturedCode):
             return 0, 0
         width, height = self.projector_size_px
         return (width - 1).bit_length(), (height - 1).bit_length() if self.code.rows else 0
@@ -213,6 +214,8 @@ class CapturePlan(Record):
     @property
     def code_count(self) -> int:
         """Frames of the code without white and black."""
+        if isinstance(self.code, CapturedCode):
+            return self.code.frame_count
         codes = 2 if isinstance(self.code, EnsembleCode) else 1
         return 2 * codes * sum(self.code_bits)
 

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import PlanError
+from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Shot
 from dsl_core.patterns.binary_code import binary_image
+from dsl_core.patterns.captured_code import captured_levels
 from dsl_core.patterns.multiplexed import profile, profiles
 
 
@@ -24,6 +26,10 @@ def pattern_image(plan: CapturePlan, shot: Shot) -> NDArray[np.uint8]:
                 raise PlanError(
                     f"The plan {plan.name!r} has no binary code, so no code frame {shot.pattern}."
                 )
+            if isinstance(plan.code, CapturedCode):
+                levels = captured_levels(plan.code, plan.projector_size_px, shot.pattern)
+                image[:] = np.round(255 * shot.level * levels).astype(np.uint8)[..., None]
+                return image
             drive = np.uint8(np.round(255 * shot.level))
             image[:] = (binary_image(plan.code, plan.projector_size_px, shot.pattern) & drive)[..., None]
         case "white":

@@ -143,6 +143,8 @@ def _zero_std_px(rig: Rig) -> float:
 def _start(code: DecodedCode) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Decoded columns and their deviation (px), flat, where refinement starts."""
     # Also where a bit is undecided: its two answers are neighbours, and the refinement tells them apart.
+    if code.fine_column_px is not None and code.fine_std_px is not None:
+        return code.fine_column_px.ravel().copy(), code.fine_std_px.ravel().copy()
     start = code.likely_column.astype(np.float32).ravel()
     std = np.full(start.size, WHOLE_PX_STD, np.float32)
     if code.at_edge is not None:

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.errors import DecodeError
+from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
 from dsl_core.model.rig import Rig
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.patterns.binary_code import decoder_of
+from dsl_core.patterns.captured_code import decode_captured
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
@@ -75,6 +77,12 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
         raise DecodeError(
             f"The scan {plan.name!r} contains no binary code, so depth is unknown. Capture one with a code."
         )
+    white = scan.merge("white", 0)
+    if isinstance(plan.code, CapturedCode):
+        merged = (scan.merge("code", index) for index in range(plan.code_count))
+        frames = ((frame.radiance, frame.variance) for frame in merged)
+        levels = (white.radiance, white.variance)
+        return decode_captured(plan.code, plan.projector_size_px, frames, levels), white
     decoder = decoder_of(plan.code, plan.projector_size_px)
 
     def add(pair: tuple[MergedFrame, MergedFrame]) -> None:
@@ -88,7 +96,7 @@ def decode_columns(scan: MergedScan, progress: Progress | None = None) -> tuple[
         progress,
         add,
     )
-    return decoder.finish(), scan.merge("white", 0)
+    return decoder.finish(), white
 
 
 def stack_lines(scan: MergedScan, progress: Progress | None = None) -> LineStack:

@@ -25,6 +25,7 @@ from dsl_core.capture.proof.prediction import (
 )
 from dsl_core.capture.proof.raster import Counts, Floats, Noise, Raster
 from dsl_core.capture.proof.sentinel import SentinelProof
+from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.plan import CapturePlan, NoCode, Shot, describe_shot
 from dsl_core.model.rig import Rig
 
@@ -123,7 +124,8 @@ class FrameProof:
 
     def _first_code(self, at_the_end: bool) -> FirstCode | None:
         plan = self._plan
-        if isinstance(plan.code, NoCode):
+        # Codes of other programs are imported, complete or not: no frame can be taken again.
+        if isinstance(plan.code, NoCode | CapturedCode):
             return None
         own = [s for s in self._shots if s.setting == self._first and s.role in ("code", "white", "black")]
         rises = None if self._calibration is None else self._calibration.pose.matrix[0, 0] > 0
