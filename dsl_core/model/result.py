@@ -76,6 +76,7 @@ VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "depth_std_mm": (("y", "x"), "mm", "standard deviation of depth"),
     "column_px": (("y", "x"), "px", "projector column through the zero order"),
     "column_std_px": (("y", "x"), "px", "standard deviation of the column"),
+    "row_px": (("y", "x"), "px", "projector row, where rows are coded and there is no depth"),
     "points_mm": (("axis", "y", "x"), "mm", "point in camera coordinates"),
     "normals": (("axis", "y", "x"), "1", "unit normal in camera coordinates, towards the camera"),
     "shading": (("y", "x"), "1", "cosine and distance factor of the illumination"),

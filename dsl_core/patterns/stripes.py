@@ -44,8 +44,8 @@ def read_stripes(spec: Stripes, count: int, frames: Iterator[Measured], white: M
         weakest[weaker] = spec.bits - 1 - bit
         np.minimum(margin, np.abs(difference), out=margin)
         np.minimum(sigmas, ratio, out=sigmas)
-    number = _number(spec, word)
-    jump = np.abs(_number(spec, word ^ (1 << weakest)) - number).astype(np.float32)
+    number = number_of(spec, word)
+    jump = np.abs(number_of(spec, word ^ (1 << weakest)) - number).astype(np.float32)
     undecided = ~(margin > 0)
     # Of two neighbours either is right to a stripe, so that nothing is lost.
     undecided &= jump > 1
@@ -83,8 +83,8 @@ def _word(spec: Stripes, number: Numbers) -> Numbers:
     return word if spec.code == "gray" else _with_base(spec, word)
 
 
-def _number(spec: Stripes, word: Numbers) -> Numbers:
-    """The number that digits show."""
+def number_of(spec: Stripes, word: Numbers) -> Numbers:
+    """The numbers that words of digits mean, whole numbers of any shape."""
     if spec.code == "binary":
         return word
     number = word if spec.code == "gray" else _with_base(spec, word)

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from dsl_core.errors import DecodeError
 from dsl_core.model.captured_code import CapturedCode
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan, NoCode, Role, Shot
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import ProjectorResponse, Rig, Sensor
 from dsl_core.optics.sensor import raw_variance
 from dsl_core.patterns.binary_code import decoder_of
 from dsl_core.patterns.captured_code import decode_captured
@@ -28,10 +28,22 @@ T = TypeVar("T")
 THREADS = 2
 
 
+class Readout(Protocol):
+    """What of a rig is needed to merge frames."""
+
+    @property
+    def sensor(self) -> Sensor:
+        """How light becomes numbers."""
+
+    @property
+    def projector_response(self) -> ProjectorResponse:
+        """How drive levels become light."""
+
+
 class MergedScan:
     """Reads the settings of a shot and merges them; one merger and its buffers per thread."""
 
-    def __init__(self, source: FrameSource, rig: Rig) -> None:
+    def __init__(self, source: FrameSource, rig: Readout) -> None:
         self.source, self.rig, self.plan = source, rig, source.plan
         self._shots: dict[tuple[Role, int], list[Shot]] = {}
         for shot in self.plan.shots():

@@ -1,0 +1,189 @@
+"""One picture of another program as an array of whole numbers, whatever its format."""
+
+from __future__ import annotations
+
+import errno
+import warnings
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.mapping import MOST_PICTURES, Mapping, RawLayout
+from dsl_core.io.reading import read_array, read_bounded, require_plain
+from dsl_core.model.plan import MOST_PX
+
+PICTURES = {".png", ".tif", ".tiff", ".bmp", ".jpg", ".jpeg", ".pgm", ".ppm"}
+ARRAYS, RAWS = {".npy"}, {".raw", ".bin"}
+#: Larger than any camera's picture, in bytes of its file and in pixels.
+MOST_BYTES, MOST_PIXELS = 1 << 30, 200_000_000
+_FULL = 65535
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A file with a picture, or one picture of an array of several."""
+
+    path: Path
+    index: int | None = None
+
+    def __str__(self) -> str:
+        return str(self.path) if self.index is None else f"{self.path}[{self.index}]"
+
+
+def pictures_in(path: Path) -> list[Picture]:
+    """The pictures of a file: one, or all of an array (pictures, rows, columns); raises `StoreError`."""
+    if path.suffix.lower() not in ARRAYS:
+        return [Picture(path)]
+    shape = _array(path, _stamp(path)).shape
+    if len(shape) < 3 or (len(shape) == 3 and shape[2] in (3, 4)):
+        return [Picture(path)]
+    if shape[0] > MOST_PICTURES:
+        raise StoreError(f"{path} holds {shape[0]} pictures; at most {MOST_PICTURES} are possible. Split it.")
+    return [Picture(path, index) for index in range(shape[0])]
+
+
+def load_values(picture: Picture, raw: RawLayout | None = None) -> NDArray[Any]:
+    """Values as stored, (rows, columns) or (rows, columns, 3) in the order R, G, B.
+
+    Raises `StoreError` that names the file, says what is wrong with it and what to do.
+    """
+    path, suffix = picture.path, picture.path.suffix.lower()
+    if suffix in ARRAYS:
+        values = _array(path, _stamp(path))
+        values = values if picture.index is None else values[picture.index]
+    elif suffix in RAWS:
+        values = _raw(path, raw)
+    else:
+        values = _image(path)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    if values.ndim == 3 and values.shape[2] in (3, 4):
+        values = values[..., :3]
+    elif values.ndim != 2:
+        raise StoreError(
+            f"{picture} has shape {values.shape}; a picture is (rows, columns) or (rows, columns, 3)."
+            " Save it in that shape."
+        )
+    if not 0 < values.shape[0] * values.shape[1] <= MOST_PIXELS or max(values.shape) > MOST_PX:
+        raise StoreError(f"{picture} is {values.shape[1]} x {values.shape[0]} px, which no camera has.")
+    return values
+
+
+def load_mosaic(picture: Picture, mapping: Mapping, bit_depth: int) -> NDArray[np.uint16]:
+    """A picture as a frame, (rows, columns), DN in ``bit_depth`` bits; raises `StoreError`."""
+    values = load_values(picture, mapping.raw)
+    is_float = values.dtype.kind == "f"
+    if values.ndim == 3 and mapping.channel == "grey":
+        values = values.mean(axis=2, dtype=np.float64)
+    elif values.ndim == 3:
+        values = values[..., ("red", "green", "blue").index(mapping.channel)]
+    if is_float and mapping.full_scale is not None:
+        values = values / mapping.full_scale * (2**bit_depth - 1)
+    if values.dtype.kind == "f":
+        values = np.rint(values)
+    if not np.isfinite(values).all() or values.min() < 0 or values.max() > _FULL:
+        raise StoreError(
+            f"{picture} holds values from {values.min():g} to {values.max():g}; 0 to {_FULL} are possible."
+            " State full_scale, the value of white, in the mapping, or save whole numbers."
+        )
+    frame = values.astype(np.uint16)
+    if mapping.left_aligned:
+        frame = np.right_shift(frame, np.uint16(16 - bit_depth))
+    if frame.max() >= 2**bit_depth:
+        raise StoreError(
+            f"{picture} holds values up to {frame.max()}, more than {bit_depth} bits have. Correct bit_depth"
+            " or left_aligned of the mapping."
+        )
+    return frame
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """What tells a file from its earlier content."""
+    try:
+        size = require_plain(path)
+        return size, path.stat().st_mtime_ns
+    except OSError as error:
+        raise _unread(path, error) from error
+
+
+@lru_cache(maxsize=1)
+def _array(path: Path, stamp: tuple[int, int]) -> NDArray[Any]:
+    """A NumPy file; the last is kept, because one file may hold all pictures."""
+    if stamp[0] > MOST_BYTES:
+        raise StoreError(f"{path} is larger than {MOST_BYTES / 1e9:.0f} GB. Save its pictures one by one.")
+    try:
+        values = read_array(path)
+    except (OSError, ValueError, EOFError) as error:
+        raise StoreError(f"{path} is not an array that NumPy can read ({error}). Save it again.") from error
+    if values.dtype.kind not in "uifb":
+        raise StoreError(f"{path} does not hold numbers but {values.dtype}. Save it again as numbers.")
+    return values
+
+
+def _raw(path: Path, layout: RawLayout | None) -> NDArray[Any]:
+    if layout is None:
+        raise StoreError(
+            f"{path} holds pixels without their size. State raw (width_px, height_px, bits) in the mapping."
+        )
+    kind = np.dtype(np.uint8 if layout.bits == 8 else (">u2" if layout.big_endian else "<u2"))
+    wanted = layout.header_bytes + layout.width_px * layout.height_px * kind.itemsize
+    data = _bytes(path)
+    if len(data) != wanted:
+        raise StoreError(
+            f"{path} has {len(data)} bytes, {wanted} are wanted for {layout.width_px} x {layout.height_px} px"
+            f" of {layout.bits} bits. Correct raw in the mapping."
+        )
+    values = np.frombuffer(data, kind, offset=layout.header_bytes)
+    return values.reshape(layout.height_px, layout.width_px).astype(kind.newbyteorder("="))
+
+
+def _image(path: Path) -> NDArray[Any]:
+    import io
+
+    import cv2
+    from PIL import Image
+
+    data = _bytes(path)
+    try:
+        # The head is read first: a small file may claim a picture that no memory holds.
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(io.BytesIO(data)) as head:
+                width, height = head.size
+        if width * height > MOST_PIXELS:
+            raise StoreError(f"{path} claims {width} x {height} px, which no camera has. Leave it out.")
+        # Through memory, because OpenCV cannot open every path on Windows.
+        found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, cv2.error) as error:
+        raise _damaged(path) from error
+    except Warning as error:
+        raise StoreError(f"{path} claims more pixels than a camera has. Leave it out.") from error
+    if found is None:
+        raise _damaged(path)
+    return np.asarray(found[..., 2::-1] if found.ndim == 3 and found.shape[2] >= 3 else found)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return read_bounded(path, MOST_BYTES)
+    except OSError as error:
+        raise _unread(path, error) from error
+
+
+def _damaged(path: Path) -> StoreError:
+    return StoreError(
+        f"{path} cannot be decoded as a picture. Copy it again, or name only good pictures with files of the"
+        " mapping."
+    )
+
+
+def _unread(path: Path, error: OSError) -> StoreError:
+    reason = error.strerror or str(error)
+    if error.errno == errno.ENOENT and path.is_symlink():
+        reason = "it is a link to a file that does not exist"
+    return StoreError(f"{path} cannot be read ({reason}). Replace it with a plain picture file, or remove it.")

@@ -1,0 +1,91 @@
+"""Pictures of another program as a source of frames."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.arrange import Arrangement, arrange
+from dsl_core.io.pictures.mapping import Mapping
+from dsl_core.io.pictures.picture_file import Picture, load_mosaic, load_values
+from dsl_core.model.plan import CapturePlan, NoSpectral, Setting, Shot
+
+#: Nobody notes exposures next to pictures; ratios within a capture are all that decoding needs.
+EXPOSURE_MS = 1.0
+
+
+@dataclass(frozen=True)
+class PictureScan:
+    """A `FrameSource` that reads the pictures of a mapping when they are requested.
+
+    Where white or black was not captured, the brightest or darkest value of each pixel stands for it.
+    """
+
+    root: Path
+    mapping: Mapping
+    arrangement: Arrangement
+    plan: CapturePlan
+    bit_depth: int
+
+    @property
+    def made_up(self) -> tuple[str, ...]:
+        """What of white and black was not captured."""
+        found = {"white": self.arrangement.white, "black": self.arrangement.black}
+        return tuple(name for name, picture in found.items() if picture is None)
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The frame of a shot, (rows, columns), DN; raises `StoreError` naming the picture that is wrong."""
+        if shot.role == "white":
+            return self._load(self.arrangement.white) if self.arrangement.white else self._extremes[1]
+        if shot.role == "black":
+            return self._load(self.arrangement.black) if self.arrangement.black else self._extremes[0]
+        return self._load(self.arrangement.frames[shot.pattern])
+
+    @cached_property
+    def _extremes(self) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+        """The darkest and the brightest value of each pixel."""
+        low = high = self._load(self.arrangement.frames[0])
+        for picture in self.arrangement.frames[1:]:
+            frame = self._load(picture)
+            low, high = np.minimum(low, frame), np.maximum(high, frame)
+        return low, high
+
+    def _load(self, picture: Picture) -> NDArray[np.uint16]:
+        frame = load_mosaic(picture, self.mapping, self.bit_depth)
+        width, height = self.plan.camera_size_px
+        if frame.shape != (height, width):
+            raise StoreError(
+                f"{picture} is {frame.shape[1]} x {frame.shape[0]} px, the first picture {width} x {height} px."
+                " Name only pictures of one camera and size with files of the mapping."
+            )
+        return frame
+
+    def fingerprint(self) -> str:
+        """What tells these pictures, mapped like this, from all others."""
+        digest = hashlib.sha256(self.mapping.model_dump_json(exclude={"unsure", "name"}).encode())
+        for shot in self.plan.shots():
+            digest.update(self.read(shot).tobytes())
+        return digest.hexdigest()
+
+
+def open_pictures(root: Path, mapping: Mapping) -> PictureScan:
+    """The pictures of a folder as a scan; raises `StoreError` saying which are missing or wrong."""
+    found = arrange(root, mapping)
+    first = load_values(found.frames[0], mapping.raw)
+    plan = CapturePlan(
+        name=mapping.name or root.absolute().name,
+        camera_size_px=(first.shape[1], first.shape[0]),
+        projector_size_px=mapping.projector_size_px,
+        code=found.code,
+        spectral=NoSpectral(),
+        settings=(Setting(exposure_ms=EXPOSURE_MS, level=1.0),),
+        code_settings=(0,),
+    )
+    stored_bits = 8 if first.dtype.itemsize == 1 else 16
+    return PictureScan(root, mapping, found, plan, mapping.bit_depth or stored_bits)

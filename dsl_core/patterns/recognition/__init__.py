@@ -1,0 +1,1 @@
+"""What pictures of an unknown capture show, told from the pictures themselves."""

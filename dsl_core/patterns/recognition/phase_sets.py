@@ -1,0 +1,211 @@
+"""Which pictures are steps of shifted sinusoids, how many periods each set has, and where they begin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.captured_code import Phases
+from dsl_core.patterns.phases import TURN, read_phases
+from dsl_core.patterns.recognition.probes import Lines
+
+#: Steps of a set that are looked for.
+STEPS = range(3, 17)
+#: Amplitude (of 0.5) of a sinusoid, and how much it and the mean may vary over a picture.
+LEAST_AMPLITUDE, AMPLITUDE_SPREAD, MEAN_SPREAD = 0.08, 0.25, 0.1
+#: A run of neighbours over which phases are followed, px.
+LEAST_RUN = 20
+#: Noise of the change of a phase from pixel to pixel, turns.
+LEAST_CHANGE = 0.04
+#: Turns of a set that may still be one fringe over the whole projector.
+ONE_FRINGE = 1.05
+#: Most fringes of a set that are tried, and how far from a whole number they may be, of all and at least.
+MOST_FRINGES, OFF_SHARE, OFF = 256, 0.0025, 0.03
+#: Positions are compared on a projector of this many columns, at so many pixels, for so many guesses.
+VIRTUAL_PX, SAMPLES, MOST_GUESSES = 1024, 500, 12
+#: Phases that disagree by this much (rms) show no one position, rad.
+MOST_OFF_RAD = 0.35
+STARTS_DEG = (0.0, -90.0, 90.0, 180.0)
+Complex = NDArray[np.complex64]
+
+
+@dataclass(frozen=True)
+class PhaseReading:
+    """Sets of ``steps`` pictures each and their fringes.
+
+    ``off_rad`` is by how much phases disagree (rms), ``rival_rad`` that of the best other reading.
+    """
+
+    steps: int
+    order: Literal["set", "step"]
+    fringes: tuple[float, ...]
+    start_deg: float
+    direction: Literal[1, -1]
+    off_rad: float
+    rival_rad: float
+
+
+def is_sinusoid(lines: Lines, pictures: Sequence[int]) -> float | None:
+    """How far pictures are from equal steps of one sinusoid, 0 for perfect; None when they are none."""
+    values = lines.some(pictures)
+    if not values.size:
+        return None
+    mean, first = values.mean(0), _harmonic(values)
+    amplitude = np.abs(first) * 2
+    middle = float(np.median(amplitude))
+    if middle < LEAST_AMPLITUDE:
+        return None
+    spread = float(np.subtract(*np.percentile(amplitude, (84, 16)))) / 2 / middle
+    drift = float(np.subtract(*np.percentile(mean, (84, 16)))) / 2
+    if spread > AMPLITUDE_SPREAD or drift > MEAN_SPREAD:
+        return None
+    return spread + drift
+
+
+def sinusoid_run(lines: Lines, pictures: Sequence[int]) -> tuple[int, int, int] | None:
+    """Steps, start and end of the longest run of whole sets among pictures in their order, or None."""
+    best: tuple[int, float, int, int, int] | None = None
+    for steps in STEPS:
+        for start in range(max(len(pictures) - steps + 1, 0)):
+            end, off = start, 0.0
+            while end + steps <= len(pictures):
+                found = is_sinusoid(lines, pictures[end : end + steps])
+                if found is None:
+                    break
+                end, off = end + steps, off + found
+            if end > start:
+                rank = (start - end, off * steps / (end - start))
+                if best is None or rank < best[:2]:
+                    best = (*rank, steps, start, end)
+    return None if best is None else best[2:]
+
+
+def steps_of_strided(lines: Lines, pictures: Sequence[int]) -> int | None:
+    """Steps of sets whose first steps come first, then all second steps and so on; None when it is not so."""
+    ranked = []
+    for steps in STEPS:
+        sets = len(pictures) // steps
+        if sets < 2 or len(pictures) % steps:
+            continue
+        found = [is_sinusoid(lines, pictures[k::sets]) for k in range(sets)]
+        if None not in found:
+            ranked.append((sum(f for f in found if f is not None), steps))
+    return min(ranked)[1] if ranked else None
+
+
+def read_phase_sets(
+    lines: Lines, pictures: Sequence[int], steps: int, order: Literal["set", "step"], has_stripes: bool
+) -> PhaseReading | None:
+    """Fringes, start and direction of sets of pictures; None when they fit no whole fringes.
+
+    With stripes one set is enough, whose fringes are then left to whoever knows the stripes (0).
+    """
+    sets = len(pictures) // steps
+    chosen = [pictures[k::sets] if order == "step" else pictures[k * steps : (k + 1) * steps] for k in range(sets)]
+    waves = [_wave(lines, each) for each in chosen]
+    turns = _turns(waves, lines.pairs)
+    if turns is None:
+        return None
+    # Columns are taken to rise along the lines; whoever sees a mirror image says so.
+    direction: Literal[1, -1] = 1 if turns[int(np.argmax(np.abs(turns)))] > 0 else -1
+    if sets == 1:
+        whole = 1.0 if abs(turns[0]) < ONE_FRINGE else 0.0
+        return PhaseReading(steps, order, (whole,), 0.0, direction, 0.0, np.pi)
+    samples = _samples(waves, lines.lit)
+    ranked = sorted(
+        (_off(samples, fringes, start, steps, direction), sum(fringes), k, fringes, start)
+        for fringes in dict.fromkeys(islice(_fringes(np.abs(turns)), MOST_GUESSES))
+        for k, start in enumerate(STARTS_DEG)
+    )
+    if not ranked or ranked[0][0] > MOST_OFF_RAD:
+        return None
+    off, _, _, fringes, start = ranked[0]
+    rival = ranked[1][0] if len(ranked) > 1 else np.pi
+    return PhaseReading(steps, order, fringes, start, direction, off, rival)
+
+
+def _harmonic(values: NDArray[np.float32]) -> Complex:
+    turn = np.exp(-1j * TURN * np.arange(len(values)) / len(values)).astype(np.complex64)
+    return np.asarray(np.tensordot(turn, values, (0, 0)) / len(values), np.complex64)
+
+
+def _wave(lines: Lines, pictures: Sequence[int]) -> Complex:
+    return _harmonic(lines.values[np.asarray(pictures)])
+
+
+def _turns(waves: Sequence[Complex], pairs: NDArray[np.bool_]) -> NDArray[np.float64] | None:
+    """Mean turns of each set over long runs, relative to each other exact; None without any run."""
+    change = np.stack([np.angle(wave[:, 1:] * np.conj(wave[:, :-1])) / TURN for wave in waves])
+    if not pairs.any():
+        return None
+    # Edges of things are left out: phases jump there, by turns that nobody sees.
+    usual = np.array([np.median(each[pairs]) for each in change])
+    near = np.abs(change - usual[:, None, None]) < LEAST_CHANGE + 2 * np.abs(usual)[:, None, None]
+    steady = pairs & near.all(0)
+    runs = []
+    for line in range(steady.shape[0]):
+        edges = np.flatnonzero(np.diff(np.r_[False, steady[line], False].astype(np.int8)))
+        for start, end in edges.reshape(-1, 2):
+            if end - start >= LEAST_RUN:
+                # Differences of neighbours telescope, so noise does not add up.
+                runs.append(change[:, line, start:end].sum(-1))
+    if not runs:
+        return None
+    table = np.array(runs)
+    finest = int(np.argmax(np.abs(table).mean(0)))
+    length = np.abs(table[:, finest])
+    longest = table[length >= 0.5 * length.max()]
+    ratio = np.median(longest / longest[:, [finest]], axis=0)
+    return np.asarray(ratio * table[np.argmax(length), finest])
+
+
+def _fringes(turns: NDArray[np.float64]) -> Iterator[tuple[float, ...]]:
+    """Whole numbers of fringes in the ratio of the turns that are seen."""
+    order = np.argsort(turns)
+    if turns[order[0]] < ONE_FRINGE:
+        # From coarse to fine each ratio is known better than to one half.
+        fringes = np.ones(len(turns))
+        for lower, upper in zip(order, order[1:], strict=False):
+            fringes[upper] = max(np.round(turns[upper] / turns[lower] * fringes[lower]), 1.0)
+        yield tuple(float(f) for f in fringes)
+    finest = turns[order[-1]]
+    for count in range(int(np.ceil(finest)), MOST_FRINGES):
+        scaled = turns / finest * count
+        off = np.abs(scaled - np.round(scaled))
+        if (off < OFF + OFF_SHARE * count).all() and (np.round(scaled) > 0).all():
+            yield tuple(float(f) for f in np.round(scaled))
+
+
+def _samples(waves: Sequence[Complex], lit: NDArray[np.bool_]) -> NDArray[np.complex64]:
+    """Harmonics of all sets at some lit pixels, (sets, pixels)."""
+    table = np.stack([wave[lit] for wave in waves])
+    return np.asarray(table[:, :: max(table.shape[1] // SAMPLES, 1)], np.complex64)
+
+
+def _off(
+    samples: NDArray[np.complex64],
+    fringes: tuple[float, ...],
+    start_deg: float,
+    steps: int,
+    direction: Literal[1, -1],
+) -> float:
+    """By how much the phases of samples disagree on their best position, rad (rms, to three digits)."""
+    periods = tuple(VIRTUAL_PX / f for f in fringes)
+    spec = Phases(periods_px=periods, steps=steps, start_deg=start_deg, direction=direction)
+    noise = np.full(samples.shape[1:], 4e-4, np.float32)
+    frames = (
+        (np.asarray(2 * np.real(wave * np.exp(1j * TURN * k / steps)), np.float32), noise)
+        for wave in samples
+        for k in range(steps)
+    )
+    position = read_phases(spec, VIRTUAL_PX, frames).position_px
+    phases = np.angle(samples) * direction - np.deg2rad(start_deg)
+    expected = TURN * position / np.array(periods)[:, None]
+    off = np.angle(np.exp(1j * (expected - phases)))
+    # A few pixels see two surfaces.
+    return round(float(np.sqrt(np.mean(np.sort(off**2, axis=1)[:, : int(0.9 * off.shape[1])]))), 3)

@@ -1,0 +1,201 @@
+"""What a sequence of pictures is: white, black, and runs that code columns and rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.captured_code import Axis
+from dsl_core.patterns.recognition.phase_sets import (
+    MOST_OFF_RAD,
+    PhaseReading,
+    read_phase_sets,
+    sinusoid_run,
+    steps_of_strided,
+)
+from dsl_core.patterns.recognition.probes import Lines, Probes
+from dsl_core.patterns.recognition.stripe_sets import ROUGH, StripeReading, read_set
+
+#: A picture that is nearly everywhere at the brightest or darkest of its pixels.
+BRIGHT, DARK = 0.9, 0.1
+#: White and black stand at most this far from an end of a sequence, or from each other.
+FROM_END = 2
+#: Splits that are tried, and the share of pictures that must speak for one; what speaking against it costs.
+MOST_SPLITS, LEAST_SUPPORT, AXIS_DOUBT = 5, 0.4, 0.5
+Slots = tuple[int | None, ...]
+
+
+@dataclass(frozen=True)
+class Block:
+    """Pictures that belong together, in order (None: absent), what they show and how they are to be read."""
+
+    kind: Literal["white", "black", "stripes", "phases", "skip"]
+    slots: Slots
+    axis: Axis = "columns"
+    reading: StripeReading | PhaseReading | None = None
+
+
+BlocksOf = Callable[[Axis, Slots], tuple[list[Block], float]]
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """Blocks in the order of the pictures; ``misfit`` is 0 for a capture that makes sense as a whole."""
+
+    blocks: tuple[Block, ...]
+    misfit: float
+
+
+def recognise(probes: Probes, slots: Slots) -> Recognised | None:
+    """The reading of a sequence of pictures that makes most sense, or None when none does."""
+    # Many guesses of where white and black are leave the same runs.
+    blocks_of: BlocksOf = cache(lambda axis, run: _axis_blocks(probes, axis, run))
+    best: Recognised | None = None
+    for white, black in _lights(probes, slots):
+        found = _without_lights(probes, slots, white, black, blocks_of)
+        if found is not None and (best is None or found.misfit < best.misfit - 1e-6):
+            best = found
+    return best
+
+
+def _lights(probes: Probes, slots: Slots) -> Iterator[tuple[int | None, int | None]]:
+    """Places where white and black may stand, the likeliest first: each is one picture or there is none."""
+    level = {i: float(probes.across.of(p).mean()) for i, p in enumerate(slots) if p is not None}
+    near = [i for i in level if min(i, len(slots) - 1 - i) < FROM_END]
+    whites = sorted((i for i in near if level[i] > BRIGHT), key=lambda i: -level[i])
+    blacks = sorted((i for i in near if level[i] < DARK), key=lambda i: level[i])
+    # White or black alone in the middle, as between columns and rows.
+    whites += [i for i in level if level[i] > BRIGHT and i not in near]
+    blacks += [i for i in level if level[i] < DARK and i not in near]
+    yield from product([*whites[:4], None], [*blacks[:4], None])
+
+
+def _without_lights(
+    probes: Probes, slots: Slots, white: int | None, black: int | None, blocks_of: BlocksOf
+) -> Recognised | None:
+    lights = {i for i in (white, black) if i is not None}
+    places = [i for i in range(len(slots)) if i not in lights]
+    if not places:
+        return None
+    # Taking white or black for a digit costs more than finding neither.
+    misfit = 0.02 * (2 - len(lights))
+    best: Recognised | None = None
+    for runs, doubt in _splits(probes, slots, places):
+        coded: list[tuple[int, Block]] = []
+        total = misfit + AXIS_DOUBT * doubt
+        for axis, run in runs:
+            found, cost = blocks_of(axis, tuple(slots[i] for i in run))
+            if not found:
+                total = np.inf
+                break
+            start = 0
+            for block in found:
+                coded.append((run[start], block))
+                start += len(block.slots)
+            total += cost
+        if not np.isfinite(total) or (best is not None and total >= best.misfit):
+            continue
+        blocks = coded
+        if white is not None:
+            blocks = [*blocks, (white, Block("white", (slots[white],)))]
+        if black is not None:
+            blocks = [*blocks, (black, Block("black", (slots[black],)))]
+        best = Recognised(tuple(block for _, block in sorted(blocks, key=lambda each: each[0])), total)
+    return best
+
+
+def _splits(
+    probes: Probes, slots: Slots, places: Sequence[int]
+) -> Iterator[tuple[tuple[tuple[Axis, Sequence[int]], ...], float]]:
+    """Columns and rows as runs of places, one axis or both in either order, and what speaks against them."""
+    votes = _axis_votes(probes, [slots[i] for i in places])
+    total = float(np.abs(votes).sum()) or 1.0
+    # Places of a split: how much speaks against columns before it and rows after it.
+    before = np.r_[0.0, np.cumsum(votes)]
+    for sign, order in ((1, ("columns", "rows")), (-1, ("rows", "columns"))):
+        support = sign * (2 * before - before[-1]) / total
+        ranked = sorted(range(len(places) + 1), key=lambda k: -support[k])
+        for k in ranked[:MOST_SPLITS]:
+            if support[k] < LEAST_SUPPORT:
+                break
+            first: tuple[Axis, Sequence[int]] = (order[0], places[:k])  # type: ignore[assignment]
+            second: tuple[Axis, Sequence[int]] = (order[1], places[k:])  # type: ignore[assignment]
+            runs = tuple(run for run in (first, second) if run[1])
+            if all(len(_joined(run[1])) == 1 or len(runs) == 1 for run in runs):
+                yield runs, 1 - float(support[k])
+
+
+def _joined(places: Sequence[int]) -> list[Sequence[int]]:
+    """Runs of places without white or black between them; two of those are no one run of digits."""
+    cuts = [k for k in range(1, len(places)) if places[k] != places[k - 1] + 1]
+    return [places] if not cuts else [places[: cuts[0]], places[cuts[0] :]]
+
+
+def _axis_votes(probes: Probes, pictures: Sequence[int | None]) -> NDArray[np.float64]:
+    """For each picture above zero when it varies across more than down, below when less; 0 when untold."""
+    votes = []
+    for picture in pictures:
+        if picture is None:
+            votes.append(0.0)
+            continue
+        across, down = probes.across.steps(picture), probes.down.steps(picture)
+        votes.append((across - down) / max(across + down, 0.01))
+    return np.array(votes)
+
+
+def _axis_blocks(probes: Probes, axis: Axis, slots: Sequence[int | None]) -> tuple[list[Block], float]:
+    """Blocks of a run of pictures that code one axis and how little they make sense; none when they do not."""
+    lines = probes.across if axis == "columns" else probes.down
+    present = [p for p in slots if p is not None]
+    stripes = read_set(lines, slots)
+    if stripes is not None:
+        found, cost = [Block("stripes", tuple(slots), axis, stripes)], _cost(stripes)
+    else:
+        found, cost = [], np.inf
+    if len(present) < len(slots):
+        return found, cost
+    others = []
+    run = sinusoid_run(lines, present)
+    if run is not None:
+        others.append(_with_phases(lines, axis, present, run))
+    strided = steps_of_strided(lines, present)
+    if strided is not None:
+        reading = read_phase_sets(lines, present, strided, "step", False)
+        if reading is not None:
+            others.append(([Block("phases", tuple(present), axis, reading)], _phase_cost(reading)))
+    return min([(found, cost), *others], key=lambda each: each[1])
+
+
+def _with_phases(
+    lines: Lines, axis: Axis, present: Sequence[int], run: tuple[int, int, int]
+) -> tuple[list[Block], float]:
+    steps, start, end = run
+    rest = [present[:start], present[end:]]
+    if all(rest):
+        return [], np.inf
+    others = rest[0] or rest[1]
+    reading = read_phase_sets(lines, present[start:end], steps, "set", bool(others))
+    if reading is None:
+        return [], np.inf
+    phases = Block("phases", tuple(present[start:end]), axis, reading)
+    if not others:
+        return [phases], _phase_cost(reading)
+    stripes = read_set(lines, others)
+    if stripes is None:
+        return [], np.inf
+    block = Block("stripes", tuple(others), axis, stripes)
+    return ([block, phases] if rest[0] else [phases, block]), _cost(stripes) + _phase_cost(reading)
+
+
+def _cost(stripes: StripeReading) -> float:
+    return stripes.roughness / ROUGH
+
+
+def _phase_cost(phases: PhaseReading) -> float:
+    return phases.off_rad / MOST_OFF_RAD

@@ -1,0 +1,157 @@
+"""Which digits a run of stripe pictures shows: by smoothness of the numbers that each reading gives.
+
+A wrong order of digits, a wrong code or pictures taken for their inverses make numbers go up and down along a
+line; with the right reading, they run in one direction, but for the edges of things before the camera.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.captured_code import MOST_BITS, Stripes
+from dsl_core.patterns.recognition.probes import Lines
+from dsl_core.patterns.stripes import number_of
+
+Inverse = Literal["none", "interleaved", "after"]
+#: Pictures and their inverses go against each other at least this much.
+COMPLEMENT = -0.6
+#: Readings as rough as this are none.
+ROUGH = 0.45
+#: Fewer digits than this are smooth in every reading.
+FEWEST_BITS = 3
+#: Of two readings the second is this many times rougher, or which one it is stays unsure.
+CLEARLY_ROUGHER = 1.5
+#: A blurred digit adds nothing but noise, so rougher readings that only differ in it are as good.
+FLOOR = 5e-3
+
+
+@dataclass(frozen=True)
+class StripeReading:
+    """How the pictures of a set are to be read, and how rough its numbers then are (0 to 1).
+
+    ``rival`` is the roughness of the best reading that is another one; ``numbers`` are the least and the
+    largest that are common. ``rises`` says whether they rise along the lines.
+    """
+
+    code: Literal["gray", "binary", "xor"]
+    base_bit: int
+    bits: int
+    first: Literal["most", "least"]
+    inverse: Inverse
+    inverse_first: bool
+    roughness: float
+    rival: float
+    numbers: tuple[int, int]
+    rises: bool
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether no other reading comes close."""
+        return self.rival > CLEARLY_ROUGHER * (self.roughness + FLOOR)
+
+
+def read_set(lines: Lines, pictures: Sequence[int | None]) -> StripeReading | None:
+    """The best reading of a run of pictures, None for those that are absent; None when none is any good."""
+    found = sorted(_readings(lines, pictures), key=_preference)
+    if not found or found[0].roughness > ROUGH:
+        return None
+    best = found[0]
+    others = [r.roughness for r in found[1:] if r.rises or not best.rises]
+    return StripeReading(**{**vars(best), "rival": min(others, default=1.0)})
+
+
+def _preference(reading: StripeReading) -> tuple[float, bool, bool]:
+    # Nearly equal ones: rising before falling, patterns before inverses.
+    return round(reading.roughness / (2 * FLOOR)), not reading.rises, reading.inverse_first
+
+
+def _readings(lines: Lines, pictures: Sequence[int | None]) -> Iterator[StripeReading]:
+    arrangements: list[Inverse] = [a for a in ("interleaved", "after") if _is_inverse(lines, pictures, a)]
+    for inverse in arrangements or ["none"]:
+        digits = _digits(lines, pictures, inverse)
+        if digits is None or not FEWEST_BITS <= len(digits) <= MOST_BITS:
+            continue
+        for first in ("most", "least"):
+            ordered = digits if first == "most" else digits[::-1]
+            for inverse_first in (False, True):
+                word = np.zeros(lines.lit.shape, np.int32)
+                for digit in ordered:
+                    word = word << 1 | (digit != inverse_first)
+                for code, base in (("gray", 0), ("binary", 0), ("xor", 0), ("xor", 1)):
+                    if base >= len(digits) or (code == "xor" and len(digits) < FEWEST_BITS + 1):
+                        continue
+                    spec = Stripes(code=code, bits=len(digits), base_bit=base)
+                    yield _judged(lines, spec, number_of(spec, word), first, inverse, inverse_first)
+
+
+def _judged(
+    lines: Lines,
+    spec: Stripes,
+    number: NDArray[np.int32],
+    first: Literal["most", "least"],
+    inverse: Inverse,
+    inverse_first: bool,
+) -> StripeReading:
+    rough, rises = [], 0.0
+    for digits in range(1, spec.bits + 1):
+        # Coarse numbers first: only the finest suffer from blur.
+        step = np.sign(np.diff(number >> (spec.bits - digits), axis=-1)[lines.pairs])
+        # Steps count by their sign: the edge of a thing is one step, however far it jumps.
+        path, way = float(np.abs(step).sum()), float(step.sum())
+        if path:
+            rough.append(1 - abs(way) / path)
+            rises += way / path
+    # A digit that never changes tells nothing, but one at least must.
+    roughness = float(np.mean(rough)) if rough else 1.0
+    seen = number[lines.lit]
+    low, high = np.percentile(seen, (1, 99)) if seen.size else (0, 0)
+    return StripeReading(
+        spec.code, spec.base_bit, spec.bits, first, inverse, inverse_first, roughness, 1.0,
+        (int(low), int(high)), rises >= 0,
+    )  # fmt: skip
+
+
+def _pairs(count: int, inverse: Inverse) -> list[tuple[int, int]]:
+    if inverse == "interleaved":
+        return [(i, i + 1) for i in range(0, count - 1, 2)]
+    return [(i, i + count // 2) for i in range(count // 2)]
+
+
+def _is_inverse(lines: Lines, pictures: Sequence[int | None], inverse: Inverse) -> bool:
+    """Whether pictures and what would be their inverses go against each other."""
+    if len(pictures) % 2 or not pictures:
+        return False
+    against = total = 0.0
+    for i, j in _pairs(len(pictures), inverse):
+        one, other = pictures[i], pictures[j]
+        if one is None or other is None:
+            continue
+        a, b = lines.of(one) - 0.5, lines.of(other) - 0.5
+        against += float(np.mean(a * b))
+        total += float(np.mean(a * a) + np.mean(b * b)) / 2
+    return total > 0 and against / total < COMPLEMENT
+
+
+def _digits(
+    lines: Lines, pictures: Sequence[int | None], inverse: Inverse
+) -> list[NDArray[np.bool_]] | None:
+    """For each digit where its picture is bright, (lines, length); None when one cannot be told."""
+    if inverse == "none":
+        return [lines.values[p] > 0.5 for p in pictures if p is not None] if None not in pictures else None
+    found = []
+    for i, j in _pairs(len(pictures), inverse):
+        one, other = pictures[i], pictures[j]
+        if one is not None and other is not None:
+            found.append(lines.values[one] > lines.values[other])
+        elif one is not None:
+            found.append(lines.values[one] > 0.5)
+        elif other is not None:
+            found.append(lines.values[other] < 0.5)
+        else:
+            return None
+    return found

@@ -1,0 +1,188 @@
+"""Captures of other programs: pictures become a scan by a mapping, and a scan without calibration columns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dsl_core.devices.base import DeviceRig
+from dsl_core.devices.replay import ReplayCamera, ReplayProjector
+from dsl_core.errors import CalibrationError, StoreError
+from dsl_core.io import MANIFEST_NAME
+from dsl_core.io.pictures.mapping import Mapping
+from dsl_core.io.pictures.source import PictureScan, open_pictures
+from dsl_core.io.records import read_record
+from dsl_core.io.scan.check import require_complete
+from dsl_core.io.scan.folder import ScanReader, ScanWriter
+from dsl_core.io.scan.frame_store import checksum
+from dsl_core.io.scan.manifest import read_manifest
+from dsl_core.model.frames import Frame, FrameSource
+from dsl_core.model.result import Flag, build_result
+from dsl_core.model.rig import ProjectorResponse, Rig, Sensor
+from dsl_core.progress import NoProgress, Progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: Notes of a scan: from which pictures it was made, how they were mapped, what their numbers are.
+FINGERPRINT, MAPPING, SENSOR = "imported_fingerprint", "imported_mapping", "imported_sensor"
+#: Attribute of a result: why it has columns and no depth.
+NO_DEPTH = "no_depth"
+#: Electrons of a full pixel of common cameras; that of a stranger's camera is not known.
+FULL_WELL = 10_000.0
+#: Pixels are lit where white stands this many deviations above black.
+LIT_SIGMAS = 8.0
+
+
+def load_mapping(path: Path) -> Mapping:
+    """A mapping from its JSON file; raises `StoreError` that names the field that is wrong."""
+    return read_record(
+        path,
+        Mapping,
+        "Correct it, or let 'dsl-scan import FOLDER --guess' write one.",
+        called="The mapping",
+        fault="is not a mapping",
+    )
+
+
+def sensor_of(scan: PictureScan) -> Sensor:
+    """What is assumed of a camera that nobody described: the noise of a common one, no black level."""
+    return Sensor(
+        bayer=scan.mapping.bayer or "RGGB",
+        bit_depth=scan.bit_depth,
+        black_level_dn=0.0,
+        electrons_per_dn=FULL_WELL / 2**scan.bit_depth,
+        read_noise_dn=max(0.5, 2.0**scan.bit_depth / 2000),
+    )
+
+
+def import_pictures(
+    root: Path,
+    target: Path,
+    mapping: Mapping,
+    calibration: Rig | None = None,
+    progress: Progress | None = None,
+) -> PictureScan:
+    """Make a scan of a folder of pictures; an interrupted import resumes.
+
+    Without a calibration the scan tells columns, and depth once one is given to its reconstruction. Raises
+    `StoreError` naming the first picture that cannot be used, or when the target holds another scan, and
+    `CalibrationError` when the calibration is for other sizes.
+    """
+    source, progress = open_pictures(root, mapping), progress or NoProgress()
+    sensor = sensor_of(source)
+    rig = None if calibration is None else calibration.model_copy(update={"sensor": sensor})
+    if rig is not None:
+        _require_sizes(source, rig)
+    notes = {
+        "imported_from": root.absolute().name,
+        FINGERPRINT: source.fingerprint(),
+        MAPPING: mapping.model_dump_json(),
+        SENSOR: sensor.model_dump_json(),
+    }
+    if source.made_up:
+        notes["not_captured"] = f"{' and '.join(source.made_up)}, made of the extremes of all patterns"
+    _refuse_other_scan(root, target, notes[FINGERPRINT])
+    camera = ReplayCamera(source, sensor.bayer, sensor.bit_depth)
+    devices = DeviceRig("import", camera, ReplayProjector(source, 1000.0 / 60.0), calibration=rig)
+    with ScanWriter.open(target, source.plan, devices, notes) as writer:
+        _write(source, writer, progress)
+    return source
+
+
+def _write(source: PictureScan, writer: ScanWriter, progress: Progress) -> None:
+    before = -1
+    for shot in list(writer.missing()):
+        progress.report("import pictures", shot.index, source.plan.shot_count)
+        pixels = source.read(shot)
+        found = checksum(pixels)
+        # Two equal pictures are no stale frame here: drawn pictures have no noise.
+        attempts = 2 if found == before else 1
+        writer.write(shot, Frame(pixels, shot.exposure_ms, float(shot.index), shot.index + 1, attempts))
+        before = found
+
+
+def _require_sizes(source: PictureScan, rig: Rig) -> None:
+    plan = source.plan
+    wanted = (rig.camera.width_px, rig.camera.height_px), (rig.projector.width_px, rig.projector.height_px)
+    for what, given, size in zip(
+        ("pictures", "projector of the mapping"),
+        (plan.camera_size_px, plan.projector_size_px),
+        wanted,
+        strict=True,
+    ):
+        if tuple(given) != size:
+            raise CalibrationError(
+                f"The {what} of {source.root}: {given[0]} x {given[1]} px; the calibration {rig.name!r} is for"
+                f" {size[0]} x {size[1]} px. Give the calibration of these pictures, or import without one."
+            )
+
+
+def _refuse_other_scan(root: Path, target: Path, fingerprint: str) -> None:
+    if (target / MANIFEST_NAME).exists() and read_manifest(target).notes.get(FINGERPRINT) != fingerprint:
+        raise StoreError(
+            f"{target} contains a scan that does not come from the pictures of {root}, mapped like this."
+            " A scan is never replaced: choose another name."
+        )
+
+
+def with_own_sensor(reader: ScanReader, rig: Rig) -> Rig:
+    """A calibration with the sensor of imported pictures, whose numbers are not those of the rig's camera."""
+    noted = reader.manifest.notes.get(SENSOR)
+    return rig if noted is None else rig.model_copy(update={"sensor": Sensor.model_validate_json(noted)})
+
+
+@dataclass(frozen=True)
+class _Readout:
+    sensor: Sensor
+    projector_response: ProjectorResponse
+
+
+def is_import(reader: ScanReader) -> bool:
+    """Whether a scan was made of the pictures of another program."""
+    return SENSOR in reader.manifest.notes
+
+
+def decode_scan(folder: Path, progress: Progress | None = None) -> xr.Dataset:
+    """Columns, rows and flags of an imported scan without calibration, with the reason for no depth.
+
+    Raises `StoreError` when it is incomplete, `DecodeError` when its code cannot be read.
+    """
+    reader = ScanReader(folder)
+    require_complete(reader)
+    noted = reader.manifest.notes.get(SENSOR)
+    sensor = Sensor() if noted is None else Sensor.model_validate_json(noted)
+    result = decode_columns_of(reader, sensor, progress)
+    reason = (
+        "No calibration of camera and projector was given, so columns have no depth. Name one with"
+        " --calibration to reconstruct depth."
+    )
+    return result.assign_attrs({**reader.manifest.notes, "captured": reader.manifest.created, NO_DEPTH: reason})
+
+
+def decode_columns_of(source: FrameSource, sensor: Sensor, progress: Progress | None = None) -> xr.Dataset:
+    """Decoded columns (px, NaN where undecided) of any frames, their deviations, rows and flags."""
+    from dsl_core.reconstruction.merge import MergedScan, decode_columns
+
+    code, white = decode_columns(MergedScan(source, _Readout(sensor, ProjectorResponse())), progress)
+    lit = (white.radiance > LIT_SIGMAS * np.sqrt(white.variance)) | white.saturated
+    flags = np.where(lit, 0, int(Flag.NO_LIGHT)).astype(np.uint16)
+    flags[lit & code.undecided] |= np.uint16(int(Flag.CODE_UNSURE))
+    good = flags == 0
+    fine, std = code.fine_column_px, code.fine_std_px
+    if fine is None or std is None:
+        fine = code.likely_column.astype(np.float32)
+        std = np.full(fine.shape, 12**-0.5, np.float32)
+    nothing = np.full(fine.shape, np.nan, np.float32)
+    arrays = {
+        "depth_mm": nothing,
+        "column_px": np.where(good, fine, np.float32(np.nan)),
+        "column_std_px": np.where(good, std, np.float32(np.nan)),
+        "flags": flags,
+    }
+    if code.row is not None:
+        arrays["row_px"] = np.where(lit & (code.row >= 0), code.row, np.nan).astype(np.float32)
+    return build_result(arrays, np.empty(0), {"plan": source.plan.name})
