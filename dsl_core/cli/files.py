@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="FOLDER", help="A published dataset or calibration.")],
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="FOLDER", help="A published dataset or calibration, or pictures."),
+    ],
     target: Annotated[
         Path | None,
         typer.Option(
@@ -34,12 +37,30 @@ def import_(
     camera_size: Annotated[
         str, typer.Option("--camera-size", help="Image size of a published calibration.")
     ] = "890x580",
+    guess: Annotated[
+        bool,
+        typer.Option("--guess", help="Find out what the pictures show; writes the mapping."),
+    ] = False,
+    mapping: Annotated[
+        Path | None,
+        typer.Option("--mapping", help="MAPPING.json that says what the pictures show; written by --guess."),
+    ] = None,
+    projector: Annotated[
+        str | None, typer.Option("--projector", help="WIDTHxHEIGHT of the projector, for --guess.")
+    ] = None,
+    chosen: Annotated[
+        str | None, typer.Option("--set", help="Which of several captures in the folder, for --guess.")
+    ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Replace RIG.json; a scan is never replaced.")
+        bool, typer.Option("--force", help="Replace RIG.json or MAPPING.json; a scan is never replaced.")
     ] = False,
     json: Json = False,
 ) -> None:
-    """Import a published dataset or calibration; list what is missing or misnamed."""
+    """Import a published dataset or calibration, or the pictures of any structured-light program.
+
+    For the former, list what is missing or misnamed; for the latter, what each picture shows.
+    """
+    from dsl_core.cli.captures import PictureOptions, import_capture
     from dsl_core.io.published.calibration import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
@@ -47,7 +68,13 @@ def import_(
 
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
-    output, rig = Output(json), load_rig(base) if base else published_rig()
+    output = Output(json)
+    options = PictureOptions(guess, mapping, projector, chosen, force)
+    if options.is_asked_for:
+        import_capture(output, source, target, load_rig(base) if base else None, options)
+        output.finish()
+        return
+    rig = load_rig(base) if base else published_rig()
     if holds_calibration(source):
         _print_files(output, "calibration", check_calibration(source))
         if target is not None:
@@ -65,7 +92,11 @@ def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig)
     """The table comes first, so that it is printed even when the import is refused."""
     from dsl_core.workflows import exchange
 
-    _print_files(output, "dataset", exchange.import_scan(source, None, rig))
+    try:
+        records = exchange.import_scan(source, None, rig)
+    except StoreError as error:
+        raise StoreError(f"{error} Add --guess if the folder holds pictures of another program.") from error
+    _print_files(output, "dataset", records)
     if target is not None:
         with output.progress() as progress:
             exchange.import_scan(source, target, rig, progress)

@@ -67,6 +67,12 @@ def reconstruct(
     grid = parse_bands(bands)
     check_targets([target], overwrite=force, kind=RESULT_FOLDER)
     rig = load_calibration(calibration) if calibration else None
+    if rig is None and _tells_columns_only(session):
+        _decode(output, session, target, force)
+        return
+    if _is_import(session):
+        # Pictures of other programs have no frames of spectral patterns.
+        depth_only = True
     options = Options(
         grid,
         model,
@@ -91,6 +97,36 @@ def reconstruct(
     print_fit(output, result)
     output.say(f"{share:.1%} of the pixels have a depth. The result is saved in {target}")
     output.put(result=target, pixels_with_depth=share, wrong_pictures=doubts, pictures_not_judged=not_judged)
+    output.finish()
+
+
+def _is_import(session: Path) -> bool:
+    from dsl_core.io.scan.folder import ScanReader
+    from dsl_core.workflows.captures import is_import
+
+    return is_import(ScanReader(session))
+
+
+def _tells_columns_only(session: Path) -> bool:
+    """Whether a scan was made of another program's pictures, and nobody said where its devices stand."""
+    from dsl_core.io.scan.folder import ScanReader
+
+    return _is_import(session) and ScanReader(session).calibration is None
+
+
+def _decode(output: Output, session: Path, target: Path, force: bool) -> None:
+    from dsl_core.io.result.result_file import save_result
+    from dsl_core.workflows.captures import NO_DEPTH, decode_scan
+
+    with output.progress() as progress:
+        result = decode_scan(session, progress)
+        save_result(result, target, overwrite=force)
+    share = float(result["column_px"].notnull().mean())
+    output.say(str(result.attrs[NO_DEPTH]))
+    output.say(f"{share:.1%} of the pixels have a column. The result is saved in {target}")
+    output.put(
+        result=target, pixels_with_depth=0.0, pixels_with_column=share, no_depth=result.attrs[NO_DEPTH]
+    )
     output.finish()
 
 

@@ -63,8 +63,8 @@ class Stripes(Record):
 class Phases(Record):
     """Sinusoids of several periods, each shifted by equal steps over one period.
 
-    Frame ``k`` of a period ``p`` is ``0.5 + 0.5 cos(2 pi x / p + start + direction 2 pi k / steps)`` at column
-    or row ``x``; all steps of the first period come first.
+    Frame ``k`` of a period ``p`` is ``0.5 + 0.5 cos(2 pi x / p + start + direction 2 pi k / steps)`` at
+    column or row ``x``; all steps of the first period come first.
     """
 
     kind: Literal["phases"] = "phases"

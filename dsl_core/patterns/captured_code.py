@@ -93,4 +93,5 @@ def _counted(frames: Iterable[Measured], wanted: int) -> Iterator[Measured]:
 
 def _whole(reading: AxisReading, count: int) -> NDArray[np.int32]:
     # Stripes of an even number of columns have their middle between two.
-    return np.floor(reading.position_px + np.float32(0.5)).astype(np.int32).clip(0, count - 1)
+    nearest = np.floor(reading.position_px + np.float32(0.5))
+    return np.asarray(nearest.clip(0, count - 1), np.int32)

@@ -80,8 +80,8 @@ class DecodedCode:
     The rest only codes with fine stripes can say. ``straight``: the light comes straight from the projector.
     ``rival_column``, int32: what the other code of an ensemble says where the two disagree, else -1.
     ``at_edge``: two codes name neighbouring columns, ``likely_column`` and the next; the truth is between.
-    ``fine_column_px`` and ``fine_std_px``, float32: columns as codes of other programs tell them, which may be
-    finer or coarser than a column, and their deviation; None for our own codes.
+    ``fine_column_px`` and ``fine_std_px``, float32: columns as codes of other programs tell them, which may
+    be finer or coarser than a column, and their deviation; None for our own codes.
     """
 
     column: NDArray[np.int32]

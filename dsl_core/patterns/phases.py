@@ -20,6 +20,8 @@ from dsl_core.patterns.reading import AxisReading, Floats, Measured
 TURN = 2 * np.pi
 #: Error of a phase that no noise explains: uneven steps, a display that is not linear.
 MODEL_STD_RAD = 0.08
+#: How sure the edge of a stripe is, px.
+EDGE_PX = 0.3
 #: The second best count of periods must fit worse by this much chi-square.
 CLEARLY_WORSE = 9.0
 #: The best one fits when each phase is within so many deviations.
@@ -65,7 +67,9 @@ def read_phases(
             std = np.hypot(found[k][1], phase_std * period / spec.periods_px[k])
             misfit += (off / std) ** 2
         if coarse is not None:
-            misfit += ((here - coarse.position_px) / np.hypot(coarse.std_px, period * phase_std / TURN)) ** 2
+            # Anywhere in its stripe a pixel fits the stripe.
+            outside = np.abs(here - coarse.position_px) - np.float32(np.sqrt(3)) * coarse.std_px
+            misfit += (np.maximum(outside, 0) / np.hypot(EDGE_PX, period * phase_std / TURN)) ** 2
         misfit[(here < -0.5) | (here > count - 0.5)] = np.inf
         better = misfit < best
         second = np.where(better, best, np.minimum(second, misfit))

@@ -63,8 +63,8 @@ def _difference(frames: list[tuple[bool, Measured]], white: Measured) -> Measure
         (_, (one, one_variance)), (_, (other, other_variance)) = frames
         return one - other, one_variance + other_variance
     is_inverse, (value, variance) = frames[0]
-    above = value - white[0] / 2
-    return (-above if is_inverse else above), variance + white[1] / 4
+    above = np.asarray(value - white[0] / 2, np.float32)
+    return (-above if is_inverse else above), np.asarray(variance + white[1] / 4, np.float32)
 
 
 def _chance_of_turning(sigmas: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -116,8 +116,8 @@ def _require_sizes(source: PictureScan, rig: Rig) -> None:
     ):
         if tuple(given) != size:
             raise CalibrationError(
-                f"The {what} of {source.root}: {given[0]} x {given[1]} px; the calibration {rig.name!r} is for"
-                f" {size[0]} x {size[1]} px. Give the calibration of these pictures, or import without one."
+                f"The {what} of {source.root}: {given[0]} x {given[1]} px; the calibration {rig.name!r} is"
+                f" for {size[0]} x {size[1]} px. Give the calibration of these pictures, or none."
             )
 
 
@@ -160,7 +160,9 @@ def decode_scan(folder: Path, progress: Progress | None = None) -> xr.Dataset:
         "No calibration of camera and projector was given, so columns have no depth. Name one with"
         " --calibration to reconstruct depth."
     )
-    return result.assign_attrs({**reader.manifest.notes, "captured": reader.manifest.created, NO_DEPTH: reason})
+    return result.assign_attrs(
+        {**reader.manifest.notes, "captured": reader.manifest.created, NO_DEPTH: reason}
+    )
 
 
 def decode_columns_of(source: FrameSource, sensor: Sensor, progress: Progress | None = None) -> xr.Dataset:
@@ -176,13 +178,11 @@ def decode_columns_of(source: FrameSource, sensor: Sensor, progress: Progress | 
     if fine is None or std is None:
         fine = code.likely_column.astype(np.float32)
         std = np.full(fine.shape, 12**-0.5, np.float32)
-    nothing = np.full(fine.shape, np.nan, np.float32)
     arrays = {
-        "depth_mm": nothing,
         "column_px": np.where(good, fine, np.float32(np.nan)),
         "column_std_px": np.where(good, std, np.float32(np.nan)),
         "flags": flags,
     }
     if code.row is not None:
-        arrays["row_px"] = np.where(lit & (code.row >= 0), code.row, np.nan).astype(np.float32)
+        arrays["row_px"] = np.where(good & (code.row >= 0), code.row, np.nan).astype(np.float32)
     return build_result(arrays, np.empty(0), {"plan": source.plan.name})

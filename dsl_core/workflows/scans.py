@@ -30,6 +30,7 @@ from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
 from dsl_core.progress import Progress
+from dsl_core.workflows.captures import with_own_sensor
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +104,7 @@ def reconstruct_scan(
     require_complete(reader)
     if calibration is not None and not override_calibration:
         _require_conditions(folder, reader.manifest, calibration)
-    rig, options = calibration_of(reader, calibration), options or Options()
+    rig, options = with_own_sensor(reader, calibration_of(reader, calibration)), options or Options()
     watched = WatchedSource(reader)
     result = reconstruct(watched, rig, options, progress, timer)
     with timer.stage("compare frames with their patterns"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,7 +36,7 @@ class Scene:
         light = 0.8 * light + 0.1 * (np.roll(light, 1, 1) + np.roll(light, -1, 1))
         value = 0.03 + 0.9 * self.albedo * light
         value = value + np.random.default_rng(seed).normal(0, noise, value.shape)
-        return np.rint(value.clip(0, 1) * (2**bits - 1)).astype(np.uint16)
+        return np.asarray(np.rint(value.clip(0, 1) * (2**bits - 1)), np.uint16)
 
 
 def scene(camera: tuple[int, int] = CAMERA, projector: tuple[int, int] = PROJECTOR) -> Scene:
@@ -62,7 +62,8 @@ def frames(
     seed: int = 1,
 ) -> tuple[list[NDArray[np.uint16]], NDArray[np.uint16], NDArray[np.uint16]]:
     """Pictures of sets by axis, in the order of the code, then white and black."""
-    seen, out = scene(camera, projector), []
+    seen = scene(camera, projector)
+    out: list[NDArray[np.uint16]] = []
     for axis, each in sets:
         code = CapturedCode(column_sets=(each,)) if axis == "columns" else CapturedCode(row_sets=(each,))
         for index in range(each.frame_count):
@@ -74,7 +75,7 @@ def frames(
     return out, white, black
 
 
-def write(folder: Path, pictures: dict[str, NDArray[np.uint16]], bits: int = 8) -> Path:
+def write(folder: Path, pictures: Mapping[str, NDArray[np.integer]], bits: int = 8) -> Path:
     """Write pictures by their names, in the format of the ending; more than 8 bits need 16."""
     import cv2
 

@@ -80,7 +80,9 @@ def depth_files(path: Path, has_std: bool, has_flags: bool) -> list[Path]:
 
 
 def _depth_planes(result: xr.Dataset, format_name: str, path: Path) -> _Planes:
-    """What `depth_files` hold, each with a sentence that says so."""
+    """What `depth_files` hold, each with a sentence that says so; columns where there is no depth."""
+    if "depth_mm" not in result and "column_px" in result:
+        return _column_planes(result, path)
     require(result, format_name, "depth_mm")
     planes: list[tuple[str, NDArray[np.float32 | np.uint16]]] = [
         ("Depth along the camera axis, mm; NaN where there is no answer", plane(result, "depth_mm"))
@@ -92,3 +94,17 @@ def _depth_planes(result: xr.Dataset, format_name: str, path: Path) -> _Planes:
         bits = ", ".join(f"{int(flag)} {FLAG_NAMES[flag]}" for flag in Flag)
         planes.append((f"Flags, the sum of: {bits}", np.asarray(result["flags"].values, np.uint16)))
     return dict(zip(depth_files(path, has_std, has_flags), planes, strict=True))
+
+
+def _column_planes(result: xr.Dataset, path: Path) -> _Planes:
+    """Decoded columns and rows of a scan without calibration: ``NAME_column``, ``NAME_row`` and so on."""
+    named = {
+        "column": ("column_px", "Projector column, px; NaN where there is no answer"),
+        "column_std": ("column_std_px", "Standard deviation of the column, px"),
+        "row": ("row_px", "Projector row, px; NaN where there is no answer"),
+    }
+    return {
+        path.with_name(f"{path.stem}_{ending}{path.suffix}"): (title, plane(result, name))
+        for ending, (name, title) in named.items()
+        if name in result
+    }

@@ -81,7 +81,9 @@ def picture_files(folder: Path, patterns: Iterable[str], with_raw: bool = False)
         matches: list[Path] = []
         for count, path in enumerate(folder.glob(pattern)):
             if count >= MOST_ENTRIES:
-                raise StoreError(f"{folder} has more than {MOST_ENTRIES} files. Give the folder of one capture.")
+                raise StoreError(
+                    f"{folder} has more than {MOST_ENTRIES} files. Give the folder of one capture."
+                )
             if path.suffix.lower() in known and not path.name.startswith(".") and not path.is_dir():
                 matches.append(path)
         matches.sort(key=lambda path: natural(path.relative_to(folder).as_posix()))
@@ -239,7 +241,9 @@ def _own_code(code: CapturedCode, size_px: tuple[int, int]) -> CodeSet:
             return code
         if each.unit_px != 1 or each.bits != (length - 1).bit_length():
             return code
-    kinds = {(each.code, each.base_bit if each.code == "xor" else 0) for each in sets if isinstance(each, Stripes)}
+    kinds = {
+        (each.code, each.base_bit if each.code == "xor" else 0) for each in sets if isinstance(each, Stripes)
+    }
     rows = bool(code.row_sets)
     if kinds == {("gray", 0)}:
         return GrayCode(rows=rows)

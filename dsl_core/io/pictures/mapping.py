@@ -1,4 +1,4 @@
-"""How a folder of pictures is a structured-light capture: stated once, kept as JSON, used for many folders."""
+"""How a folder of pictures is a structured-light capture: stated once as JSON, used for many folders."""
 
 from __future__ import annotations
 

@@ -159,9 +159,9 @@ def _image(path: Path) -> NDArray[Any]:
             raise StoreError(f"{path} claims {width} x {height} px, which no camera has. Leave it out.")
         # Through memory, because OpenCV cannot open every path on Windows.
         found = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError, cv2.error) as error:
+    except (OSError, ValueError, SyntaxError, cv2.error) as error:
         raise _damaged(path) from error
-    except Warning as error:
+    except (Warning, Image.DecompressionBombError) as error:
         raise StoreError(f"{path} claims more pixels than a camera has. Leave it out.") from error
     if found is None:
         raise _damaged(path)
@@ -186,4 +186,6 @@ def _unread(path: Path, error: OSError) -> StoreError:
     reason = error.strerror or str(error)
     if error.errno == errno.ENOENT and path.is_symlink():
         reason = "it is a link to a file that does not exist"
-    return StoreError(f"{path} cannot be read ({reason}). Replace it with a plain picture file, or remove it.")
+    return StoreError(
+        f"{path} cannot be read ({reason}). Replace it with a plain picture file, or remove it."
+    )

@@ -61,7 +61,7 @@ class PictureScan:
         width, height = self.plan.camera_size_px
         if frame.shape != (height, width):
             raise StoreError(
-                f"{picture} is {frame.shape[1]} x {frame.shape[0]} px, the first picture {width} x {height} px."
+                f"{picture} is {frame.shape[1]} x {frame.shape[0]} px, the first {width} x {height} px."
                 " Name only pictures of one camera and size with files of the mapping."
             )
         return frame

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Literal
 
 import numpy as np
@@ -106,7 +106,9 @@ def read_phase_sets(
     With stripes one set is enough, whose fringes are then left to whoever knows the stripes (0).
     """
     sets = len(pictures) // steps
-    chosen = [pictures[k::sets] if order == "step" else pictures[k * steps : (k + 1) * steps] for k in range(sets)]
+    chosen = [
+        pictures[k::sets] if order == "step" else pictures[k * steps : (k + 1) * steps] for k in range(sets)
+    ]
     waves = [_wave(lines, each) for each in chosen]
     turns = _turns(waves, lines.pairs)
     if turns is None:
@@ -127,6 +129,26 @@ def read_phase_sets(
     off, _, _, fringes, start = ranked[0]
     rival = ranked[1][0] if len(ranked) > 1 else np.pi
     return PhaseReading(steps, order, fringes, start, direction, off, rival)
+
+
+def turns_per_number(
+    lines: Lines, pictures: Sequence[int], direction: Literal[1, -1], number: NDArray[np.int32]
+) -> tuple[float, float]:
+    """Periods of a sinusoid in one stripe, a power of two, and its start in degrees (of a quarter turn).
+
+    ``number`` (lines, length) is what stripes say.
+    """
+    phase = np.angle(_wave(lines, pictures)) * direction
+    change = np.angle(np.exp(1j * np.diff(phase, axis=-1))) / TURN
+    step = np.diff(number, axis=-1)
+    near = lines.pairs & (np.abs(step) <= 1)
+    turns = 2.0 ** np.round(np.log2(max(abs(change[near].sum()) / max(abs(step[near].sum()), 1), 1e-3)))
+    # At the edge of a stripe the column is known.
+    edge = near & (step == 1)
+    expected = TURN * turns * number[:, 1:]
+    between = phase[:, 1:] - np.pi * change
+    off = np.angle(np.exp(1j * (between - expected))[edge].mean()) if edge.any() else 0.0
+    return float(turns), float(90 * np.round(np.rad2deg(off) / 90))
 
 
 def _harmonic(values: NDArray[np.float32]) -> Complex:
@@ -170,7 +192,7 @@ def _fringes(turns: NDArray[np.float64]) -> Iterator[tuple[float, ...]]:
     if turns[order[0]] < ONE_FRINGE:
         # From coarse to fine each ratio is known better than to one half.
         fringes = np.ones(len(turns))
-        for lower, upper in zip(order, order[1:], strict=False):
+        for lower, upper in pairwise(order):
             fringes[upper] = max(np.round(turns[upper] / turns[lower] * fringes[lower]), 1.0)
         yield tuple(float(f) for f in fringes)
     finest = turns[order[-1]]

@@ -45,17 +45,17 @@ class Lines:
 
     def some(self, pictures: Sequence[int]) -> Floats:
         """Values of some lit pixels, (pictures, pixels)."""
-        return self._some[np.asarray(pictures)]
+        return np.asarray(self._some[np.asarray(pictures)])
 
     @cached_property
     def _some(self) -> Floats:
         lit = np.flatnonzero(self.lit)
         chosen = lit[:: max(lit.size // SOME, 1)]
-        return self.values.reshape(len(self.values), -1)[:, chosen]
+        return np.asarray(self.values.reshape(len(self.values), -1)[:, chosen])
 
     def of(self, picture: int) -> Floats:
         """Values of the lit pixels of one picture."""
-        return self.values[picture][self.lit]
+        return np.asarray(self.values[picture][self.lit])
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class ProbeTaker:
         self._across: list[Floats] = []
         self._down: list[Floats] = []
 
-    def add(self, grey: NDArray[np.floating]) -> None:
+    def add(self, grey: NDArray[np.number]) -> None:
         """Look at a picture (rows, columns); all must have one size."""
         rows, columns = (_places(length) for length in grey.shape)
         self._across.append(np.asarray(grey[rows], np.float32))

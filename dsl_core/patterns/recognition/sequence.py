@@ -51,6 +51,11 @@ class Recognised:
     blocks: tuple[Block, ...]
     misfit: float
 
+    @property
+    def axes(self) -> frozenset[Axis]:
+        """What is coded."""
+        return frozenset(block.axis for block in self.blocks if block.reading is not None)
+
 
 def recognise(probes: Probes, slots: Slots) -> Recognised | None:
     """The reading of a sequence of pictures that makes most sense, or None when none does."""
@@ -150,7 +155,7 @@ def _axis_votes(probes: Probes, pictures: Sequence[int | None]) -> NDArray[np.fl
 
 
 def _axis_blocks(probes: Probes, axis: Axis, slots: Sequence[int | None]) -> tuple[list[Block], float]:
-    """Blocks of a run of pictures that code one axis and how little they make sense; none when they do not."""
+    """Blocks of a run of pictures that code one axis, none if they do not, and what speaks against them."""
     lines = probes.across if axis == "columns" else probes.down
     present = [p for p in slots if p is not None]
     stripes = read_set(lines, slots)

@@ -24,10 +24,20 @@ COMPLEMENT = -0.6
 ROUGH = 0.45
 #: Fewer digits than this are smooth in every reading.
 FEWEST_BITS = 3
+#: Digits vary by this much where they are seen at all, and go together less than this.
+LEAST_VARIANCE, REPEATED = 0.04, 0.93
 #: Of two readings the second is this many times rougher, or which one it is stays unsure.
 CLEARLY_ROUGHER = 1.5
 #: A blurred digit adds nothing but noise, so rougher readings that only differ in it are as good.
 FLOOR = 5e-3
+
+
+_CODES: tuple[tuple[Literal["gray", "binary", "xor"], int], ...] = (
+    ("gray", 0),
+    ("binary", 0),
+    ("xor", 0),
+    ("xor", 1),
+)
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,22 @@ def read_set(lines: Lines, pictures: Sequence[int | None]) -> StripeReading | No
     return StripeReading(**{**vars(best), "rival": min(others, default=1.0)})
 
 
+def numbers_of(lines: Lines, pictures: Sequence[int | None], reading: StripeReading) -> NDArray[np.int32]:
+    """The numbers that a reading gives along the lines, (lines, length)."""
+    digits = _digits(lines, pictures, reading.inverse)
+    assert digits is not None
+    ordered = digits if reading.first == "most" else digits[::-1]
+    spec = Stripes(code=reading.code, bits=reading.bits, base_bit=reading.base_bit)
+    return number_of(spec, _word(lines, ordered, reading.inverse_first))
+
+
+def _word(lines: Lines, digits: Sequence[NDArray[np.bool_]], inverse_first: bool) -> NDArray[np.int32]:
+    word = np.zeros(lines.lit.shape, np.int32)
+    for digit in digits:
+        word = word << 1 | (digit != inverse_first)
+    return word
+
+
 def _preference(reading: StripeReading) -> tuple[float, bool, bool]:
     # Nearly equal ones: rising before falling, patterns before inverses.
     return round(reading.roughness / (2 * FLOOR)), not reading.rises, reading.inverse_first
@@ -79,10 +105,8 @@ def _readings(lines: Lines, pictures: Sequence[int | None]) -> Iterator[StripeRe
         for first in ("most", "least"):
             ordered = digits if first == "most" else digits[::-1]
             for inverse_first in (False, True):
-                word = np.zeros(lines.lit.shape, np.int32)
-                for digit in ordered:
-                    word = word << 1 | (digit != inverse_first)
-                for code, base in (("gray", 0), ("binary", 0), ("xor", 0), ("xor", 1)):
+                word = _word(lines, ordered, inverse_first)
+                for code, base in _CODES:
                     if base >= len(digits) or (code == "xor" and len(digits) < FEWEST_BITS + 1):
                         continue
                     spec = Stripes(code=code, bits=len(digits), base_bit=base)
@@ -137,12 +161,23 @@ def _is_inverse(lines: Lines, pictures: Sequence[int | None], inverse: Inverse) 
     return total > 0 and against / total < COMPLEMENT
 
 
-def _digits(
-    lines: Lines, pictures: Sequence[int | None], inverse: Inverse
-) -> list[NDArray[np.bool_]] | None:
+def _is_repeated(lines: Lines, pictures: Sequence[int]) -> bool:
+    """Whether one picture shows the same as another, or its inverse: no two digits of a number do."""
+    values = lines.some(pictures).astype(np.float64)
+    varied = values[values.var(axis=1) > LEAST_VARIANCE]
+    if len(varied) < 2:
+        return False
+    alike = np.abs(np.corrcoef(varied))
+    return bool((alike - np.eye(len(varied)) > REPEATED).any())
+
+
+def _digits(lines: Lines, pictures: Sequence[int | None], inverse: Inverse) -> list[NDArray[np.bool_]] | None:
     """For each digit where its picture is bright, (lines, length); None when one cannot be told."""
     if inverse == "none":
-        return [lines.values[p] > 0.5 for p in pictures if p is not None] if None not in pictures else None
+        present = [p for p in pictures if p is not None]
+        if len(present) < len(pictures) or _is_repeated(lines, present):
+            return None
+        return [lines.values[p] > 0.5 for p in present]
     found = []
     for i, j in _pairs(len(pictures), inverse):
         one, other = pictures[i], pictures[j]

@@ -1,0 +1,87 @@
+"""The part of the import command for pictures of other programs, by a guess or a mapping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from dsl_core.cli.options import parse_size
+from dsl_core.cli.output import Output
+
+if TYPE_CHECKING:
+    from dsl_core.io.pictures.mapping import Mapping
+    from dsl_core.model.rig import Rig
+
+#: What is left out of a table between its first and its last lines.
+HEAD_LINES, TAIL_LINES = 30, 10
+
+
+@dataclass(frozen=True)
+class PictureOptions:
+    """How the pictures of a folder are to be imported."""
+
+    guess: bool
+    mapping: Path | None
+    projector: str | None
+    chosen: str | None
+    force: bool
+
+    @property
+    def is_asked_for(self) -> bool:
+        """Whether the folder is one of pictures by any mapping."""
+        return self.guess or self.mapping is not None
+
+
+def import_capture(
+    output: Output, source: Path, target: Path | None, rig: Rig | None, options: PictureOptions
+) -> None:
+    """Say what every picture is; write the guessed mapping, and make a scan if there is a target."""
+    from dsl_core.io.pictures.arrange import arrange
+    from dsl_core.workflows import captures
+
+    if options.guess:
+        mapping = _guessed(output, source, rig, options)
+    else:
+        assert options.mapping is not None
+        mapping = captures.load_mapping(options.mapping)
+        _print(output, mapping, arrange(source, mapping).table)
+    if target is not None:
+        with output.progress() as progress:
+            captures.import_pictures(source, target, mapping, rig, progress)
+        output.say(f"Imported to {target}. Next: dsl-scan reconstruct {target} --depth-only")
+        output.put(imported=target)
+
+
+def _guessed(output: Output, source: Path, rig: Rig | None, options: PictureOptions) -> Mapping:
+    from dsl_core.io.pictures.guess import guess_mapping
+    from dsl_core.io.records import write_record
+
+    size = parse_size("--projector", options.projector) if options.projector else None
+    if size is None and rig is not None:
+        size = (rig.projector.width_px, rig.projector.height_px)
+    with output.progress() as progress:
+        guess = guess_mapping(source, size, options.chosen, progress)
+    _print(output, guess.mapping, guess.table)
+    path = options.mapping or Path(f"{source.absolute().name}.mapping.json")
+    write_record(path, guess.mapping, overwrite=options.force)
+    output.say(f"The mapping is saved in {path}; correct it there and use it with --mapping.")
+    output.put(mapping=path, others=list(guess.others))
+    return guess.mapping
+
+
+def _print(output: Output, mapping: Mapping, table: tuple[tuple[str, str], ...]) -> None:
+    lines = list(table)
+    if len(lines) > HEAD_LINES + TAIL_LINES + 1:
+        gap = [("...", f"{len(lines) - HEAD_LINES - TAIL_LINES} more")]
+        lines = [*lines[:HEAD_LINES], *gap, *lines[-TAIL_LINES:]]
+    output.table(("picture", "what it shows"), lines)
+    width, height = mapping.projector_size_px
+    output.say(f"{len(table)} pictures; projector {width} x {height} px.")
+    for sentence in mapping.unsure:
+        output.say(f"Unsure: {sentence}.")
+    output.put(
+        pictures=[{"file": name, "shows": words} for name, words in table],
+        unsure=list(mapping.unsure),
+        projector_px=[width, height],
+    )

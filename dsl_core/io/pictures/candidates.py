@@ -1,0 +1,128 @@
+"""Which pictures of a folder may be one capture: all of them, or those of one camera, pose or name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.arrange import natural, picture_files
+from dsl_core.io.pictures.picture_file import ARRAYS, Picture, pictures_in
+
+#: Fewer pictures are no code, more are several captures.
+FEWEST, MOST = 4, 512
+#: So many numbers may be absent from a row of names.
+MOST_ABSENT = 4
+#: Patterns of files that are tried, from the folder itself to folders in its folders.
+_EVERYTHING = (("*",), ("*", "*/*"), ("*", "*/*", "*/*/*"))
+_LAST_NUMBER = re.compile(r"\d+(?!.*\d)")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Pictures that may be one capture, None where a number is absent; ``files`` are globs that find them.
+
+    ``left_out`` counts pictures of the folder that belong to none or to another capture.
+    """
+
+    name: str
+    pictures: tuple[Picture | None, ...]
+    files: tuple[str, ...]
+    left_out: int
+
+    @property
+    def absent(self) -> tuple[int, ...]:
+        """Places of absent pictures."""
+        return tuple(i for i, picture in enumerate(self.pictures) if picture is None)
+
+
+def candidates(folder: Path) -> tuple[list[Candidate], list[Candidate]]:
+    """Captures that a folder may hold: all pictures as one, and each group of names as its own.
+
+    Raises `StoreError` when there are too few pictures.
+    """
+    files: list[Path] = []
+    for patterns in _EVERYTHING:
+        files = picture_files(folder, patterns)
+        if len(files) >= FEWEST or any(path.suffix.lower() in ARRAYS for path in files):
+            break
+    pictures = [picture for path in files for picture in pictures_in(path)]
+    if len(pictures) < FEWEST:
+        raise StoreError(
+            f"{folder} contains {len(pictures)} pictures (PNG, TIFF, JPEG, BMP, PGM or NPY); a capture has at"
+            f" least {FEWEST}. Give the folder of one capture, convert camera raw files to TIFF, or state raw"
+            " in a mapping."
+        )
+    groups: dict[str, list[Path]] = {}
+    for path in files:
+        groups.setdefault(_key(folder, path), []).append(path)
+    by_folder: dict[str, list[Path]] = {}
+    for path in files:
+        by_folder.setdefault(path.relative_to(folder).parent.as_posix(), []).append(path)
+    parts = list(by_folder.values()) if len(by_folder) > 1 else []
+    parts += [g for g in groups.values() if len(groups) > 1 and g not in parts]
+    whole = [] if len(pictures) > MOST else list(_variants(folder, files, files, folder.absolute().name))
+    without_strays = [path for group in groups.values() if len(group) > 1 for path in group]
+    if 0 < len(without_strays) < len(files) and len(without_strays) <= MOST:
+        whole += _variants(folder, without_strays, files, folder.absolute().name)
+    single = [
+        candidate
+        for group in sorted(parts, key=lambda g: natural(str(g[0])))
+        if FEWEST <= len(group) <= MOST
+        for candidate in _variants(folder, group, files, _name(folder, group))
+    ]
+    return whole, single
+
+
+def _variants(folder: Path, group: Sequence[Path], files: Sequence[Path], name: str) -> Iterator[Candidate]:
+    """The pictures as they are, and with absent ones where numbers lack."""
+    globs, left_out = _globs(folder, group), len(files) - len(group)
+    listed = [picture for path in group for picture in pictures_in(path)]
+    yield Candidate(name, tuple(listed), globs, left_out)
+    slots: list[Picture | None] = []
+    before: dict[str, int] = {}
+    for path in group:
+        key, number = _key(folder, path), _number(path)
+        if number is not None:
+            gap = number - before.get(key, number - 1) - 1
+            if not 0 <= gap <= MOST_ABSENT:
+                return
+            slots += [None] * gap
+            before[key] = number
+        slots.append(Picture(path))
+    absent = slots.count(None)
+    if 0 < absent <= MOST_ABSENT and len(listed) == len(group):
+        yield Candidate(name, tuple(slots), globs, left_out)
+
+
+def _globs(folder: Path, group: Sequence[Path]) -> tuple[str, ...]:
+    """The shortest patterns that find just these files in this order, or their names."""
+    names = [path.relative_to(folder).as_posix() for path in group]
+    first = names[0]
+    parent = first.rpartition("/")[0]
+    within = f"{parent}/" if parent else ""
+    key = _LAST_NUMBER.sub("*", first.rpartition("/")[2].rpartition(".")[0])
+    ending = first.rpartition(".")[2]
+    for patterns in (*_EVERYTHING, (f"{within}*",), (f"{within}{key}.{ending}",)):
+        if "[" not in patterns[-1] and picture_files(folder, patterns) == list(group):
+            return patterns
+    return tuple(names)
+
+
+def _key(folder: Path, path: Path) -> str:
+    name = path.relative_to(folder)
+    return f"{name.parent.as_posix()}/{_LAST_NUMBER.sub('#', path.stem)}{path.suffix.lower()}"
+
+
+def _number(path: Path) -> int | None:
+    found = _LAST_NUMBER.search(path.stem)
+    return int(found.group()) if found else None
+
+
+def _name(folder: Path, group: Sequence[Path]) -> str:
+    parents = {path.parent for path in group}
+    if len(parents) == 1 and group[0].parent != folder:
+        return group[0].relative_to(folder).parent.as_posix()
+    return _LAST_NUMBER.sub("", group[0].stem).strip(" _-.") or group[0].stem

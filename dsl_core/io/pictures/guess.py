@@ -1,0 +1,247 @@
+"""A mapping guessed from the pictures of a folder, and what of it is unsure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.arrange import arrange
+from dsl_core.io.pictures.candidates import Candidate, candidates
+from dsl_core.io.pictures.guessed_parts import guessed_size, part_of
+from dsl_core.io.pictures.mapping import Mapping
+from dsl_core.io.pictures.picture_file import load_values
+from dsl_core.model.rig import BayerPattern
+from dsl_core.patterns.recognition.probes import Probes, ProbeTaker
+from dsl_core.patterns.recognition.sequence import Recognised, recognise
+from dsl_core.progress import NoProgress, Progress
+
+#: A projector that lights less than this share of the camera's range is as good as off.
+LEAST_LIGHT = 0.02
+#: Readings worse than this make sense, but not much.
+DOUBTFUL = 0.8
+#: Mean values of the four places of a mosaic differ by at least this ratio, its two greens by less.
+MOSAIC_RATIO, GREEN_RATIO = 1.12, 1.05
+Size = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Guess:
+    """The mapping, what each file shows by it, what is unsure, and other captures in the same folder."""
+
+    mapping: Mapping
+    table: tuple[tuple[str, str], ...]
+    others: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Look:
+    """What reading all pictures of a candidate showed."""
+
+    probes: Probes
+    bit_depth: int | None
+    left_aligned: bool
+    full_scale: float | None
+    bayer: BayerPattern | None
+    notes: tuple[str, ...]
+
+
+def guess_mapping(
+    folder: Path,
+    projector_size_px: Size | None = None,
+    chosen: str | None = None,
+    progress: Progress | None = None,
+) -> Guess:
+    """Find out from the pictures how they are a capture; ``chosen`` names one of several in the folder.
+
+    Nothing is written. Raises `StoreError` that says what was found when the pictures make no sense.
+    """
+    if not folder.is_dir():
+        raise StoreError(f"{folder} is not a folder. Give the folder that contains the pictures.")
+    progress = progress or NoProgress()
+    whole, single = candidates(folder)
+    names = list(dict.fromkeys(each.name for each in single))
+    if chosen is not None:
+        single = [each for each in single if each.name == chosen]
+        if not single:
+            known = ", ".join(names) or "none"
+            raise StoreError(f"{folder} contains no set {chosen!r}; found were: {known}. Name one of these.")
+        whole = []
+    # A folder with a folder for each pose or camera holds many captures of the same kind.
+    order = [*single, *whole] if len(names) > 2 and _alike(single) else [*whole, *single]
+    best: tuple[Candidate, _Look, Recognised] | None = None
+    trouble: StoreError | None = None
+    for number, candidate in enumerate(order):
+        progress.report("look at the pictures", number, len(order))
+        try:
+            look = _look_at(candidate)
+        except StoreError as error:
+            trouble = trouble or error
+            continue
+        slots, count = [], 0
+        for picture in candidate.pictures:
+            slots.append(None if picture is None else count)
+            count += picture is not None
+        found = recognise(look.probes, tuple(slots))
+        if found is not None and (best is None or found.misfit < best[2].misfit):
+            best = candidate, look, found
+        if best is not None and best[2].misfit < DOUBTFUL and not _absent_next(order, number):
+            break
+    if best is not None and best[0] in whole and len(names) > 1:
+        best = _single_instead(best, single) or best
+    if best is None:
+        raise trouble or StoreError(
+            f"The pictures of {folder} make no sense as a capture: no order of white, black, stripes and"
+            " sinusoids lets their positions run steadily. Check that all are of one camera and scene, or"
+            " state a mapping."
+        )
+    return _guess_of(folder, *best, projector_size_px, names)
+
+
+def _single_instead(
+    best: tuple[Candidate, _Look, Recognised], single: Sequence[Candidate]
+) -> tuple[Candidate, _Look, Recognised] | None:
+    """The first of several sets where it codes all that they code together, as with two cameras."""
+    first = single[0]
+    try:
+        look = _look_at(first)
+    except StoreError:
+        return None
+    found = None if None in first.pictures else recognise(look.probes, tuple(range(len(first.pictures))))
+    if found is None or found.misfit > DOUBTFUL or found.axes != best[2].axes:
+        return None
+    # Stripes in one folder and the sinusoids that they count in another belong together.
+    return (first, look, found) if _alike(single) else None
+
+
+def _alike(single: Sequence[Candidate]) -> bool:
+    return len({len(each.pictures) for each in single}) == 1
+
+
+def _absent_next(order: Sequence[Candidate], number: int) -> bool:
+    """Whether the next candidate is this one with absent pictures."""
+    return number + 1 < len(order) and order[number + 1].files == order[number].files
+
+
+def _look_at(candidate: Candidate) -> _Look:
+    taker, bits, most, floats = ProbeTaker(), 0, 0.0, False
+    shape: tuple[int, ...] | None = None
+    brightest: tuple[float, NDArray[np.float32]] | None = None
+    colour = is_wide = False
+    for picture in candidate.pictures:
+        if picture is None:
+            continue
+        values = load_values(picture)
+        if shape is not None and values.shape[:2] != shape[:2]:
+            raise StoreError(
+                f"{picture} is {values.shape[1]} x {values.shape[0]} px, the first picture {shape[1]} x"
+                f" {shape[0]} px. Keep pictures of one camera and size in a folder, or state a mapping."
+            )
+        shape, colour = values.shape, colour or values.ndim == 3
+        floats = floats or values.dtype.kind == "f"
+        most = max(most, float(values.max()))
+        if values.dtype.kind in "ui":
+            bits |= int(np.bitwise_or.reduce(values.ravel()))
+            is_wide = is_wide or values.dtype.itemsize > 1
+        grey = np.asarray(values.mean(axis=2) if values.ndim == 3 else values, np.float32)
+        if brightest is None or grey.mean() > brightest[0]:
+            brightest = float(grey.mean()), grey
+        taker.add(grey)
+    assert brightest is not None
+    depth, aligned = _depth_of(bits, most, is_wide, floats)
+    scale = most if floats else float((1 << (16 if aligned else depth or 8)) - 1)
+    probes = taker.finish(max(scale, 1e-9))
+    if probes.range_share < LEAST_LIGHT:
+        raise StoreError(
+            f"The pictures of {candidate.name} change by {probes.range_share:.1%} of their range: no"
+            " projector's light is seen. Give the folder of a capture, or expose longer."
+        )
+    notes = ["JPEG has changed values near edges of stripes"] if _has_jpeg(candidate) else []
+    bayer = None if colour else _bayer_of(brightest[1])
+    if bayer is not None:
+        notes.append(
+            f"neighbouring pixels look like a colour mosaic; {bayer} is assumed (red and blue unsure)"
+        )
+    return _Look(probes, depth, aligned, most if floats else None, bayer, tuple(notes))
+
+
+def _depth_of(bits: int, most: float, is_wide: bool, floats: bool) -> tuple[int | None, bool]:
+    """Bit depth and whether values are at the upper end of 16 bits, from all bits that occur."""
+    if floats:
+        return 16, False
+    if not is_wide:
+        return None, False
+    for depth in (10, 12):
+        if most < 2**depth:
+            return depth, False
+    for depth in (10, 12):
+        if bits % 2 ** (16 - depth) == 0:
+            return depth, True
+    return 16, False
+
+
+def _bayer_of(picture: NDArray[np.float32]) -> BayerPattern | None:
+    means = np.array([[picture[r::2, c::2].mean() for c in (0, 1)] for r in (0, 1)])
+    if means.min() <= 0 or means.max() / means.min() < MOSAIC_RATIO:
+        return None
+    ratios = [max(a, b) / min(a, b) for a, b in ((means[0, 1], means[1, 0]), (means[0, 0], means[1, 1]))]
+    if min(ratios) > GREEN_RATIO:
+        return None
+    return "RGGB" if ratios[0] < ratios[1] else "GRBG"
+
+
+def _has_jpeg(candidate: Candidate) -> bool:
+    return any(p is not None and p.path.suffix.lower() in {".jpg", ".jpeg"} for p in candidate.pictures)
+
+
+def _guess_of(
+    folder: Path,
+    candidate: Candidate,
+    look: _Look,
+    found: Recognised,
+    size_px: Size | None,
+    names: Sequence[str],
+) -> Guess:
+    unsure = list(look.notes)
+    size, doubt = (size_px, "") if size_px else guessed_size(found.blocks)
+    parts = []
+    for block in found.blocks:
+        part, doubts = part_of(block, found.blocks, size, look.probes)
+        parts.append(part)
+        unsure += doubts
+    if doubt:
+        unsure.append(doubt)
+    if found.misfit > DOUBTFUL:
+        unsure.append("positions run less steadily than usual; compare the table with what was projected")
+    others = [name for name in names if name != candidate.name] if candidate.left_out else []
+    if candidate.absent:
+        unsure.append(f"by their numbers {len(candidate.absent)} pictures are absent")
+    if others:
+        unsure.append(f"there are other sets ({_few(others)}): name one with --set")
+    elif candidate.left_out:
+        unsure.append(f"{candidate.left_out} pictures do not belong to the code and are not used")
+    kinds = {block.kind for block in found.blocks}
+    lacking = [name for name in ("white", "black") if name not in kinds]
+    if lacking:
+        unsure.append(f"there is no {' and no '.join(lacking)} picture: extremes of the others stand for it")
+    mapping = Mapping(
+        name=candidate.name,
+        files=candidate.files,
+        parts=tuple(parts),
+        missing=candidate.absent,
+        projector_size_px=size,
+        bayer=look.bayer,
+        bit_depth=look.bit_depth,
+        left_aligned=look.left_aligned,
+        full_scale=look.full_scale,
+        unsure=tuple(unsure),
+    )
+    return Guess(mapping, arrange(folder, mapping).table, tuple(others))
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")

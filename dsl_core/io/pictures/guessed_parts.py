@@ -1,0 +1,129 @@
+"""From what pictures show to the parts of a mapping, and to the size of the projector they may come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dsl_core.io.pictures.mapping import BlackPicture, Part, PhasePictures, StripePictures, WhitePicture
+from dsl_core.patterns.recognition.phase_sets import PhaseReading, turns_per_number
+from dsl_core.patterns.recognition.probes import Probes
+from dsl_core.patterns.recognition.sequence import Block
+from dsl_core.patterns.recognition.stripe_sets import StripeReading, numbers_of
+
+#: Sizes of projectors, the commonest first.
+COMMON_PX = (
+    (1024, 768), (1280, 800), (1920, 1080), (1280, 720), (800, 600), (854, 480), (640, 360), (640, 480),
+    (912, 1140), (608, 684), (1140, 912), (1400, 1050), (1600, 1200), (1920, 1200), (2560, 1600),
+    (3840, 2160),
+)  # fmt: skip
+#: Phases disagree by so many times more with the next reading, or which one it is stays unsure.
+CLEARLY_WORSE = 2.0
+Size = tuple[int, int]
+
+
+def guessed_size(blocks: Sequence[Block]) -> tuple[Size, str]:
+    """A projector that has the digits that were seen, and a sentence of how sure that is."""
+    need: dict[str, tuple[int, int]] = {}
+    has_phases = {block.axis for block in blocks if block.kind == "phases"}
+    for block in blocks:
+        if isinstance(block.reading, StripeReading) and block.axis not in has_phases:
+            need[block.axis] = (block.reading.bits, block.reading.numbers[1])
+    wanted = [need.get("columns"), need.get("rows")]
+    if not need:
+        return COMMON_PX[
+            0
+        ], "phases do not say the size of the projector: 1024 x 768 is assumed; give --projector"
+    for size in COMMON_PX:
+        fits = [
+            each is None or ((length - 1).bit_length() == each[0] and each[1] < length)
+            for each, length in zip(wanted, size, strict=True)
+        ]
+        if all(fits):
+            break
+    else:
+        first, second = (2 ** each[0] if each else None for each in wanted)
+        size = first or (second or 768) * 4 // 3, second or (first or 1024) * 3 // 4
+    seen = " and ".join(f"{bits} bits of {axis} up to {most}" for axis, (bits, most) in need.items())
+    return size, f"{seen} were seen: a projector of {size[0]} x {size[1]} px is assumed; give --projector"
+
+
+def part_of(block: Block, blocks: Sequence[Block], size_px: Size, probes: Probes) -> tuple[Part, list[str]]:
+    """The part of a mapping for a block, and sentences about what is unsure."""
+    if isinstance(block.reading, StripeReading):
+        return _stripes(block, block.reading, blocks, size_px)
+    if isinstance(block.reading, PhaseReading):
+        return _phases(block, block.reading, blocks, size_px, probes)
+    return (WhitePicture() if block.kind == "white" else BlackPicture()), []
+
+
+def _stripes(
+    block: Block, reading: StripeReading, blocks: Sequence[Block], size_px: Size
+) -> tuple[Part, list[str]]:
+    length = size_px[0] if block.axis == "columns" else size_px[1]
+    unit = _unit(reading, length)
+    # Several programs put the middle of the numbers in the middle of the projector.
+    spare = 2**reading.bits - -(-length // unit)
+    offset = spare // 2 if reading.numbers[1] * unit >= length and spare > 0 else 0
+    doubts = []
+    if offset:
+        doubts.append(
+            f"numbers of {block.axis} exceed {length}: they are taken to be centred on the projector"
+        )
+    if not reading.is_sure:
+        doubts.append(f"{block.axis}: another code or order of digits fits nearly as well")
+    if not reading.rises:
+        doubts.append(f"{block.axis} fall along the picture: camera or projector may be mirrored")
+    part = StripePictures(
+        axis=block.axis,
+        code=reading.code,
+        bits=reading.bits,
+        first=reading.first,
+        inverse=reading.inverse,
+        inverse_first=reading.inverse_first,
+        unit_px=unit,
+        offset=offset,
+        base_bit=reading.base_bit,
+    )
+    return part, doubts
+
+
+def _unit(reading: StripeReading, length: int) -> int:
+    """Width of a stripe of one number: all numbers together just cover the projector."""
+    return max(-(-length // (1 << reading.bits)), 1)
+
+
+def _phases(
+    block: Block, reading: PhaseReading, blocks: Sequence[Block], size_px: Size, probes: Probes
+) -> tuple[Part, list[str]]:
+    length = size_px[0] if block.axis == "columns" else size_px[1]
+    fringes, start, doubts = reading.fringes, reading.start_deg, []
+    stripes = next((b for b in blocks if b.axis == block.axis and isinstance(b.reading, StripeReading)), None)
+    pictures = [p for p in block.slots if p is not None]
+    lines = probes.across if block.axis == "columns" else probes.down
+    if stripes is not None and isinstance(stripes.reading, StripeReading):
+        number = numbers_of(lines, stripes.slots, stripes.reading)
+        turns, start = turns_per_number(lines, pictures[: reading.steps], reading.direction, number)
+        fringes = (length / _unit(stripes.reading, length) * turns,)
+        if len(reading.fringes) > 1:
+            fringes = tuple(fringes[0] * each / reading.fringes[0] for each in reading.fringes)
+    elif np.min(fringes) == 1.0:
+        doubts.append(f"the coarsest sinusoid of {block.axis} is taken to be one period over the projector")
+    else:
+        shown = ", ".join(f"{each:g}" for each in fringes)
+        doubts.append(f"{block.axis}: {shown} fringes over the projector fit best, multiples fit as well")
+    if fringes == (0.0,):
+        fringes = (1.0,)
+        doubts.append(f"{block.axis}: one set of sinusoids alone does not say which period a pixel is in")
+    if stripes is None and reading.rival_rad < CLEARLY_WORSE * reading.off_rad:
+        doubts.append(f"{block.axis}: where the sinusoids start ({start:g} degrees) is unsure")
+    part = PhasePictures(
+        axis=block.axis,
+        fringes=fringes,
+        steps=reading.steps,
+        order=reading.order,
+        start_deg=start,
+        direction=reading.direction,
+    )
+    return part, doubts

@@ -1,0 +1,102 @@
+"""A mapping says which picture is which frame; what is missing or too much is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.arrange import Arrangement, arrange, natural, picture_files
+from dsl_core.io.pictures.mapping import Mapping, Part, PhasePictures, Skipped, StripePictures, WhitePicture
+from dsl_core.model.captured_code import CapturedCode, Phases, Stripes
+from dsl_core.model.plan import GrayCode, XorCode
+from tests.cases.foreign_captures import write
+
+SIZE = (8, 4)
+
+
+def _folder(tmp_path: Path, names: list[str]) -> Path:
+    return write(tmp_path / "set", {name: np.full((3, 4), i, np.uint16) for i, name in enumerate(names)})
+
+
+def _arranged(
+    folder: Path, *parts: Part, missing: tuple[int, ...] = (), files: tuple[str, ...] = ("*",)
+) -> Arrangement:
+    return arrange(folder, Mapping(parts=parts, projector_size_px=SIZE, missing=missing, files=files))
+
+
+def _order(found: Arrangement) -> list[str]:
+    return [picture.path.stem for picture in found.frames]
+
+
+def test_names_are_sorted_as_a_person_counts(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"im{i}.png" for i in range(12)])
+    assert [path.stem for path in picture_files(folder, ("*",))] == [f"im{i}" for i in range(12)]
+    assert natural("im10") > natural("im9")
+
+
+@pytest.mark.parametrize(
+    ("part", "order"),
+    [
+        (StripePictures(bits=3), "012345"),
+        (StripePictures(bits=3, first="least"), "452301"),
+        (StripePictures(bits=3, inverse="after"), "031425"),
+        (StripePictures(bits=3, inverse_first=True), "103254"),
+    ],
+)
+def test_digits_come_in_the_order_of_the_code(tmp_path: Path, part: StripePictures, order: str) -> None:
+    found = _arranged(_folder(tmp_path, [f"{i}.png" for i in range(6)]), part)
+    assert "".join(_order(found)) == order
+    assert found.code == GrayCode(rows=False)
+
+
+def test_steps_come_set_by_set(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"{i}.png" for i in range(6)])
+    found = _arranged(folder, PhasePictures(fringes=(1, 4), steps=3, order="step"))
+    assert "".join(_order(found)) == "024135"
+    assert found.code == CapturedCode(column_sets=(Phases(periods_px=(8.0, 2.0), steps=3),))
+
+
+def test_parts_may_name_their_own_files_and_skip_others(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, ["full.png", *(f"c{i}.png" for i in range(6)), "r0.png", "r1.png", "room.png"])
+    found = _arranged(
+        folder,
+        StripePictures(axis="rows", bits=2, inverse="none", files=("r[0-9].png",)),
+        StripePictures(bits=3, files=("c*.png",)),
+        WhitePicture(files=("full.png",)),
+        Skipped(),
+    )
+    assert _order(found) == ["c0", "c1", "c2", "c3", "c4", "c5", "r0", "r1"]
+    assert found.white is not None
+    assert found.white.path.stem == "full"
+    assert found.code == CapturedCode(
+        column_sets=(Stripes(bits=3),), row_sets=(Stripes(bits=2, inverse=False),)
+    )
+
+
+def test_absent_pictures_leave_their_digit_to_the_other(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"{i}.png" for i in (0, 1, 2, 4, 5)])
+    found = _arranged(folder, StripePictures(bits=3), missing=(3,))
+    assert found.code == CapturedCode(column_sets=(Stripes(bits=3, lacking=(3,)),))
+    assert ("-", "columns, gray bit 1 inverse: missing") in found.table
+    with pytest.raises(StoreError, match=r"has 5 pictures where the mapping wants 6.*begins with columns"):
+        _arranged(folder, StripePictures(bits=3))
+    with pytest.raises(StoreError, match="missing of the mapping must name places 0 to 5"):
+        _arranged(folder, StripePictures(bits=3), missing=(9,))
+
+
+def test_an_xor_code_as_ours_is_ours(tmp_path: Path) -> None:
+    folder = _folder(tmp_path, [f"{i}.png" for i in range(6)])
+    found = _arranged(folder, StripePictures(bits=3, code="xor", base_bit=1))
+    assert found.code == XorCode(rows=False, base_px=4)
+
+
+def test_a_mapping_cannot_leave_its_folder_or_code_nothing() -> None:
+    for name in ("../*", "/etc/*", "a/../../b.png", "C:/x.png"):
+        with pytest.raises(ValidationError, match="inside the folder"):
+            Mapping(parts=(StripePictures(bits=3),), projector_size_px=SIZE, files=(name,))
+    with pytest.raises(ValidationError, match="nothing is coded"):
+        Mapping(parts=(WhitePicture(),), projector_size_px=SIZE)

@@ -1,0 +1,102 @@
+"""A folder of a stranger is taken in by what its pictures show; what that leaves open is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.guess import guess_mapping
+from dsl_core.io.pictures.mapping import BlackPicture, PhasePictures, StripePictures, WhitePicture
+from dsl_core.model.captured_code import Phases, Stripes
+from tests.cases.foreign_captures import PROJECTOR, frames, write
+
+Pictures = list[NDArray[np.uint16]]
+
+
+@pytest.fixture(scope="module")
+def gray() -> Pictures:
+    """Columns with inverse, then white and black."""
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    return [*pictures, white, black]
+
+
+def test_the_mapping_finds_its_files_and_says_what_they_are(tmp_path: Path, gray: Pictures) -> None:
+    folder = write(tmp_path / "scan", {f"im{i + 1}.bmp": p for i, p in enumerate(gray)})
+    guess = guess_mapping(folder)
+    assert guess.mapping.files == ("*",)
+    assert guess.mapping.parts == (StripePictures(bits=7), WhitePicture(), BlackPicture())
+    assert guess.table[0] == ("im1.bmp", "columns, gray bit 6")
+    assert guess.table[-1] == ("im16.bmp", "black")
+    assert guess.mapping.projector_size_px == (128, 96)
+    assert any("7 bits of columns up to 12" in sentence for sentence in guess.mapping.unsure)
+
+
+def test_one_of_two_cameras_is_taken_and_the_other_named(tmp_path: Path, gray: Pictures) -> None:
+    pictures = {f"cam{c}_{i:02d}.png": p for c in (1, 2) for i, p in enumerate(gray)}
+    folder = write(tmp_path, pictures)
+    guess = guess_mapping(folder, PROJECTOR)
+    assert guess.mapping.files == ("cam1_*.png",)
+    assert guess.others == ("cam2",)
+    assert guess_mapping(folder, PROJECTOR, "cam2").mapping.files == ("cam2_*.png",)
+    with pytest.raises(StoreError, match="no set 'left'; found were: cam1, cam2"):
+        guess_mapping(folder, PROJECTOR, "left")
+
+
+def test_lights_and_axes_may_be_in_folders_of_their_own(tmp_path: Path, gray: Pictures) -> None:
+    pictures = {f"v/{i}.png": p for i, p in enumerate(gray[:14])} | {"w.png": gray[14], "b.png": gray[15]}
+    guess = guess_mapping(write(tmp_path, pictures), PROJECTOR)
+    assert guess.mapping.files == ("*", "*/*")
+    assert [part.kind for part in guess.mapping.parts] == ["black", "white", "stripes"]
+
+
+def test_an_absent_number_is_seen(tmp_path: Path, gray: Pictures) -> None:
+    folder = write(tmp_path, {f"im{i}.png": p for i, p in enumerate(gray) if i != 5})
+    mapping = guess_mapping(folder, PROJECTOR).mapping
+    assert mapping.missing == (5,)
+    assert any("1 pictures are absent" in sentence for sentence in mapping.unsure)
+
+
+def test_bit_depth_and_alignment_are_read_from_the_values(tmp_path: Path) -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))], 12)
+    named = {f"{i}.tif": p << 4 for i, p in enumerate([white, black, *pictures])}
+    mapping = guess_mapping(write(tmp_path, named, 12), PROJECTOR).mapping
+    assert (mapping.bit_depth, mapping.left_aligned) == (12, True)
+
+
+def test_stripes_count_the_periods_of_a_sinusoid(tmp_path: Path) -> None:
+    sets: list[tuple[str, Stripes | Phases]] = [
+        ("columns", Stripes(bits=4, inverse=False, unit_px=8)),
+        ("columns", Phases(periods_px=(16.0,), steps=4, start_deg=-90)),
+    ]
+    pictures, white, black = frames(sets)
+    mapping = guess_mapping(
+        write(tmp_path, {f"{i}.png": p for i, p in enumerate([white, black, *pictures])}), PROJECTOR
+    ).mapping
+    stripes, phases = mapping.parts[2:]
+    assert isinstance(stripes, StripePictures)
+    assert isinstance(phases, PhasePictures)
+    assert stripes.unit_px == 8
+    assert (phases.fringes, phases.start_deg) == ((8.0,), -90.0)
+
+
+def test_folders_of_no_capture_end_in_a_sentence(tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(StoreError, match=r"contains 0 pictures .*convert camera raw files"):
+        guess_mapping(empty)
+    with pytest.raises(StoreError, match="is not a folder"):
+        guess_mapping(tmp_path / "nowhere")
+    rng = np.random.default_rng(5)
+    holiday = {f"{i}.png": rng.integers(0, 255, (30, 40), np.uint16) for i in range(8)}
+    with pytest.raises(StoreError, match="make no sense as a capture"):
+        guess_mapping(write(tmp_path / "holiday", holiday))
+    dark = {f"{i}.png": np.full((30, 40), 20, np.uint16) for i in range(8)}
+    with pytest.raises(StoreError, match="no projector's light is seen"):
+        guess_mapping(write(tmp_path / "dark", dark))
+    sizes = {f"{i}.png": np.zeros((30, 40 + i), np.uint16) for i in range(8)}
+    with pytest.raises(StoreError, match=r"1\.png is 41 x 30 px, the first picture 40 x 30"):
+        guess_mapping(write(tmp_path / "sizes", sizes))

@@ -1,0 +1,92 @@
+"""Pictures in any format become whole numbers; what is no picture ends in a sentence with its name."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import StoreError
+from dsl_core.io.pictures.mapping import Mapping, RawLayout, StripePictures
+from dsl_core.io.pictures.picture_file import Picture, load_mosaic, load_values, pictures_in
+from tests.cases.foreign_captures import write
+
+MAPPING = Mapping(parts=(StripePictures(bits=3),), projector_size_px=(8, 4))
+GREY = np.arange(12, dtype=np.uint16).reshape(3, 4) * 20
+
+
+@pytest.mark.parametrize("ending", ["png", "tif", "bmp", "pgm", "npy"])
+def test_every_lossless_format_keeps_its_values(tmp_path: Path, ending: str) -> None:
+    write(tmp_path, {f"a.{ending}": GREY})
+    assert np.array_equal(load_mosaic(Picture(tmp_path / f"a.{ending}"), MAPPING, 8), GREY)
+
+
+def test_colour_becomes_grey_or_one_channel(tmp_path: Path) -> None:
+    rgb = np.stack([GREY, GREY + 3, GREY + 6], axis=-1)
+    np.save(tmp_path / "a.npy", rgb)
+    write(tmp_path, {"a.png": rgb[..., ::-1]})
+    for name in ("a.npy", "a.png"):
+        picture = Picture(tmp_path / name)
+        assert np.array_equal(load_mosaic(picture, MAPPING, 8), GREY + 3)
+        assert np.array_equal(load_mosaic(picture, MAPPING.model_copy(update={"channel": "red"}), 8), GREY)
+
+
+def test_bits_are_moved_to_the_lower_end_and_floats_scaled(tmp_path: Path) -> None:
+    write(tmp_path, {"a.tif": GREY << 4}, 12)
+    np.save(tmp_path / "f.npy", GREY / 255)
+    aligned = MAPPING.model_copy(update={"left_aligned": True})
+    assert np.array_equal(load_mosaic(Picture(tmp_path / "a.tif"), aligned, 12), GREY)
+    scaled = MAPPING.model_copy(update={"full_scale": 1.0})
+    assert np.array_equal(load_mosaic(Picture(tmp_path / "f.npy"), scaled, 8), GREY)
+    with pytest.raises(StoreError, match=r"a\.tif holds values up to 3520, more than 8 bits have"):
+        load_mosaic(Picture(tmp_path / "a.tif"), MAPPING, 8)
+
+
+def test_one_array_may_hold_all_pictures(tmp_path: Path) -> None:
+    wide = np.tile(GREY, 2)
+    np.save(tmp_path / "all.npy", np.stack([wide + i for i in range(5)]))
+    found = pictures_in(tmp_path / "all.npy")
+    assert len(found) == 5
+    assert np.array_equal(load_values(found[3]), wide + 3)
+
+
+def test_raw_pixels_need_their_layout_and_size(tmp_path: Path) -> None:
+    (tmp_path / "a.raw").write_bytes(b"head" + GREY.astype(">u2").tobytes())
+    layout = RawLayout(width_px=4, height_px=3, header_bytes=4, big_endian=True)
+    assert np.array_equal(load_values(Picture(tmp_path / "a.raw"), layout), GREY)
+    with pytest.raises(StoreError, match=r"a\.raw holds pixels without their size. State raw"):
+        load_values(Picture(tmp_path / "a.raw"))
+    with pytest.raises(StoreError, match=r"a\.raw has 28 bytes, 36 are wanted for 4 x 4 px"):
+        load_values(Picture(tmp_path / "a.raw"), RawLayout(width_px=4, height_px=4, header_bytes=4))
+
+
+def test_what_is_no_picture_is_named(tmp_path: Path) -> None:
+    (tmp_path / "cut.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"0" * 40)
+    (tmp_path / "empty.bmp").write_bytes(b"")
+    (tmp_path / "gone.png").symlink_to(tmp_path / "nowhere.png")
+    os.mkfifo(tmp_path / "pipe.png")
+    np.save(tmp_path / "text.npy", np.array([["a", "b"]]))
+    for name, what in (
+        ("cut.png", "cannot be decoded"),
+        ("empty.bmp", "cannot be decoded"),
+        ("gone.png", "a link to a file that does not exist"),
+        ("pipe.png", "it is a pipe or a device"),
+        ("text.npy", "does not hold numbers"),
+    ):
+        with pytest.raises(StoreError, match=rf"{name}.*{what}"):
+            load_values(Picture(tmp_path / name))
+
+
+def test_a_small_file_that_claims_a_huge_picture_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", 60000, 60000, 8, 0, 0, 0, 0)
+    data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+    (tmp_path / "bomb.png").write_bytes(data)
+    with pytest.raises(StoreError, match=r"bomb\.png claims .*camera has"):
+        load_values(Picture(tmp_path / "bomb.png"))

@@ -1,0 +1,92 @@
+"""From pictures in any order of white, black, digits and steps: what each of them shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.model.captured_code import Phases, Stripes
+from dsl_core.patterns.recognition.phase_sets import PhaseReading
+from dsl_core.patterns.recognition.probes import ProbeTaker
+from dsl_core.patterns.recognition.sequence import Recognised, Slots, recognise
+from dsl_core.patterns.recognition.stripe_sets import StripeReading
+from tests.cases.foreign_captures import frames
+
+Pictures = list[NDArray[np.uint16]]
+Arrange = Callable[[Pictures, NDArray[np.uint16], NDArray[np.uint16]], Pictures]
+
+
+def _recognised(pictures: Pictures, slots: Slots | None = None) -> Recognised | None:
+    taker = ProbeTaker()
+    for picture in pictures:
+        taker.add(picture)
+    return recognise(taker.finish(255.0), slots or tuple(range(len(pictures))))
+
+
+def _stripes(found: Recognised | None, axis: str) -> StripeReading:
+    assert found is not None
+    reading = next(b.reading for b in found.blocks if b.axis == axis and b.kind == "stripes")
+    assert isinstance(reading, StripeReading)
+    return reading
+
+
+@pytest.mark.parametrize(
+    ("code", "arrange", "first", "inverse", "inverse_first"),
+    [
+        (Stripes(bits=7), lambda f, w, b: [*f, w, b], "most", "interleaved", False),
+        (Stripes(bits=7), lambda f, w, b: [b, w, *f[1::2], *f[0::2]], "most", "after", True),
+        (Stripes(bits=7, inverse=False), lambda f, w, b: [w, *f[::-1]], "least", "none", False),
+        (Stripes(bits=7, inverse=False, code="binary"), lambda f, w, b: [b, *f, w], "most", "none", False),
+        (Stripes(bits=7, code="xor", base_bit=1), lambda f, w, b: [*f, b], "most", "interleaved", False),
+    ],
+)
+def test_digits_are_told_by_how_steadily_their_numbers_run(
+    code: Stripes, arrange: Arrange, first: str, inverse: str, inverse_first: bool
+) -> None:
+    found = _recognised(arrange(*frames([("columns", code)])))
+    reading = _stripes(found, "columns")
+    assert (reading.code, reading.bits, reading.base_bit) == (code.code, 7, code.base_bit)
+    assert (reading.first, reading.inverse, reading.inverse_first) == (first, inverse, inverse_first)
+    assert reading.is_sure
+    assert reading.rises
+
+
+def test_rows_and_columns_are_told_apart_in_either_order_and_with_a_picture_absent() -> None:
+    pictures, white, black = frames([("rows", Stripes(bits=7)), ("columns", Stripes(bits=7))])
+    whole = [white, black, *pictures]
+    found = _recognised(whole)
+    assert found is not None
+    assert [(b.kind, b.axis, len(b.slots)) for b in found.blocks] == [
+        ("white", "columns", 1),
+        ("black", "columns", 1),
+        ("stripes", "rows", 14),
+        ("stripes", "columns", 14),
+    ]
+    slots = tuple(i if i < 7 else None if i == 7 else i - 1 for i in range(30))
+    lacking = _recognised(whole[:7] + whole[8:], slots)
+    assert _stripes(lacking, "rows").bits == _stripes(lacking, "columns").bits == 7
+
+
+def test_sinusoids_are_told_by_their_steps_and_their_fringes() -> None:
+    sets = [("columns", Phases(periods_px=tuple(128 / n for n in (12, 11, 10)), steps=3, start_deg=-90))]
+    found = _recognised(frames(sets)[0])
+    assert found is not None
+    (block,) = found.blocks
+    assert isinstance(block.reading, PhaseReading)
+    assert (block.reading.steps, block.reading.fringes, block.reading.order) == (3, (12.0, 11.0, 10.0), "set")
+    assert (block.reading.start_deg, block.reading.direction) == (-90.0, 1)
+    pictures = frames([("columns", Phases(periods_px=(128, 32, 8), steps=4, direction=-1))])[0]
+    strided = _recognised([pictures[s * 4 + k] for k in range(4) for s in range(3)])
+    assert strided is not None
+    reading = strided.blocks[0].reading
+    assert isinstance(reading, PhaseReading)
+    assert (reading.order, reading.fringes, reading.direction) == ("step", (1.0, 4.0, 16.0), -1)
+
+
+def test_pictures_of_no_code_make_no_sense() -> None:
+    rng = np.random.default_rng(3)
+    noise: Sequence[NDArray[np.uint16]] = [rng.integers(0, 255, (48, 64), np.uint16) for _ in range(10)]
+    assert _recognised(list(noise)) is None
