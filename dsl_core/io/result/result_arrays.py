@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.errors import StoreError
 from dsl_core.io.result.result_file import load_result
 from dsl_core.model.result import VARIABLES
 from dsl_core.progress import NoProgress, Progress
@@ -53,6 +54,11 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
     """Read a whole result; never holds more than the result and one band. Raises `StoreError`."""
     progress = progress or NoProgress()
     result = load_result(path)
+    if "depth_mm" not in result:
+        raise StoreError(
+            f"{path} contains no depth, only columns of the projector. Reconstruct its scan with a calibration,"
+            " or export the columns with 'dsl-scan export'."
+        )
     names = [name for name in VARIABLES if name in result]
     total = sum(len(result[name]) if result[name].ndim > 2 else 1 for name in names)
     done, arrays = 0, {}
