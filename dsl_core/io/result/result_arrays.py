@@ -56,7 +56,7 @@ def load_arrays(path: Path, progress: Progress | None = None) -> ResultArrays:
     result = load_result(path)
     if "depth_mm" not in result:
         raise StoreError(
-            f"{path} contains no depth, only columns of the projector. Reconstruct its scan with a calibration,"
+            f"{path} contains columns of the projector and no depth. Reconstruct its scan with a calibration,"
             " or export the columns with 'dsl-scan export'."
         )
     names = [name for name in VARIABLES if name in result]
