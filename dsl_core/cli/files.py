@@ -95,7 +95,7 @@ def _import_dataset(output: Output, source: Path, target: Path | None, rig: Rig)
     try:
         records = exchange.import_scan(source, None, rig)
     except StoreError as error:
-        raise StoreError(f"{error} Add --guess if the folder holds pictures of another program.") from error
+        raise StoreError(f"{error} Add --guess for pictures of another program.") from error
     _print_files(output, "dataset", records)
     if target is not None:
         with output.progress() as progress:
