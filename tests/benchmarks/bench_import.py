@@ -122,7 +122,9 @@ LAYOUTS = (
     Layout(
         "Gray without inverse, 12 bit TIFF at the upper end, rows first",
         _without_inverse(),
-        lambda f, w, b: _in_order("img_{i}.tif", [p << 4 for p in (*f[7:], *f[:7], w, b)]),
+        lambda f, w, b: _in_order(
+            "img_{i}.tif", [np.left_shift(p, np.uint16(4)) for p in (*f[7:], *f[:7], w, b)]
+        ),
         (_stripes("rows", inverse="none"), _stripes("columns", inverse="none"), W, B),
         bits=12,
         left_aligned=True,
