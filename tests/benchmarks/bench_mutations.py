@@ -2,7 +2,8 @@
 
 ``python -m tests.benchmarks.bench_mutations --seed 1 --count 60`` copies the tree, puts one fault at a time
 into the copy, runs the tests of the fault's folder until one fails, and lists which faults were caught. A
-fault swaps an operator or a comparison, changes a number, or leaves out a statement. Takes about an hour.
+fault swaps an operator or a comparison, changes a number, or leaves out a statement. What cannot change a
+result is not drawn: annotations, texts of errors and of the log, code for other systems. Takes about an hour.
 """
 
 from __future__ import annotations
@@ -111,8 +112,10 @@ def faults_of(path: str, source: str) -> Iterator[Fault]:
 
 
 def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
-    """Annotations, decorators, texts of errors and of the log, the guard of a zip of equally long parts."""
+    """Annotations, decorators, texts of errors and of the log, other systems, `strict` of equal parts."""
     for node in ast.walk(tree):
+        if isinstance(node, ast.If) and (here := _is_here(node.test)) is not None:
+            yield from node.orelse if here else node.body
         if isinstance(node, ast.Raise) and node.exc is not None:
             yield node.exc
         if isinstance(node, ast.Expr) and ast.unparse(node).startswith(("_log.", "warnings.")):
@@ -125,6 +128,15 @@ def _without_effect(tree: ast.AST) -> Iterator[ast.AST]:
             yield node.returns
         if isinstance(node, ast.keyword) and node.arg == "strict":
             yield node.value
+
+
+def _is_here(test: ast.expr) -> bool | None:
+    """Whether a condition that asks for the operating system holds on this one; None for any other."""
+    match test:
+        case ast.Compare(left=asked, ops=[ast.Eq()], comparators=[ast.Constant(value=str(name))]):
+            known = {"sys.platform": sys.platform, "os.name": os.name}.get(ast.unparse(asked))
+            return None if known is None else known == name
+    return None
 
 
 def draw(count: int, seed: int) -> list[Fault]:
@@ -150,14 +162,16 @@ def place_of(fault: Fault) -> str:
 
 
 def tests_of(fault: Fault) -> list[str]:
-    """Test files for a fault, those named like its module or folder first."""
+    """All test files of a fault's folder: first that of its module, those that import it, those beside it."""
     place = place_of(fault)
     module = Path(fault.path)
     inner = module.parent.relative_to(place).parts
+    dotted = ".".join(module.with_suffix("").parts)
 
     def distance(test: Path) -> tuple[bool, bool, bool]:
         named = test.stem == f"test_{module.stem}"
-        return (not named, not (inner and inner[0] in test.parts), not (inner and inner[0] in test.stem))
+        imports = f"from {dotted} import" in test.read_text(encoding="utf-8")
+        return (not named, not imports, not (inner and inner[0] in test.parts))
 
     found = [path for tests in PLACES[place] for path in sorted((ROOT / tests).rglob("test_*.py"))]
     return [path.relative_to(ROOT).as_posix() for path in sorted(found, key=distance)]

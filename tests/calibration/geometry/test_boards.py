@@ -9,6 +9,7 @@ import pytest
 
 from dsl_core.calibration.geometry.boards import (
     Corners,
+    _nearest_known,
     find_corners,
     grey_of,
     pitches_px,
@@ -93,3 +94,22 @@ def test_a_board_that_is_not_there_and_unknown_markers_are_named() -> None:
     odd = Charuco(columns=8, rows=6, square_mm=20.0, marker_mm=15.0, dictionary="DICT_9X9_7")
     with pytest.raises(CalibrationError, match="'DICT_9X9_7'"):
         find_corners(flat, odd, "pose 3")
+
+
+def test_what_is_unknown_is_taken_from_the_nearest_corner_of_the_board() -> None:
+    places = np.array([[0, 0], [1, 0], [2, 2], [5, 1], [0, 4]])
+    values = np.array([[1.0, 0.0], [0.0, 2.0], [3.0, 0.0], [0.0, 0.0], [5.0, 0.0]])
+    known = np.array([[True, False], [False, True], [True, False], [False, False], [True, False]])
+    # Distances squared of (5, 1) along x: 26, 10 to (2, 2), 34; of (1, 0): 1, 5, 17.
+    assert _nearest_known(places, values, known).tolist() == [
+        [1.0, 2.0], [1.0, 2.0], [3.0, 2.0], [3.0, 2.0], [5.0, 2.0],
+    ]  # fmt: skip
+    none = np.zeros_like(known)
+    assert not _nearest_known(places, values, none).any()
+    # Nearer to what is left of it, and below, than to what is right of it.
+    row = np.array([[-3, 0], [0, 0], [2, 0], [0, -1]])
+    at = np.array([[1.0, 1.0], [0.0, 0.0], [2.0, 2.0], [4.0, 4.0]])
+    one = np.array([[True, True], [False, False], [True, True], [False, False]])
+    assert _nearest_known(row, at, one)[1].tolist() == [2.0, 2.0]
+    one[3] = True
+    assert _nearest_known(row, at, one)[1].tolist() == [4.0, 4.0]

@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from dsl_core.calibration.geometry.corner_model import even_mosaic, fit_corners
+from dsl_core.calibration.geometry.corner_model import (
+    _edge_distances,
+    _start,
+    _windows,
+    even_mosaic,
+    fit_corners,
+)
 from dsl_core.calibration.geometry.projector_corners import PoseObservation
 from dsl_core.optics.sensor import bayer_channels
 from tests.cases.board_twin import tilted_errors
@@ -37,3 +44,32 @@ def test_a_corner_out_of_sight_is_no_corner() -> None:
     flat = np.full((60, 60), 50.0) + np.random.default_rng(0).normal(0, 1, (60, 60))
     along = np.array([[[15.0, 0.0], [0.0, 15.0]]])
     assert np.isnan(fit_corners(flat, np.array([[30.0, 30.0]]), along).points_px).all()
+
+
+def test_windows_hold_the_pixels_within_reach_and_none_outside_the_picture() -> None:
+    grey = np.arange(30.0).reshape(5, 6)
+    grey[2, 3] = np.nan
+    places, values, usable = _windows(grey, np.array([[4.6, 3.4], [2.0, 2.0]]), np.array([1.5, 2.0]))
+    assert places.shape == (2, 25, 2)
+    assert places[0].mean(0).tolist() == [5.0, 3.0]
+    for corner, (centre, reach) in enumerate((((4.6, 3.4), 1.5), ((2.0, 2.0), 2.0))):
+        for (x, y), value, use in zip(places[corner], values[corner], usable[corner], strict=True):
+            there = 0 <= x <= 5 and 0 <= y <= 4 and np.hypot(x - centre[0], y - centre[1]) <= reach
+            there = there and (x, y) != (3, 2)
+            assert use == there, (x, y)
+            assert value == (6 * y + x if there else 0.0)
+
+
+def test_distances_to_edges_follow_their_bend() -> None:
+    # An edge along x, and one along y that bends by 0.02 per pixel towards its left.
+    state = np.array([[10.0, 20.0, 0.0, np.pi / 2, 0.5]])
+    places = np.array([[[13.0, 20.0], [10.0, 26.0], [12.0, 23.0]]])
+    first, second = _edge_distances(state, places, np.array([[0.0, 0.02]]))[:, 0]
+    assert first == pytest.approx([0.0, 6.0, 3.0])
+    assert second == pytest.approx([-3.0, -0.5 * 0.02 * 36, -2 - 0.5 * 0.02 * 9])
+
+
+def test_a_start_is_a_place_two_directions_and_a_blur() -> None:
+    along = np.array([[[3.0, 3.0], [-2.0, 0.0]]])
+    found = _start(np.array([[7.0, 8.0]]), along)[0]
+    assert found[:4] == pytest.approx([7.0, 8.0, np.pi / 4, np.pi])

@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from dsl_core.calibration.common.tiles import ColumnSamples
 from dsl_core.calibration.geometry.bundle import CAMERA
-from dsl_core.calibration.geometry.plane_refinement import PlaneRefinement, lone_plane, refine_planes
+from dsl_core.calibration.geometry.plane_refinement import (
+    PlaneRefinement,
+    _gauss_newton,
+    _rms,
+    lone_plane,
+    refine_planes,
+)
 from dsl_core.calibration.geometry.stage_planes import columns_at, plane_of, rays_through, shared_parameters
 from dsl_core.errors import CalibrationError
 from dsl_core.model.rig import Rig
@@ -205,3 +211,44 @@ def test_too_little_light_is_named() -> None:
     samples[1] = replace(few, camera_px=few.camera_px[:5], column_px=few.column_px[:5], std_px=few.std_px[:5])
     with pytest.raises(CalibrationError, match="750 mm only 5 tiles"):
         refine_planes(small_rig(), POSITIONS_MM, samples, None, STAGE_STD_MM)
+
+
+class LinearStage:
+    """Points whose columns are linear in the numbers, in the place of planes on a stage."""
+
+    def __init__(self, design: NDArray[np.float64], seen: NDArray[np.float64], std_px: float) -> None:
+        self.design, self.seen = design, seen
+        self.std_px = np.full(len(seen), std_px)
+        self.prior_weight = np.array([0.0, 3.0, 0.0])
+
+    def residual_px(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(self.seen - self.design @ numbers)
+
+    def jacobian(self, _: NDArray[np.float64], free: NDArray[np.int64]) -> NDArray[np.float64]:
+        return np.asarray(self.design[:, free])
+
+
+def test_numbers_are_those_of_least_squares_with_their_prior() -> None:
+    rng = np.random.default_rng(5)
+    design = rng.standard_normal((200, 3))
+    # Deviations of 0.01 px and the floor of 0.002 together; no residual beyond two and a half of them.
+    noise = np.hypot(0.01, 0.002) * np.linspace(-1.7, 1.7, 200)[rng.permutation(200)]
+    seen = design @ [0.3, -0.2, 0.1] + noise
+    weight = 1 / (0.01**2 + 0.002**2)
+    free = np.array([0, 1])
+    for prior, pull in ((True, np.diag([0.0, 9.0])), (False, np.zeros((2, 2)))):
+        stage = LinearStage(design, seen, 0.01)
+        start = np.array([0.0, 0.0, 0.1])
+        numbers, covariance = _gauss_newton(stage, start, free, prior)  # type: ignore[arg-type]
+        scale = max(1.0, 1.4826 * float(np.median(np.abs(stage.residual_px(numbers)))) * weight**0.5)
+        information = design[:, free].T @ design[:, free] * weight / scale**2 + pull
+        right = design[:, free].T @ (seen - 0.1 * design[:, 2]) * weight / scale**2
+        assert numbers[free] == pytest.approx(np.linalg.solve(information, right), rel=1e-4)
+        assert numbers[2] == 0.1
+        assert covariance[np.ix_(free, free)] == pytest.approx(np.linalg.inv(information), rel=1e-3)
+        assert not covariance[2].any()
+
+
+def test_scatter_is_that_of_the_middle_ninety_five_percent() -> None:
+    assert _rms(np.r_[np.full(96, -2.0), np.full(4, 100.0)]) == pytest.approx(2.0)
+    assert _rms(np.r_[np.full(94, 2.0), np.full(6, 100.0)]) > 20

@@ -87,11 +87,9 @@ def test_distortion_counts_at_the_farthest_corner_of_both_devices() -> None:
     off = plain_lens(cx_px=400.0, cy_px=200.0, distortion=(0.5, -0.3, 9.0, 9.0, 0.2))
     square = (0.599**2) + (0.299**2)
     assert _corner_share(off) == pytest.approx(abs(0.5 * square - 0.3 * square**2 + 0.2 * square**3))
-    far = 0.5**2 + 0.25**2
     for share, told in ((0.49, False), (0.51, True), (-0.51, True)):
         lens = plain_lens(cx_px=499.5, cy_px=249.5, distortion=(share / (0.4995**2 + 0.2495**2), 0, 0, 0, 0))
         assert bool(_of_lens("projector", lens)) == told
-    assert far > 0.3
 
 
 @pytest.mark.parametrize(

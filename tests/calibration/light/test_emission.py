@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.light.emission import measured_emission, smooth_curve
+from dsl_core.calibration.light.emission import (
+    _check_leds,
+    _variance,
+    _with_white,
+    measured_emission,
+    smooth_curve,
+)
 from dsl_core.errors import CalibrationError
 from dsl_core.model.calibration.spectralon import COLOURS, EMISSION_SUM_NM, EmissionReadings, LightColour
 from dsl_core.model.spectral import SpectralCurve
@@ -84,3 +90,45 @@ def test_exchanged_missing_and_dark_spectra_are_named() -> None:
     for told, spectra in wrong.items():
         with pytest.raises(CalibrationError, match=told):
             measured_emission(EmissionReadings(source="test", readings=spectra), WHITE)
+
+
+def test_white_improves_the_leds_as_all_five_readings_together_would() -> None:
+    """Readings of red, green, blue, white and black, of which black is in each of the others."""
+    rng = np.random.default_rng(4)
+    red, green, blue, white, black = rng.uniform(1.0, 3.0, 5)
+    noise = dict(zip(("red", "green", "blue", "white", "black"), (0.3, 0.2, 0.5, 0.1, 0.05), strict=True))
+    each = {name: np.array([value]) for name, value in noise.items()}
+    leds = np.array([[red - black], [green - black], [blue - black]])
+    spread = np.stack([each[name] + each["black"] for name in ("red", "green", "blue")])
+    found, variance = _with_white(leds, np.array([white - black]), spread, each)  # type: ignore[arg-type]
+    design = np.array([[1, 0, 0, 1], [0, 1, 0, 1], [0, 0, 1, 1], [1, 1, 1, 1], [0, 0, 0, 1.0]])
+    weight = np.diag(1 / np.array(list(noise.values())))
+    covariance = np.linalg.inv(design.T @ weight @ design)
+    wanted = covariance @ design.T @ weight @ [red, green, blue, white, black]
+    assert found[:, 0] == pytest.approx(wanted[:3])
+    assert variance[:, 0] == pytest.approx(np.diag(covariance)[:3])
+
+
+def test_the_variance_of_readings_is_their_scatter_or_the_roughness_of_one() -> None:
+    rng = np.random.default_rng(5)
+    stack = 3.0 + 0.2 * rng.standard_normal((6, 4000))
+    found = _variance(stack)
+    assert found.mean() == pytest.approx(0.04, rel=0.02)
+    # Pooled over 31 wavelengths of five degrees of freedom each.
+    assert found.std() == pytest.approx(0.04 * np.sqrt(2 / (5 * 31)), rel=0.15)
+    smooth = np.sin(np.arange(4000) / 400)
+    assert _variance((smooth + 0.2 * rng.standard_normal(4000))[None])[0] == pytest.approx(0.04, rel=0.06)
+
+
+@pytest.mark.parametrize(("share", "dark"), [(2e-3, False), (0.5e-3, True)])
+def test_an_led_of_less_than_a_thousandth_of_the_strongest_is_dark(share: float, dark: bool) -> None:
+    nm = np.arange(400.0, 701.0)
+    leds = np.stack([np.exp(-(((nm - centre) / 20) ** 2)) for centre in (630, 530, 450)])
+    leds[1] *= share
+    if dark:
+        with pytest.raises(CalibrationError, match="Under green"):
+            _check_leds(nm, leds)
+    else:
+        _check_leds(nm, leds)
+        with pytest.raises(CalibrationError, match="out of order"):
+            _check_leds(nm, leds[[1, 0, 2]])

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+import pytest
 import torch
 
-from dsl_core.optics.spread.wave import column_wave
+from dsl_core.optics.spread.wave import _significant, column_wave
 
 PERIOD_PX = 2.0
 
@@ -63,3 +64,25 @@ def test_runs_that_cannot_show_a_wave_give_none() -> None:
     column = 10.0 + at + torch.linspace(0, 400, 50, dtype=torch.float64)[:, None]
     found = column_wave(column + waved(column), torch.ones_like(column, dtype=torch.bool), PERIOD_PX)
     assert found.px.abs().max() < 0.01
+
+
+@pytest.mark.parametrize(("sigmas", "kept"), [(2.9, False), (3.1, True)])
+def test_a_wave_counts_from_three_deviations_of_its_runs_on(sigmas: float, kept: bool) -> None:
+    """24 runs of four pixels at places of their own, each off by one more or less than the mean."""
+    # With a ridge of a tenth, deviations of 24 m² / ((m / 11)² + 1), squared.
+    mean = math.sqrt(sigmas**2 / (24 - sigmas**2 / 121))
+    sign = torch.where(torch.arange(24) % 2 == 0, 1.0, -1.0).double()
+    values = (mean + sign)[:, None].expand(24, 4)
+    shapes = torch.ones((24, 4, 1), dtype=torch.float64)
+    found = _significant(shapes, values, torch.arange(24.0, dtype=torch.float64))
+    assert float(found[0]) == (pytest.approx(mean / 1.1) if kept else 0.0)
+
+
+def test_runs_at_one_place_count_as_one() -> None:
+    """Fewer places than runs: pairs of runs that are off alike are as sure as half of them."""
+    sign = torch.where(torch.arange(48) // 2 % 2 == 0, 1.0, -1.0).double()
+    shapes = torch.ones((48, 4, 1), dtype=torch.float64)
+    for mean, kept in ((0.55, False), (0.75, True)):
+        values = (mean + sign)[:, None].expand(48, 4)
+        found = _significant(shapes, values, torch.arange(48.0, dtype=torch.float64))
+        assert (float(found[0]) != 0.0) == kept

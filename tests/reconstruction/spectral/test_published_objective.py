@@ -129,3 +129,33 @@ def test_a_grey_pixel_is_its_reflectance_in_units_of_white_however_bright_it_is_
     assert float(found.median()) == pytest.approx(GREY, rel=0.03)
     # Of bands at the edge of what the LEDs emit, the mean dispersion of many pixels says little.
     assert found == pytest.approx(GREY, rel=0.3)
+
+
+def test_the_objective_is_the_published_sum_written_out() -> None:
+    draw = torch.Generator().manual_seed(2)
+
+    def some(*shape: int) -> torch.Tensor:
+        return torch.rand(shape, generator=draw, dtype=torch.float64)
+
+    bands, pixels = 4, 3
+    measured = LineData(
+        first=some(3, bands, pixels),
+        first_white=some(3, bands, pixels),
+        zero=some(3, pixels),
+        zero_white=some(3, bands),
+        reached=(some(bands, pixels) > 0.4).double(),
+        kappa=some(pixels),
+    )
+    spectra, total = some(bands, pixels), 0.0
+    for p in range(pixels):
+        first = zero = rough = 0.0
+        for c in range(3):
+            for j in range(bands):
+                away = measured.first_white[c, j, p] * spectra[j, p] - measured.first[c, j, p]
+                first += float(abs(away) * measured.reached[j, p]) / bands
+            zero += float(abs(measured.zero_white[c] @ spectra[:, p] - measured.zero[c, p]))
+        for j in range(bands - 1):
+            rough += float((spectra[j + 1, p] - spectra[j, p]) ** 2) / bands
+        kappa = float(measured.kappa[p])
+        total += kappa * first + (1 - kappa) * zero + 0.7 * rough
+    assert float(objective(spectra, measured, 0.7)) == pytest.approx(total)
