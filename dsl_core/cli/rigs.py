@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -117,3 +118,23 @@ def doctor(
     output.finish()
     if broken:
         raise typer.Exit(_BROKEN)
+
+
+@rigs.command()
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the rig, such as my-lab.")],
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="[FOLDER]", help="New folder for it; NAME where none is given.")
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a package for a rig of one's own, with tests, to put one's devices into."""
+    from dsl_core.devices.registry import rig_names
+    from dsl_core.workflows.new_rig import write_new_rig
+
+    output, target = Output(json), folder or Path(name)
+    files = write_new_rig(name, target, rig_names())
+    output.say(f"{target} contains {', '.join(path.name for path in files)}.")
+    output.say(f"Next: pip install -e {target}, then pytest {target}; replace one device after the other.")
+    output.put(rig=name, files=[str(path) for path in files])
+    output.finish()

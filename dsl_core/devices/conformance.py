@@ -20,7 +20,9 @@ from typing import get_args
 
 import numpy as np
 
-from dsl_core.devices.base import Camera, CameraInfo, DeviceRig, Projector, Spectroradiometer, Stage
+from dsl_core.devices.base import Camera, CameraInfo, Projector, Spectroradiometer, Stage
+from dsl_core.devices.conformance_of_rig import RigParts
+from dsl_core.devices.conformance_of_rig import require as _require
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
 from dsl_core.model.rig import BayerPattern
@@ -234,14 +236,10 @@ class SpectroradiometerConformance:
         instrument.close()
 
 
-class RigConformance:
+class RigConformance(RigParts):
     """Promises of a whole rig; ``sees_projector`` is false for rigs that only play back."""
 
     sees_projector = True
-
-    def open_rig(self) -> DeviceRig:
-        """Open the rig under test."""
-        raise NotImplementedError("say in the subclass how the rig is opened")
 
     def test_rig_calibration_fits_its_devices(self) -> None:
         """A calibration that comes with the rig is for these image sizes and this mosaic."""
@@ -287,12 +285,6 @@ class RigConformance:
         rig = self.open_rig()
         rig.close()
         rig.close()
-
-
-def _require(holds: bool, sentence: str) -> None:
-    """Fail a test with a sentence; pytest does not take apart assertions of other packages."""
-    if not holds:
-        raise AssertionError(sentence)
 
 
 def _refuses(action: Callable[[], object], what: str) -> None:

@@ -2,43 +2,69 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 
-from dsl_core.resources import resource_path
+from dsl_core.workflows.new_rig import page_files, write_new_rig
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_the_rig_of_the_help_page_keeps_every_promise(tmp_path: Path) -> None:
-    page = resource_path("help/adding-a-rig.md").read_text(encoding="utf-8")
-    settings, module, tests = re.findall(r"```(?:toml|python)\n(.*?)```", page, re.DOTALL)
-    (tmp_path / "my_lab.py").write_text(module, encoding="utf-8")
-    (tmp_path / "test_my_lab.py").write_text(tests, encoding="utf-8")
-    points = tomllib.loads(settings)["project"]["entry-points"]["dsl_scan.rigs"]
-    assert points == {"my-lab": "my_lab:open_lab"}
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package that the help page shows, written by the command and installed by pip into a folder."""
+    pytest.importorskip("setuptools")
+    pytest.importorskip("pip")
+    folder = tmp_path_factory.mktemp("lab")
+    write_new_rig("room-12", folder / "room-12", [])
     command = [
         sys.executable,
         "-m",
-        "pytest",
+        "pip",
+        "install",
         "-q",
-        "-W",
-        "error",
-        "-p",
-        "no:cacheprovider",
-        "test_my_lab.py",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
     ]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}  # the tests run without an installation too
+    command += ["--disable-pip-version-check", "--target", str(folder / "site"), str(folder / "room-12")]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert answer.returncode == 0, answer.stderr
+    return folder
+
+
+def _run(folder: Path, *command: str) -> str:
+    path = os.pathsep.join([str(folder / "site"), str(ROOT)])  # the tests run without an installation too
     answer = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-m", *command],
+        cwd=folder / "room-12",
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    assert re.search(r"^\d\d passed", answer.stdout, re.MULTILINE), answer.stdout
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    return answer.stdout
+
+
+def test_the_rig_of_the_help_page_keeps_every_promise(installed: Path) -> None:
+    assert set(page_files()) == {"pyproject.toml", "my_lab.py", "test_my_lab.py"}
+    told = _run(installed, "pytest", "-q", "-W", "error", "-p", "no:cacheprovider", "test_room_12.py")
+    assert re.search(r"^\d\d passed", told, re.MULTILINE), told
+
+
+def test_the_rig_of_the_help_page_is_found_and_scans(installed: Path) -> None:
+    told = _run(
+        installed, "dsl_core.cli", "scan", "first.dsl", "--rig", "room-12", "--lines", "8x8", "--json"
+    )
+    found = json.loads(told)
+    assert found["frames"] > 10
 
 
 @pytest.mark.parametrize("name", ["README.md", "ARCHITECTURE.md", "CHANGELOG.md"])

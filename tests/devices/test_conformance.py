@@ -24,7 +24,10 @@ from dsl_core.devices.conformance import (
 )
 from dsl_core.errors import DeviceError
 from dsl_core.model.frames import Frame
+from dsl_core.model.placement import Placement
+from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import SpectralCurve
+from tests.cases.small_rig import small_rig
 
 
 class Light:
@@ -126,6 +129,40 @@ class GoodMeter(Spectroradiometer):
         return SpectralCurve(wavelengths_nm=(low, 780.0), values=(1.0, 2.0), unit=unit)
 
 
+class Hand:
+    """Places what it is asked to, but for the named fault."""
+
+    def __init__(self, fault: str) -> None:
+        self.fault, self.now = fault, "a mug"
+
+    def place(self, placement: Placement) -> None:
+        if placement.target == "nothing" or self.fault == "lazy":
+            raise DeviceError("This hand can only hold things; put them away yourself.")
+        self.now = "" if self.fault == "mute" else placement.target
+
+    def put_back(self) -> None:
+        self.now = "a mug" if self.fault != "forgets" else "another mug"
+
+    def standing(self) -> str:
+        return self.now
+
+
+def _nominal(fault: str) -> Rig:
+    known = small_rig()
+    wide = 64 if fault == "other shape" else 6
+    changes: dict[str, object] = {
+        "camera": known.camera.resized(wide, 4),
+        "projector": known.projector.resized(10, 6),
+    }
+    if fault == "second order":
+        changes["efficiency"] = {2: known.efficiency[1]}
+    if fault == "metres":
+        changes["film"] = known.film.model_copy(update={"lines_per_mm": 0.48})
+    if fault == "no light":
+        changes["emission"] = (SpectralCurve.of([400, 420], [1.0, 0.0]), *known.emission[1:])
+    return known.model_copy(update=changes)
+
+
 class Everything(
     CameraConformance, ProjectorConformance, StageConformance, SpectroradiometerConformance, RigConformance
 ):
@@ -145,9 +182,18 @@ class Everything(
         return GoodMeter(self.faults.get("meter", ""))
 
     def open_rig(self) -> DeviceRig:
-        light = Light()
-        camera = GoodCamera(self.faults.get("rig", ""), light)
-        return DeviceRig("good", camera, GoodProjector("", light))
+        light, fault, hand = Light(), self.faults.get("rig", ""), Hand(self.faults.get("rig", ""))
+        camera = GoodCamera(fault, light)
+        return DeviceRig(
+            "good",
+            camera,
+            GoodProjector("", light),
+            nominal=_nominal(fault),
+            place=hand.place,
+            put_back=None if fault == "keeps" else hand.put_back,
+            standing=hand.standing,
+            filters={550.0: SpectralCurve.of([530, 550, 570], [0, 90 if fault == "percent" else 0.9, 0])},
+        )
 
 
 def _failing(suite: Everything) -> list[str]:
@@ -189,6 +235,15 @@ def test_a_good_rig_passes() -> None:
         ("meter", "unit", "test_spectroradiometer_measures_radiance"),
         ("meter", "narrow", "test_spectroradiometer_measures_radiance"),
         ("rig", "early", "test_rig_camera_sees_what_the_projector_shows"),
+        ("rig", "other shape", "test_rig_nominal_describes_its_devices"),
+        ("rig", "second order", "test_rig_nominal_describes_its_devices"),
+        ("rig", "metres", "test_rig_nominal_describes_its_devices"),
+        ("rig", "no light", "test_rig_nominal_describes_its_devices"),
+        ("rig", "percent", "test_rig_filters_are_transmissions"),
+        ("rig", "keeps", "test_rig_places_targets_and_puts_them_back"),
+        ("rig", "forgets", "test_rig_places_targets_and_puts_them_back"),
+        ("rig", "lazy", "test_rig_places_targets_and_puts_them_back"),
+        ("rig", "mute", "test_rig_places_targets_and_puts_them_back"),
     ],
 )
 def test_each_mistake_is_found(device: str, fault: str, test: str) -> None:

@@ -16,9 +16,9 @@ from pydantic import Field, model_validator
 
 from dsl_core.devices.base import Stage
 from dsl_core.devices.driver_table import Driver, FoundDevice
+from dsl_core.devices.drivers.rail import RailSettings
 from dsl_core.devices.drivers.serial_line import BRINGS, SerialLine, open_line, serial_ports
 from dsl_core.errors import DeviceError
-from dsl_core.model.base import Record
 
 COUNTS_PER_MM = 409_600
 #: Longest way of each model, mm.
@@ -36,12 +36,12 @@ _AT_LIMIT, _MOVING, _HOMING, _HOMED = 0x3, 0xF0, 0x200, 0x400
 _LOST, _OVERLOAD = 0x4000, 0x0100_0000
 
 
-class LtsSettings(Record):
+class LtsSettings(RailSettings):
     """Which stage, and what it may do."""
 
     port: str = Field(min_length=1, description="serial port, such as /dev/ttyUSB0 or COM4")
     range_mm: tuple[float, float] = Field(
-        default=(0.0, 150.0), description="smallest and largest position that it may go to, mm"
+        default=(0.0, 150.0), description="from where to where on its own scale it may go, mm"
     )
     home: bool = Field(
         default=False,
@@ -109,11 +109,16 @@ class ThorlabsLts(Stage):
 
     @property
     def range_mm(self) -> tuple[float, float]:
-        """Smallest and largest position of the settings, mm."""
-        return self._settings.range_mm
+        """Smallest and largest position of the target, mm."""
+        low, high = sorted(self._settings.to_target(mm) for mm in self._settings.range_mm)
+        return low, high
 
     @property
     def position_mm(self) -> float:
+        """Where the target is, mm."""
+        return self._settings.to_target(self._stands_at())
+
+    def _stands_at(self) -> float:
         """Where the stage says that it is, mm; asked twice, as an answer may be an old one."""
         for _ in range(5):
             first, second = self._status(), self._status()
@@ -123,17 +128,18 @@ class ThorlabsLts(Stage):
 
     def move_to(self, position_mm: float) -> float:
         """Move, wait until it stands still there, and return the position read back, mm."""
-        low, high = self._settings.range_mm
+        low, high = self.range_mm
         if not low <= position_mm <= high:
             raise DeviceError(
                 f"{self._line.name} moves from {low:g} to {high:g} mm, not to {position_mm:g} mm. Choose a"
                 " position in its range."
             )
-        counts = round(position_mm * COUNTS_PER_MM)
+        stage_mm = self._settings.to_stage(position_mm)
+        counts = round(stage_mm * COUNTS_PER_MM)
         self._line.drain()
         self._line.write(struct.pack("<HHBBHi", _MOVE, 6, _STAGE | 0x80, _HOST, 1, counts))
         try:
-            self._wait(lambda status: self._is_there(status, position_mm), f"move to {position_mm:g} mm")
+            self._wait(lambda status: self._is_there(status, stage_mm), f"move to {position_mm:g} mm")
         except DeviceError:
             self._stop()
             raise
@@ -149,8 +155,8 @@ class ThorlabsLts(Stage):
         """Release the port; the stage stays where it is."""
         self._line.close()
 
-    def _is_there(self, status: _Status, position_mm: float) -> bool:
-        return abs(status.mm - position_mm) <= self._settings.tolerance_mm
+    def _is_there(self, status: _Status, stage_mm: float) -> bool:
+        return abs(status.mm - stage_mm) <= self._settings.tolerance_mm
 
     def _require_reference(self) -> None:
         if self._status().bits & _HOMED:

@@ -36,6 +36,17 @@ def test_the_published_scale_is_used() -> None:
     assert inner.target == 10
 
 
+def test_positions_are_distances_from_the_camera() -> None:
+    inner = Lts()
+    with lts(inner, target_at_zero_mm=900.0, towards_camera=True) as stage:
+        assert stage.range_mm == (750.0, 900.0)
+        assert stage.position_mm == pytest.approx(840.0)
+        assert stage.move_to(800.0) == pytest.approx(800.0)
+        assert inner.target == 100
+        with pytest.raises(DeviceError, match="moves from 750 to 900 mm, not to 100 mm"):
+            stage.move_to(100.0)
+
+
 def test_a_stage_without_reference_finds_it_only_when_asked() -> None:
     with pytest.raises(DeviceError, match=r"has not found its reference .* set home to true"):
         lts(Lts(is_homed=False))
