@@ -30,7 +30,9 @@ _BUILT_IN = {
     "projector.none": "no_projector",
     "projector.screen": "screen",
     "spectroradiometer.jeti": "jeti_specbos",
+    "spectroradiometer.ocean": "ocean",
     "stage.thorlabs-lts": "thorlabs_lts",
+    "stage.zaber": "zaber",
 }
 BUILT_IN = tuple(
     EntryPoint(name, f"dsl_core.devices.drivers.{module}:DRIVER", GROUP) for name, module in _BUILT_IN.items()

@@ -23,6 +23,7 @@ DISTRIBUTIONS = {
     "colour": "colour-science",
     "cv2": "opencv-contrib-python-headless",
     "serial": "pyserial",
+    "zaber_motion": "zaber-motion",
     # The part of PySide that knows which objects are still alive.
     "shiboken6": "pyside6-essentials",
     "vtkmodules": "vtk",
