@@ -18,6 +18,8 @@ from dsl_core.progress import CancelToken
 SETTLE_MS = (100.0, 300.0, 900.0)
 #: After so many wrong pictures on end, projector or camera count as late.
 FAILURES = 2
+#: Of doubtful pictures that come out the same again, every so many are followed by a control.
+CONTROL_EVERY = 8
 #: On resuming, so many shots before a missing one are captured again where nothing can be told of them.
 MOST_UNTOLD = 32
 _log = logging.getLogger(__name__)
@@ -34,6 +36,7 @@ class ProvenShots:
         self._failures = 0
         self._is_late = False
         self._untold: list[Shot] = []
+        self._doubts = 0
         #: Shots that were taken again because a picture did not show their pattern.
         self.corrected = 0
 
@@ -66,11 +69,17 @@ class ProvenShots:
         elif found.verdict is Verdict.RIGHT:
             self._failures = 0
             self._untold.clear()
-        elif shot.role == "spectral":
+        elif self._is_alone(shot):
             self._untold.append(shot)
         self._correct(found, self._proof)
         if self._failures >= FAILURES and not self._is_late:
             self._be_late(shot, self._proof)
+
+    def _is_alone(self, shot: Shot) -> bool:
+        """Whether a shot is judged by itself: those of the first code are by what they are together."""
+        return shot.role == "spectral" or (
+            self._proof is not None and shot.setting != self._proof.first_setting
+        )
 
     def _ask_again(self, shot: Shot, frame: Frame, proof: FrameProof) -> tuple[Frame, Finding]:
         """A second picture of a shot that may be wrong, and whether the first one was."""
@@ -79,10 +88,15 @@ class ProvenShots:
             self._failures += 1
             self.corrected += 1
             second = replace(second, corrected="it was unlike those before it")
+        else:
+            if self._doubts % CONTROL_EVERY == 0:
+                self._require_control(proof)
+            self._doubts += 1
         return second, proof.judge(shot, second.pixels)
 
     def _be_late(self, shot: Shot, proof: FrameProof) -> None:
         """Expect every picture to be late from now on, and so of those before that could not be told."""
+        self._require_control(proof)
         self._is_late = True
         _log.warning(
             "Pictures are wrong one after the other, as if projector or camera were one picture late. From %s"
@@ -114,11 +128,24 @@ class ProvenShots:
                 tail = []
                 continue
             found = self._proof.judge(shot, stored.read(shot))
-            is_untold = found.verdict is Verdict.UNTOLD and shot.role == "spectral"
+            is_untold = found.verdict is Verdict.UNTOLD and self._is_alone(shot)
             tail = [*tail, shot] if is_untold else []
             self._correct(found, self._proof)
         for shot in again:
             self.take(shot)
+
+    def _require_control(self, proof: FrameProof) -> None:
+        """Raise `DeviceError` unless a picture of the first code still looks as it did at first."""
+        for control in proof.controls():
+            frame = self._taker.take(control, 1, SETTLE_MS[0], twice=True)
+            if proof.is_as_before(control, frame.pixels):
+                continue
+            raise DeviceError(
+                f"{describe_shot(control).capitalize()}, captured once more as a control, does not show its"
+                " pattern any more: projector, camera, light or target have changed since. Check that the"
+                " projector follows, that no automatic mode is on, and that nothing has moved. Frames before"
+                " are saved; resume the scan afterwards."
+            )
 
     def _correct(self, found: Finding, proof: FrameProof) -> None:
         for earlier, settle_ms in enumerate(SETTLE_MS):
@@ -133,6 +160,9 @@ class ProvenShots:
                 frame = replace(self._taker.take(shot, earlier + 1, settle_ms, twice=True), corrected=reason)
                 taken.append((shot, frame))
                 found = proof.judge(shot, frame.pixels)
+            if len(wrong) > 1 and wrong[0].role == "spectral" and not found.is_wrong:
+                # They agree now; but so do two wrong ones, and the earlier one may have been right.
+                self._require_control(proof)
             for shot, frame in taken:
                 if shot not in found.again:
                     self._sink.write(shot, frame)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.raster import Counts
@@ -126,3 +128,24 @@ def test_shots_nobody_can_judge_before_the_stop_are_taken_again_on_resuming(
     monkeypatch.setattr(FrameProof, "judge_raster", blind)
     _run(scene, sink)[0].run()
     assert [index for index in range(30) if sink.frames[index].frame_id != -1] == [27, 28, 29]
+
+
+@pytest.mark.parametrize("is_changed", [True, False])
+def test_a_control_tells_whether_everything_is_as_it_was(scene: RenderedScene, is_changed: bool) -> None:
+    rig = scene.open()
+    proof = FrameProof(scene.plan, scene.calibration)
+    assert proof.controls() == ()
+
+    def picture(shot: Shot, shift_px: int = 0) -> NDArray[np.uint16]:
+        rig.projector.show(token_image(scene.plan, shot))
+        rig.camera.configure(shot.exposure_ms)
+        return np.roll(rig.camera.snap().pixels, shift_px, 1)
+
+    for shot in scene.plan.shots():
+        proof.judge(shot, picture(shot))
+    for control in proof.controls():
+        assert control.role == "code"
+        assert proof.is_as_before(control, picture(control, 6 if is_changed else 0)) is not is_changed
+        inverse = next(s for s in scene.plan.shots() if (s.role, s.pattern) == ("code", control.pattern ^ 1))
+        assert not proof.is_as_before(control, picture(inverse))
+    assert len(proof.controls()) == 2

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsl_core.capture.proof.contest import Contest
+from dsl_core.capture.proof.control import choose_pairs, is_same
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.first_code import FirstCode
 from dsl_core.capture.proof.neighbours import LineNeighbours
@@ -111,6 +112,27 @@ class FrameProof:
     def differ(self, one: NDArray[np.uint16], other: NDArray[np.uint16]) -> bool:
         """Whether two pictures of one shot of lines, as raw mosaics, show different patterns."""
         return self._neighbours.differ(self._raster.take(one), self._raster.take(other))
+
+    def controls(self) -> tuple[Shot, ...]:
+        """Shots that show whether devices and scene are as they were; none before the first code."""
+        numbers = choose_pairs(self._code_pairs(), self._raster.shape)
+        return tuple(self._shots[self._places["code", 2 * number]] for number in numbers)
+
+    def is_as_before(self, control: Shot, pixels: NDArray[np.uint16]) -> bool:
+        """Whether a raw mosaic of the shot that `controls` named shows what it showed at first."""
+        before = self._kept[control.index]
+        return is_same(self._raster.take(pixels), before, self._code_pairs(), self._noise)
+
+    def _code_pairs(self) -> dict[int, tuple[Counts, Counts]]:
+        """Pattern and inverse of the first code by the number of the pair, as far as both are there."""
+        kept = {n: self._kept.get(at) for (role, n), at in self._places.items() if role == "code"}
+        pairs = {n // 2: (one, kept.get(n + 1)) for n, one in kept.items() if n % 2 == 0}
+        return {n: (one, other) for n, (one, other) in pairs.items() if one is not None and other is not None}
+
+    @property
+    def first_setting(self) -> int:
+        """The setting whose code is judged by itself."""
+        return self._first
 
     @property
     def lacking_pairs(self) -> tuple[int, ...]:

@@ -1,0 +1,51 @@
+"""A picture of the first code that, taken once more, shows whether devices and scene are as they were."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from dsl_core.capture.proof.code_pairs import Pair, alike
+from dsl_core.capture.proof.raster import Counts, Floats, Noise
+
+#: Stripes are well seen by a pixel, or by so many of those that are lit, with this share of the contrast.
+WELL_SEEN = 0.7
+#: A pixel is lit with a contrast of so many deviations.
+LIT_SIGMAS = 12.0
+
+
+def choose_pairs(pairs: Mapping[int, Pair], shape: tuple[int, int]) -> tuple[int, ...]:
+    """The pairs with the most and the fewest stripes of those well seen; ``shape`` is that of the raster.
+
+    Stripes rather than white: they move when anything does. The widest are not their own mirror image, as all
+    others of a Gray code are.
+    """
+    if not pairs:
+        return ()
+    found: dict[int, int] = {}
+    contrast = _contrast(pairs.values())
+    lit = contrast > float(np.median(contrast)) / 2
+    for number, (one, other) in pairs.items():
+        step = one.astype(np.float32) - other.astype(np.float32)
+        seen = np.abs(step) > WELL_SEEN * np.maximum(contrast, 1.0)
+        if (seen & lit).sum() < WELL_SEEN * lit.sum():
+            continue
+        grid, known = (step > 0).reshape(shape), (seen & lit).reshape(shape)
+        changes = int(((grid[:, 1:] != grid[:, :-1]) & known[:, 1:] & known[:, :-1]).sum())
+        if changes:
+            found[number] = changes
+    return tuple(dict.fromkeys(ends(found, key=lambda n: found[n]) for ends in (max, min))) if found else ()
+
+
+def is_same(seen: Counts, before: Counts, pairs: Mapping[int, Pair], noise: Noise) -> bool:
+    """Whether a picture shows what it showed ``before``, as far as light reaches."""
+    contrast = _contrast(pairs.values())
+    return alike(seen, before, contrast, contrast > LIT_SIGMAS * np.sqrt(noise.variance(before)))
+
+
+def _contrast(pairs: Iterable[Pair]) -> Floats:
+    """Brightest less darkest counts of each pixel."""
+    pictures = [picture for pair in pairs for picture in pair]
+    low, high = np.minimum.reduce(pictures), np.maximum.reduce(pictures)
+    return np.asarray(high.astype(np.float32) - low.astype(np.float32))
