@@ -141,8 +141,8 @@ class ProvenShots:
             if proof.is_as_before(control, frame.pixels):
                 continue
             raise DeviceError(
-                f"{describe_shot(control).capitalize()}, captured once more as a control, does not show its"
-                " pattern any more: projector, camera, light or target have changed since. Check that the"
+                f"{describe_shot(control).capitalize()}, captured once more as a control, no longer shows its"
+                " pattern: projector, camera, light or target have changed since. Check that the"
                 " projector follows, that no automatic mode is on, and that nothing has moved. Frames before"
                 " are saved; resume the scan afterwards."
             )

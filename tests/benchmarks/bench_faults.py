@@ -56,6 +56,7 @@ REASONS = {
     "driver raises for good": "Input/output error",
     "driver ends the program": "SystemExit",
     "left-aligned": "is the largest",
+    "cut off from": "rows empty",
     "another size": "of shape",
     "another type": "uint8",
     "exposure told": "instead of",
@@ -66,7 +67,7 @@ REASONS = {
     "stage overshoots": "was sent to",
     "stage says NaN": "nan",
 }
-_PICTURES = r"does not show its pattern|delivered the picture of the previous"
+_PICTURES = r"does not show its pattern|delivered the picture of the previous|captured once more as a control"
 _SPECTRUM = "spectrum|measure"
 
 
