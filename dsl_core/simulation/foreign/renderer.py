@@ -101,9 +101,10 @@ class ForeignRenderer:
         black = response.black_fraction
         levels = led_radiance(response, np.arange(256)[None] / 255, self.foreign) - black
         out = torch.zeros(self.shape[0] * self.shape[1], device=self.device)
+        spread = _SpreadPictures(self._frame, image, levels)
         for colour in self._seen(channel):
             parts = self._parts(colour, channel)
-            light = self._light(colour, channel, image, levels)
+            light = self._light(colour, channel, spread)
             if black:
                 light = light + black * self._white(colour, channel)
             out.index_add_(0, parts.pixel, light * parts.shading)
@@ -112,15 +113,16 @@ class ForeignRenderer:
     def _seen(self, channel: int | None) -> tuple[int, ...]:
         return (0, 1, 2) if channel is None else (channel,)
 
-    def _light(self, colour: int, channel: int | None, image: NDArray[np.uint8], levels: Floats) -> Tensor:
+    def _light(self, colour: int, channel: int | None, spread: _SpreadPictures) -> Tensor:
         """Light of a pattern on the parts of a colour, (parts,), at unit shading and without black."""
         axis: Axis
+        image, levels = spread.image, spread.levels
         if (image == image[:1]).all():
             axis, line = "columns", image[0]
         elif (image == image[:, :1]).all():
             axis, line = "rows", image[:, 0]
         else:
-            return self._free(colour, channel, image, levels)
+            return self._free(colour, channel, spread)
         radiance = np.stack([levels[led][line[:, led]] for led in ALL_LEDS])
         groups: list[tuple[tuple[int, ...], Floats]] = [((k,), radiance[k]) for k in ALL_LEDS]
         if (radiance == radiance[:1]).all():
@@ -134,17 +136,15 @@ class ForeignRenderer:
                 total += weights @ table[torch.as_tensor(lit, device=self.device)]
         return total
 
-    def _free(self, colour: int, channel: int | None, image: NDArray[np.uint8], levels: Floats) -> Tensor:
+    def _free(self, colour: int, channel: int | None, spread: _SpreadPictures) -> Tensor:
         """Light of a pattern that varies both ways."""
         parts = self._parts(colour, channel)
-        radiance = np.stack([levels[led][image[..., led]] for led in ALL_LEDS])
         total = torch.zeros(len(parts.pixel), device=self.device)
         for led in ALL_LEDS:
             for sources in parts.sources:
                 brought = self._brought(colour, channel, sources.order, (led,), self._wavelengths())
-                total[sources.active] += _free_pattern(
-                    self._frame, radiance[led], sources, brought, self._wavelengths()
-                )
+                picture = spread.of(led, halo=sources.order == 0)
+                total[sources.active] += _free_pattern(picture, sources, brought, self._wavelengths())
         return total
 
     def _parts(self, colour: int, channel: int | None) -> _Parts:
@@ -227,17 +227,33 @@ class ForeignRenderer:
         return self._tables[key]
 
 
-def _free_pattern(
-    frame: Frame, radiance: Floats, sources: Sources, brought: Brought, wavelengths_nm: Floats
-) -> Tensor:
-    """Light on an order's active parts, (active,), of a radiance image (height, width) that varies both ways.
+class _SpreadPictures:
+    """A pattern (height, width, LEDs) of drive levels, spread once for all orders and colours.
 
-    It is looked up in a spread picture of the pattern. The spread is the usual one all over the frame,
+    ``levels`` (LEDs, 256) is the radiance of each level.
+    """
+
+    def __init__(self, frame: Frame, image: NDArray[np.uint8], levels: Floats) -> None:
+        self.image, self.levels = image, levels
+        self._frame = frame
+        self._pictures: dict[tuple[int, bool], Tensor] = {}
+
+    def of(self, led: int, halo: bool) -> Tensor:
+        """What an LED shows, with or without halo, (height * COARSE, width * COARSE)."""
+        if (led, halo) not in self._pictures:
+            picture = _spread_picture(self._frame, self.levels[led][self.image[..., led]], halo)
+            self._pictures[led, halo] = torch.as_tensor(picture, dtype=torch.float32)
+        return self._pictures[led, halo]
+
+
+def _free_pattern(picture: Tensor, sources: Sources, brought: Brought, wavelengths_nm: Floats) -> Tensor:
+    """Light on an order's active parts, (active,), of a pattern that varies both ways.
+
+    It is looked up in the spread picture of the pattern. The spread is the usual one all over the frame,
     whatever it is in the corners.
     """
-    picture = _spread_picture(frame, radiance, halo=sources.order == 0)
     height, width = picture.shape
-    source = torch.as_tensor(picture, dtype=torch.float32)[None, None]
+    source = picture[None, None]
     light = brought.of(sources.active, wavelengths_nm)
     every = EVERY if len(wavelengths_nm) > 100 else 1
     total = torch.zeros(len(sources.active))
