@@ -1,11 +1,11 @@
 """A whole plan through real camera libraries: is every stored frame the twin's own, bit by bit?
 
-``python -m tests.benchmarks.bench_cameras [--quick] [--size 112x72] [--json FILE]``
+``python -m tests.benchmarks.bench_cameras [--quick] [--size 112x72] [--library pylon] [--json FILE]``
 
 The twin is scanned once by itself. Then its pictures are what Aravis' own GigE Vision camera on loopback
 delivers; the scan is killed three times and resumed from the disk, and the camera is killed three times more
-and started again. The first 150 frames also go through pylon's emulator, with 50 bad buffers forced between
-them. What is not installed is left out, and said so.
+and started again. Then the same plan goes through pylon's emulator, with 50 bad buffers forced between its
+frames. What is not installed is left out, and said so.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from dsl_core.devices.registry import open_rig
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.frames import Frame
-from dsl_core.model.plan import CapturePlan, GrayCode, LineComb
+from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting
 from dsl_core.pipeline import fit_plan, scan
 from tests.benchmarks.common import options, print_table, write_json
 
@@ -39,6 +39,7 @@ SERIAL = "TWIN"
 SERVER = Path(__file__).parents[1] / "devices" / "drivers" / "aravis_server.py"
 _SHIFT = 4
 _BAD = 50
+LIBRARIES = ("aravis", "pylon")
 _COUNTS = ("asked", "delivered", "bad", "late", "reopened")
 
 
@@ -80,7 +81,12 @@ def plan_of(quick: bool) -> CapturePlan:
     """The published plan, or a short one of combs."""
     if not quick:
         return CapturePlan()
-    return CapturePlan(code=GrayCode(rows=False), spectral=LineComb(width_px=5, step_px=2, period_px=106))
+    return CapturePlan(
+        code=GrayCode(rows=False),
+        spectral=LineComb(width_px=5, step_px=4, period_px=212),
+        settings=(Setting(exposure_ms=166.7, level=0.8),),
+        code_settings=(0,),
+    )
 
 
 def twin(size: str) -> DeviceRig:
@@ -123,7 +129,7 @@ def work(library: str, size: str, quick: bool, folder: Path, file: Path) -> None
 def emulated(
     chosen: GenicamSettings, file: Path
 ) -> tuple[GenicamCamera, Callable[[NDArray[np.uint16]], None]]:
-    """Pylon's emulator, fed by a picture file, with a bad buffer forced for every third of 150 frames."""
+    """Pylon's emulator, fed by a picture file, a bad buffer forced before each of the first 50 frames."""
     import cv2
 
     path = file.with_suffix(".png")
@@ -139,12 +145,10 @@ def emulated(
     def feed(pixels: NDArray[np.uint16]) -> None:
         nonlocal fed
         cv2.imwrite(str(path), pixels << _SHIFT)
-        port = camera._port
-        assert port is not None
-        port.stop()
-        port.write("ImageFilename", str(path))
-        port.start()
-        if fed % 3 == 0 and fed < 3 * _BAD:
+        # The emulator reads its file when it is named.
+        camera.restart(lambda port: port.write("ImageFilename", str(path)))
+        if fed < _BAD:
+            port = camera._ready_port()
             port.write("ForceFailedBufferCount", 1)
             port.execute("ForceFailedBuffer")
         fed += 1
@@ -254,7 +258,7 @@ def through(library: str, arguments: argparse.Namespace, home: Path, known: Path
 def installed() -> list[str]:
     """Libraries to measure; says which are missing, and what brings them."""
     found = []
-    for name, load in (("aravis", aravis_library.aravis), ("pylon", basler.pylon)):
+    for name, load in zip(LIBRARIES, (aravis_library.aravis, basler.pylon), strict=True):
         try:
             load()
             found.append(name)
@@ -267,13 +271,14 @@ def main() -> None:
     """Measure all that is installed."""
     parser = options(__doc__)
     parser.add_argument("--size", default="112x72", help="picture size (default 112x72)")
+    parser.add_argument("--library", choices=LIBRARIES, help="only this one")
     parser.add_argument("--work", nargs=3, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work:
         library, folder, file = arguments.work
         work(library, arguments.size, arguments.quick, Path(folder), Path(file))
         return
-    libraries = installed()
+    libraries = [name for name in installed() if arguments.library in (None, name)]
     with tempfile.TemporaryDirectory() as made:
         home = Path(made)
         with twin(arguments.size) as rig:

@@ -81,6 +81,15 @@ class GenicamCamera(Camera):
         self.counts = replace(self.counts, asked=self.counts.asked + 1)
         return self._retrying(lambda port: self._take(port, timeout_ms / 1000.0))
 
+    def restart(self, meanwhile: Callable[[GenicamPort], None] = lambda port: None) -> None:
+        """Drop whatever frames are on their way, and begin anew; ``meanwhile`` may set what is locked else."""
+        port = self._ready_port()
+        port.stop()
+        meanwhile(port)
+        port.start()
+        # Some cameras count from 0 again, others do not.
+        self._numbers.restart()
+
     def close(self) -> None:
         """Stop and release the camera."""
         self._is_closed = True
@@ -191,8 +200,7 @@ class GenicamCamera(Camera):
                 self.counts = replace(self.counts, late=self.counts.late + 1)
                 faults.append("no frame came")
                 # A frame that comes after all must not pass for the next one.
-                port.stop()
-                port.start()
+                self.restart()
             else:
                 self.counts = replace(self.counts, bad=self.counts.bad + 1)
                 faults.append(raw.fault)

@@ -59,6 +59,7 @@ class FakeSensor:
     is_gone: bool = False
     is_stale: bool = False
     next_id: int = 65401
+    counts_anew: bool = False
     taken: int = 0
     written: list[str] = field(default_factory=list)
     serial: str = "F1"
@@ -153,7 +154,8 @@ class FakePort:
         )
 
     def start(self) -> None:
-        self._reach()
+        sensor = self._reach()
+        sensor.next_id = 0 if sensor.counts_anew else sensor.next_id
         self.running = True
 
     def stop(self) -> None:

@@ -60,6 +60,11 @@ def test_a_trigger_that_is_lost_is_given_again() -> None:
         assert eye.counts.late == 1
 
 
+def test_numbers_rise_where_a_restart_counts_from_zero() -> None:
+    with camera(FakeSensor(counts_anew=True, faults=["", "lost", "", "lost", "lost"])) as eye:
+        assert [eye.snap().frame_id for _ in range(4)] == [0, 1, 2, 3]
+
+
 def test_a_frame_that_comes_late_does_not_pass_for_the_next() -> None:
     class Slow(FakePort):
         held = True
