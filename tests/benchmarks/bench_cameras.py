@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dsl_core.capture.exposure import RetryPolicy
 from dsl_core.devices.base import Camera, CameraInfo, DeviceRig
 from dsl_core.devices.drivers import aravis, aravis_library, basler
 from dsl_core.devices.drivers.genicam.camera import GenicamCamera
@@ -62,8 +63,11 @@ class FedCamera(Camera):
         return self._twin.configure(exposure_ms)
 
     def prepare(self, shot_index: int, attempt: int = 0) -> None:
-        """Render the shot, always with the noise of its first attempt, and give it to the camera."""
-        self._twin.prepare(shot_index, 0)
+        """Render the shot and give it to the camera.
+
+        A frame that was lost comes again with the same noise; one that was judged wrong with other noise.
+        """
+        self._twin.prepare(shot_index, attempt - attempt % RetryPolicy().attempts)
         self._seen = self._twin.snap()
         self._feed(self._seen.pixels)
 
@@ -258,7 +262,8 @@ def through(library: str, arguments: argparse.Namespace, home: Path, known: Path
 def installed() -> list[str]:
     """Libraries to measure; says which are missing, and what brings them."""
     found = []
-    for name, load in zip(LIBRARIES, (aravis_library.aravis, basler.pylon), strict=True):
+    loaders: dict[str, Callable[[], object]] = {"aravis": aravis_library.aravis, "pylon": basler.pylon}
+    for name, load in loaders.items():
         try:
             load()
             found.append(name)
