@@ -43,6 +43,8 @@ class ExposureSearch:
         self._judged = 0
         self.found = False
         self.trouble = ""
+        #: Whether the trouble is too much light for any exposure.
+        self.is_too_bright = False
 
     @property
     def is_over(self) -> bool:
@@ -59,6 +61,7 @@ class ExposureSearch:
         share = self._brightness(pixels)
         if share >= 1.0:
             if exposure_ms <= self._low:
+                self.is_too_bright = True
                 self.trouble = (
                     f"Even the shortest exposure, {exposure_ms:.4g} ms, saturates. Close the"
                     " aperture, or lower the projector's intensity."

@@ -1,4 +1,4 @@
-"""The demo: a finished scan of the simulated rig, made once, and a live one. No Qt."""
+"""The demo: finished scans of the simulated rig, and a live one. No Qt."""
 
 from __future__ import annotations
 
@@ -14,22 +14,16 @@ from dsl_app.scan.controller import ScanController
 from dsl_app.scan.state import Phase
 from dsl_app.shared.jobs.base import Job, JobRunner
 from dsl_app.shared.notify import Notifier
-from dsl_core.errors import Cancelled, DslError
-from dsl_core.model.plan import CapturePlan
-from dsl_core.model.presets import PRESETS
-from dsl_core.progress import Progress
+from dsl_app.start.examples import EXAMPLES
+from dsl_core.errors import StoreError
 
-#: What the finished scan shows: large enough to look at and small enough to be made while a person waits.
-SCENE = {"scene": "color-checker", "size": "296x194"}
-PRESET = "quick"
-#: The live scan: the same chart, for less than half a minute.
-LIVE_RIG = RigChoice("twin", tuple(SCENE.items()))
+#: The live scan: a Color Checker, for less than half a minute.
+LIVE_RIG = RigChoice("twin", (("scene", "color-checker"), ("size", "296x194")))
 LIVE_PRESET = "preview"
-SCAN, RESULT = "demo.dsl", "demo.zarr"
 
 
 class DemoController:
-    """Opens the demo, making it where it is missing, and starts the live one.
+    """Opens finished scans, and starts a live one.
 
     ``open_result`` shows a result; ``scan_page`` opens the Scan page and gives its controller.
     """
@@ -46,50 +40,22 @@ class DemoController:
     ) -> None:
         self._folder, self._rig, self._runner, self._notifier = folder, rig, runner, notifier
         self._open_result, self._scan_page, self._clock = open_result, scan_page, clock
-        self._is_made = False
 
-    # The finished scan -----------------------------------------------------------------------------
+    # Finished scans --------------------------------------------------------------------------------
 
-    def show(self) -> None:
-        """Open the finished scan; while it is being made, say so."""
-        if (self._folder / RESULT).exists():
-            self._present(self._folder / RESULT)
-        elif self._is_made:
-            self._notifier.tell("info", "The demo is being made; it opens when it is ready.")
-        else:
-            self._is_made = True
-            self._notifier.tell("info", "Making the demo for the first time. This takes about a minute.")
-            self._runner.submit(
-                Job("Make the demo", self._make, self._present, self._failed, on_ended=self._end)
-            )
-
-    def _make(self, progress: Progress) -> Path:
-        from dsl_core.io.result.result_file import save_result
-        from dsl_core.workflows.scans import reconstruct_scan
-
-        session = self._folder / SCAN
-        try:
-            take_demo(session, progress)
-        except Cancelled:
-            raise
-        except DslError:
-            # A scan of another version, or a damaged one, cannot be resumed.
-            shutil.rmtree(session, ignore_errors=True)
-            take_demo(session, progress)
-        target = self._folder / RESULT
-        save_result(reconstruct_scan(session, progress=progress), target)
-        return target
+    def show(self, key: str = EXAMPLES[0].key) -> None:
+        """Open a finished scan that comes with the program, from a folder where marks can be saved."""
+        target = self._folder / f"{key}.zarr"
+        title = f"Open the example {key}"
+        self._runner.submit(Job(title, lambda progress: _fetch(key, target), self._present, self._failed))
 
     def _failed(self, error: Exception) -> None:
-        self._notifier.tell("error", f"The demo could not be made: {error}")
-
-    def _end(self) -> None:
-        self._is_made = False
+        self._notifier.tell("error", f"The example could not be opened: {error}")
 
     def _present(self, result: Path) -> None:
         self._open_result(result)
         self._notifier.offer(
-            "This is a finished scan of the simulated rig. Point at a patch to see its spectrum; click"
+            "This is a finished scan of the simulated rig. Point at the picture to see a spectrum; click"
             " to pin it.",
             {"Start a live scan": self.scan_live},
         )
@@ -132,19 +98,16 @@ class DemoController:
             scans.plan_new_scan()
 
 
-def take_demo(session: Path, progress: Progress) -> None:
-    """Capture the demo's scan on the twin, or resume it; raises `DslError`."""
-    from dsl_core import pipeline
-    from dsl_core.devices.registry import open_rig
-    from dsl_core.io.scan.origin import rig_notes
+def _fetch(key: str, target: Path) -> Path:
+    """The example in a folder of the person's own, copied there unless it is; raises `StoreError`."""
+    from dsl_core.io.result.result_file import RESULT_FOLDER, load_result
+    from dsl_core.io.staging import staged
+    from dsl_core.resources import resource_path
 
-    session.parent.mkdir(parents=True, exist_ok=True)
-    progress.report("open the simulated rig", 0, 1)
-    with open_rig("twin", SCENE) as rig:
-        plan = pipeline.fit_plan(demo_plan(), rig)
-        pipeline.scan(rig, plan, session, progress, rig_notes("twin", SCENE))
-
-
-def demo_plan() -> CapturePlan:
-    """The plan of the finished scan."""
-    return next(preset.plan for preset in PRESETS if preset.key == PRESET)
+    try:
+        load_result(target)
+    except StoreError:
+        # Not there yet, damaged, or of another version.
+        with staged([target], overwrite=True, kind=RESULT_FOLDER) as (draft,):
+            shutil.copytree(resource_path(f"examples/{key}.zarr"), draft)
+    return target

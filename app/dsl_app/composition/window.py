@@ -77,6 +77,7 @@ class Composition(QObject):
     def pages(self) -> dict[str, Callable[[], PageWidget]]:
         """Makers of all pages by key."""
         return {
+            "start": self._start_page,
             "rig": self._rig_page,
             "calibrate": self._calibrate_page,
             "scan": self._scan_page,
@@ -201,6 +202,26 @@ class Composition(QObject):
         return ImportAction(self.window)
 
     # Pages -----------------------------------------------------------------------------------------
+
+    def _start_page(self) -> PageWidget:
+        from dsl_app.start.page import StartPage
+
+        window = self.window
+        return StartPage(
+            window.parts.recent,
+            window.open_path,
+            lambda key: self.demo.show(key),
+            self._start_live,
+            lambda: window.open_page("rig"),
+            lambda: window.do("open"),
+        )
+
+    def _start_live(self) -> None:
+        """Show what the simulated rig's camera sees; connects it unless a rig is connected."""
+        self.window.open_page("rig")
+        if self.rig.state.link.value not in (Link.OPEN, Link.OPENING):
+            self.rig.connect(self.rig.state.choice.value)
+        self.live.begin_when_open()
 
     def _rig_page(self) -> PageWidget:
         from dsl_app.rig.page import RigPage

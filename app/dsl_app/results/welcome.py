@@ -6,17 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QListWidget, QListWidgetItem, QWidget
+from PySide6.QtWidgets import QWidget
 
-from dsl_app.shared.settings import RecentFiles, entry_text
-from dsl_app.shared.widgets.forms import label, named, push_button
+from dsl_app.shared.settings import RecentFiles
+from dsl_app.shared.widgets.forms import label, push_button
 from dsl_app.shared.widgets.layouts import STRETCH, Stretch, column_of, row_of
+from dsl_app.shared.widgets.recent_list import RecentList
 
 WIDTH_PX = 560
 HINT = (
     "Open a result (a folder NAME.zarr) or a finished scan (NAME.dsl), or drop one on the window. The demo is"
-    " a scan of a Color Checker with the simulated rig; making it takes about a minute, the first time only."
+    " a scan of a Color Checker with the simulated rig."
 )
 
 
@@ -27,43 +27,15 @@ class Welcome(QWidget):
         self, recent: RecentFiles, open_path: Callable[[Path], object], demo: Callable[[], object]
     ) -> None:
         super().__init__()
-        self._recent, self._open_path = recent, open_path
         tip = "Choose the folder of a result or of a finished scan"
         self.choose = push_button("Open…", tip, role="primary")
         self.demo = push_button("Show the demo", "Open a finished scan of the simulated rig", lambda: demo())
-        self.files = named(QListWidget(), "Recent files", "Double-click or press Enter to open")
-        self.files.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.files.setTextElideMode(Qt.TextElideMode.ElideMiddle)
-        self.files.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.files.itemActivated.connect(self._open)
-        self._title = label("Recent", "heading")
+        listed = RecentList(recent, open_path)
+        self.files = listed.files
         hint = label(HINT, "muted", wraps=True)
         buttons = row_of(self.choose, self.demo, STRETCH)
-        column_of(label("No result is open", "title"), hint, 6, buttons, 14, self._title, self.files, on=self)
+        column_of(label("No result is open", "title"), hint, 6, buttons, 14, listed, on=self)
         self.setFixedWidth(WIDTH_PX)
-        self.stops = [recent.paths.follow(lambda _: self._fill())]
-
-    def _fill(self) -> None:
-        self.files.clear()
-        for path in self._recent.paths.value:
-            item = QListWidgetItem(entry_text(path))
-            item.setData(Qt.ItemDataRole.UserRole, str(path))
-            item.setToolTip(str(path))
-            if not path.exists():
-                item.setForeground(self.palette().placeholderText())
-            self.files.addItem(item)
-        rows = max(self.files.sizeHintForRow(0), 1) * self.files.count()
-        self.files.setFixedHeight(rows + 2 * self.files.frameWidth())
-        for widget in (self._title, self.files):
-            widget.setVisible(self.files.count() > 0)
-
-    def _open(self, item: QListWidgetItem) -> None:
-        self._open_path(Path(item.data(Qt.ItemDataRole.UserRole)))
-
-    def showEvent(self, event: QShowEvent) -> None:
-        """Update the list, as files may have come or gone."""
-        super().showEvent(event)
-        self._fill()
 
 
 class Offer(QWidget):

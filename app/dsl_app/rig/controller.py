@@ -8,14 +8,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from dsl_app.connection.controller import RigController
-from dsl_app.connection.state import RigState
-from dsl_app.rig.state import FrameCounts, LiveState
+from dsl_app.connection.state import Link, RigState
+from dsl_app.rig.state import LEVEL, FrameCounts, LiveState
 from dsl_app.shared.notify import Notifier
 from dsl_core.capture.auto_exposure import ExposureSearch
 from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError, DslError
 from dsl_core.model.frames import Frame
-from dsl_core.patterns.trial_pictures import PictureKind, trial_picture
+from dsl_core.patterns.trial_pictures import KINDS, PictureKind, trial_picture
 from dsl_core.progress import Progress
 
 #: x, y, width, height in pixels of the camera.
@@ -27,6 +27,10 @@ LOST_AFTER = 3
 LIVE_PERIOD_S = 1 / 30
 #: A frame belongs to the requested exposure if its own differs by less than this share: cameras round.
 SAME_EXPOSURE = 0.02
+#: Drive level of a dimmed picture over the one before, and the lowest worth trying.
+DIMMER, LEAST_LEVEL = 0.7, 0.05
+#: Live frames that may be on their way when the picture changes.
+STALE_FRAMES = 2
 
 
 class LiveController:
@@ -37,7 +41,9 @@ class LiveController:
         self._lock = threading.Lock()
         self._latest: Frame | None = None
         self._counts = FrameCounts()
-        self._exposer = AutoExposer(rig.state, self.state, notifier, self.set_exposure)
+        #: What the panel names before anything is chosen on it.
+        self._picture: tuple[PictureKind, float, int] = KINDS[0], LEVEL, 0
+        self._exposer = AutoExposer(rig.state, self.state, notifier, self.set_exposure, self._dim)
         rig.state.devices.follow(lambda _: self.set_exposure(self.state.exposure_ms.value))
         rig.state.live.changed.connect(self._live_changed)
 
@@ -50,6 +56,22 @@ class LiveController:
             self._notifier.tell("info", NO_CAMERA)
         else:
             self.rig.start_live(lambda progress: self._look(devices, progress))
+
+    def begin(self) -> None:
+        """Project the picture that was asked for last, find the exposure for it and start the live view."""
+        if not self.rig.state.used_by.value:
+            self.show_again()
+            self.expose_automatically(None)
+
+    def begin_when_open(self) -> None:
+        """`begin` as soon as the rig that is being opened is open; not at all where it cannot be opened."""
+        link = self.rig.state.link
+        if link.value is Link.OPENING:
+            link.changed.once(
+                lambda now: self.begin() if now is Link.OPEN else None, lambda now: now is not Link.OPENING
+            )
+        elif link.value is Link.OPEN:
+            self.begin()
 
     def stop(self) -> None:
         """Stop after the current frame."""
@@ -115,8 +137,15 @@ class LiveController:
 
     # Projector -------------------------------------------------------------------------------------
 
+    def show_again(self) -> None:
+        """Project the picture that was asked for last, as a newly chosen screen is black."""
+        if self.rig.state.devices.value is not None:
+            self.show(*self._picture)
+
     def show(self, kind: PictureKind, level: float = 1.0, column_px: int = 0) -> None:
         """Project a trial picture, unless it would spoil frames; the live view continues meanwhile."""
+        self._picture = kind, level, column_px
+        self.state.level.set(level)
         user, devices = self.rig.state.used_by.value, self.rig.state.devices.value
         if user:
             self._notifier.tell("info", f"{user} is using the projector. Wait until it ends, or cancel it.")
@@ -131,14 +160,32 @@ class LiveController:
         except DslError as error:
             self._notifier.tell("error", str(error))
 
+    def _dim(self) -> bool:
+        """Project the picture with about half the light; False where that is not possible or too little."""
+        kind, level, column_px = self._picture
+        if self.rig.state.used_by.value or kind == "black" or DIMMER * level < LEAST_LEVEL:
+            return False
+        self.show(kind, round(DIMMER * level, 2), column_px)
+        return True
+
 
 class AutoExposer:
-    """Sets the live exposure by what live frames show; idle until `begin`, then `judge` gets every frame."""
+    """Sets the live exposure by what live frames show; idle until `begin`, then `judge` gets every frame.
+
+    ``dim`` lowers the projector's intensity where even the shortest exposure saturates; False when it cannot.
+    """
 
     def __init__(
-        self, rig: RigState, state: LiveState, notifier: Notifier, set_exposure: Callable[[float], None]
+        self,
+        rig: RigState,
+        state: LiveState,
+        notifier: Notifier,
+        set_exposure: Callable[[float], None],
+        dim: Callable[[], bool],
     ) -> None:
-        self._rig, self._state, self._notifier, self._set = rig, state, notifier, set_exposure
+        self._rig, self._state, self._notifier, self._set, self._dim = rig, state, notifier, set_exposure, dim
+        #: Frames to leave out, as they may show the picture before it was dimmed.
+        self._stale = 0
         self._search: ExposureSearch | None = None
         self._region: Region | None = None
 
@@ -148,7 +195,7 @@ class AutoExposer:
         if devices is None:
             return
         info, known = devices.camera.info, devices.calibration
-        self._region = region
+        self._region, self._stale = region, 0
         self._search = search = ExposureSearch(
             info.exposure_range_ms,
             2**info.bit_depth - 1,
@@ -163,6 +210,9 @@ class AutoExposer:
         search, asked_ms = self._search, self._state.exposure_ms.value
         if search is None or abs(frame.exposure_ms - asked_ms) > SAME_EXPOSURE * asked_ms:
             return
+        if self._stale:
+            self._stale -= 1
+            return
         pixels = frame.pixels
         if self._region is not None:
             x, y, width, height = self._region
@@ -172,11 +222,16 @@ class AutoExposer:
         if not search.is_over:
             self._set(following_ms)
             return
+        if search.is_too_bright and self._dim():
+            self.begin(self._region)
+            self._stale = STALE_FRAMES
+            return
         self.end()
         if search.trouble:
             self._notifier.tell("warning", search.trouble)
         else:
-            self._notifier.tell("info", f"Exposed for {asked_ms:.4g} ms.")
+            level = self._state.level.value
+            self._notifier.tell("info", f"Exposed for {asked_ms:.4g} ms at intensity {level:.2f}.")
 
     def end(self) -> None:
         """Stop the search."""

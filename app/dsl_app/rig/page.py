@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLineEdit
 
 from dsl_app.connection.state import Link, RigChoice
@@ -111,11 +111,14 @@ class RigPage(PageWidget):
         state, live, commands = self._state, self._live_state, self._commands
         self.exposure.valueChanged.connect(commands.set_exposure)
         self.projector.requested.connect(commands.show)
+        # Once whoever serves the choice has made the screen the projector's.
+        self.projector.screen_chosen.connect(lambda _: QTimer.singleShot(0, self, commands.show_again))
         self.stops += [
             state.choice.follow(self._show_choice),
             state.devices.follow(self._show_devices),
             state.live.follow(self._switch_timer),
             live.exposure_ms.follow(self._show_exposure),
+            live.level.follow(self.projector.set_level),
             state.used_by.follow(self.projector.set_user),
             *follow_any(self._show, state.link, state.trouble, live.is_exposing),
         ]
@@ -126,6 +129,7 @@ class RigPage(PageWidget):
             return
         choice = RigChoice(str(self._rig.currentData()), parse_options(self._options.text()))
         self._rig_commands.connect(choice)
+        self._commands.begin_when_open()
 
     def _toggle_live(self) -> None:
         if self._state.live.value:

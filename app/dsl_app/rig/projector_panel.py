@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QSlider
 
-from dsl_app.rig.state import panel_view
+from dsl_app.rig.state import LEVEL, panel_view
 from dsl_app.shared.widgets.forms import ChoiceBox, NumberBox, WholeBox, check_box, label, push_button, quiet
 from dsl_app.shared.widgets.layouts import column_of, row_of
 from dsl_core.devices.base import ProjectorInfo
@@ -35,7 +35,7 @@ class ProjectorPanel(QGroupBox):
         self._kind = ChoiceBox("Picture", "What the projector shows")
         for kind in KINDS:
             self._kind.addItem(kind.capitalize(), kind)
-        self._level = NumberBox("Intensity", 0, 1, 0.8, decimals=2, tip="Drive level of lit parts, 0 to 1")
+        self._level = NumberBox("Intensity", 0, 1, LEVEL, decimals=2, tip="Drive level of lit parts, 0 to 1")
         self._level.setSingleStep(0.05)
         self._column = WholeBox("Line column", 0, 639, 320, "px", "First column of the line")
         self._slider = QSlider(Qt.Orientation.Horizontal)
@@ -84,6 +84,11 @@ class ProjectorPanel(QGroupBox):
             self._column.setMaximum(last)
             self._slider.setRange(0, last)
         self._show_state()
+
+    def set_level(self, level: float) -> None:
+        """Show the intensity that is projected, whoever chose it."""
+        with quiet(self._level):
+            self._level.setValue(level)
 
     def set_user(self, title: str) -> None:
         """Leave the projector to a job of this title, whose frames a picture would spoil; empty for none."""

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from dsl_core.devices.base import CameraInfo, ProjectorInfo
     from dsl_core.model.frames import Frame
 
+#: Drive level of the first trial picture.
+LEVEL = 0.8
 _LINK_ROLES = {Link.OPEN: "good", Link.OPENING: "warn", Link.LOST: "bad", Link.CLOSED: "muted"}
 
 
@@ -27,13 +29,17 @@ class FrameCounts:
 
 
 class LiveState:
-    """Values of the live view: the latest frame, its exposure, and whether an exposure is being searched."""
+    """Values of the live view: the latest frame, its exposure, and whether an exposure is being searched.
+
+    ``level`` is the drive level of the trial picture.
+    """
 
     def __init__(self) -> None:
         self.frame: Value[Frame | None] = Value(None)
         self.exposure_ms = Value(1000.0 / 6.0)
         self.counts = Value(FrameCounts())
         self.is_exposing = Value(False)
+        self.level = Value(LEVEL)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="ignore", validate_assignment=True)
 
     theme: Literal["system", "light", "dark"] = "system"
-    page: str = "rig"
+    page: str = "start"
     rig: str = "twin"
     rig_options: dict[str, str] = Field(default_factory=dict)
     recent: list[str] = Field(default_factory=list)

@@ -41,6 +41,7 @@ class Page:
 
 
 PAGES: tuple[Page, ...] = (
+    Page("start", "Start", "start", "Finished scans, the simulated rig, your own rig, recent files", "rig"),
     Page("rig", "Rig", "rig", "Devices, live view, projector, self-test", "rig"),
     Page("calibrate", "Calibrate", "calibrate", "Guided calibrations and their library", "calibrating"),
     Page("scan", "Scan", "scan", "Plan, run and watch a scan", "scanning"),
@@ -71,8 +72,8 @@ ACTIONS: tuple[Action, ...] = (
     Action("undo", "&Undo", "View", "Ctrl+Z", "Undo the last change of pins, regions or settings"),
     Action("redo", "&Redo", "View", "Ctrl+Shift+Z", "Redo what was undone"),
     *(
-        Action(f"page_{page.key}", page.title, "View", f"Ctrl+{i}", page.tip, separator=i == 1)
-        for i, page in enumerate(PAGES, 1)
+        Action(f"page_{page.key}", page.title, "View", f"Ctrl+{i}", page.tip, separator=i == 0)
+        for i, page in enumerate(PAGES)
     ),
     Action("theme_system", "&System theme", "View", checkable=True, separator=True),
     Action("theme_light", "&Light theme", "View", checkable=True),

@@ -23,7 +23,7 @@ class Rail(QFrame):
         super().__init__(parent)
         self.setObjectName("rail")
         self._pages = tuple(pages)
-        self._buttons = {page.key: self._button(page, number) for number, page in enumerate(pages, 1)}
+        self._buttons = {page.key: self._button(page, number) for number, page in enumerate(pages)}
         column_of(*self._buttons.values(), STRETCH, on=self, margins=(0, 6, 0, 6), spacing=2)
 
     def _button(self, page: Page, number: int) -> QToolButton:

@@ -19,6 +19,7 @@ _log = logging.getLogger(__name__)
 _SHARED = ("dsl_app.connection.controller", "dsl_app.rig.projector_screens", "dsl_app.session.restore")
 #: What each page is made of.
 PAGE_MODULES = {
+    "start": (*_SHARED, "dsl_app.start.page"),
     "rig": (*_SHARED, "dsl_core.devices.registry", "dsl_app.rig.page"),
     "scan": (
         *_SHARED,

@@ -5,23 +5,21 @@ from collections import namedtuple
 from datetime import datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 from dsl_app.composition import demo
 from dsl_app.composition.demo import DemoController
 from dsl_app.connection.state import Link, RigChoice
 from dsl_app.scan.state import Phase
+from dsl_app.start.examples import EXAMPLES, Example
 
-from dsl_core import pipeline
-from dsl_core.devices.base import DeviceRig
 from dsl_core.errors import DeviceError
 from dsl_core.io.result.result_file import load_result
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.model.frames import Frame
-from dsl_core.model.plan import CapturePlan
 from dsl_core.simulation.sim_devices import SimCamera
-from dsl_core.workflows import scans
 from tests.app.support.doubles import InlineRunner
-from tests.app.support.scan_bench import SHORT, ScanBench, make_bench
+from tests.app.support.scan_bench import ScanBench, make_bench
 
 SMALL = {"scene": "color-checker", "size": "64x48"}
 
@@ -42,68 +40,44 @@ class Bench:
         )
 
 
-def patch_small(patch: pytest.MonkeyPatch) -> None:
-    """Let the demo be a short scan of few pixels."""
-    patch.setattr(demo, "SCENE", SMALL)
-    patch.setattr(demo, "LIVE_RIG", RigChoice("twin", tuple(SMALL.items())))
-    patch.setattr(demo, "demo_plan", lambda: SHORT)
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """A bench whose demo has been made: the one real reconstruction of these tests."""
-    made = Bench(tmp_path_factory.mktemp("finished"))
-    with pytest.MonkeyPatch.context() as patch:
-        patch_small(patch)
-        made.demo.show()
-    return made
-
-
 @pytest.fixture
-def bench(tmp_path: Path, finished: Bench, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    """A bench without a demo; new demos are copies of the finished one."""
-    patch_small(monkeypatch)
-    result, capture = finished.opened[0], pipeline.scan
-
-    def copy_scan(rig: DeviceRig, plan: CapturePlan, session: Path, *rest: object) -> object:
-        if session.exists():
-            return capture(rig, plan, session, *rest)  # type: ignore[arg-type]
-        return shutil.copytree(result.with_suffix(".dsl"), session)
-
-    monkeypatch.setattr(pipeline, "scan", copy_scan)
-    monkeypatch.setattr(scans, "reconstruct_scan", lambda session, progress: load_result(result))
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    """A bench whose live scan is a short one of few pixels."""
+    monkeypatch.setattr(demo, "LIVE_RIG", RigChoice("twin", tuple(SMALL.items())))
     return Bench(tmp_path)
 
 
-def test_the_demo_is_made_once_and_offers_a_live_one(finished: Bench) -> None:
-    result = finished.opened[0]
-    assert result.name == "demo.zarr"
-    assert "reflectance" in load_result(result)
-    assert "Start a live scan" in finished.scans.notifier.offers
-    finished.demo.show()
-    assert [job.title for job in finished.runner.finished] == ["Make the demo"]
-    assert finished.opened[:2] == [result, result]
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda each: each.key)
+def test_the_examples_open_from_a_folder_of_the_person(
+    bench: Bench, tmp_path: Path, example: Example
+) -> None:
+    bench.demo.show(example.key)
+    (path,) = bench.opened
+    assert path == tmp_path / "demo" / f"{example.key}.zarr"
+    result = load_result(path)
+    assert result.sizes["wavelength_nm"] == 47
+    assert float((result["flags"] == 0).mean()) > 0.5
+    assert "Start a live scan" in bench.scans.notifier.offers
 
 
-def test_a_demo_of_another_version_is_made_again(bench: Bench, tmp_path: Path) -> None:
-    session = tmp_path / "demo" / "demo.dsl"
-    session.mkdir(parents=True)
-    (session / "manifest.json").write_text("{ cut off")
+def test_a_damaged_example_is_replaced_and_marks_next_to_it_stay(bench: Bench, tmp_path: Path) -> None:
     bench.demo.show()
-    assert bench.opened == [tmp_path / "demo" / "demo.zarr"]
-    assert not ScanReader(session).missing()
-
-
-def test_a_failure_is_told_and_can_be_tried_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(*_: object) -> None:
-        raise OSError("no room")
-
-    with monkeypatch.context() as broken:
-        broken.setattr(demo, "take_demo", fail)
-        bench.demo.show()
-    assert bench.scans.notifier.told[-1] == ("error", "The demo could not be made: no room")
+    (path,) = bench.opened
+    marks = path.with_suffix(".marks.json")
+    marks.write_text("{}")
+    next(path.glob("depth_mm/c/*/*")).write_bytes(b"cut off")
     bench.demo.show()
-    assert len(bench.opened) == 1
+    assert bench.opened == [path, path]
+    assert np.isfinite(load_result(path)["depth_mm"].values).any()
+    assert marks.exists()
+
+
+def test_a_failure_is_told(bench: Bench, tmp_path: Path) -> None:
+    (tmp_path / "demo").write_text("a file where a folder is needed")
+    bench.demo.show()
+    kind, text = bench.scans.notifier.told[-1]
+    assert kind == "error"
+    assert text.startswith("The example could not be opened: ")
 
 
 def test_the_live_demo_connects_the_twin_and_scans(bench: Bench, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from dsl_app.connection.controller import RigController
 from dsl_app.connection.state import Link, RigChoice, RigState
@@ -47,7 +48,6 @@ def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
     assert not page.live_button.isEnabled()
     connect(qtbot, page, state)
     assert "64 × 48" in page.camera_text.text()
-    click(page.live_button)
     qtbot.waitUntil(lambda: page.live.content.frames_per_second > 0, timeout=20_000)
     assert page.live_button.text() == "Stop live view"
     click(page.live_button)
@@ -55,6 +55,29 @@ def test_connect_look_and_leave(qtbot: QtBot, bench: Bench) -> None:
     click(page.connect_button)
     qtbot.waitUntil(lambda: runner.active == ())
     assert page.camera_text.text() == "–"
+
+
+def test_connecting_projects_what_the_panel_names_and_exposes_for_it(qtbot: QtBot, bench: Bench) -> None:
+    page, state, _, notifier = bench
+    connect(qtbot, page, state)
+    devices = state.devices.value
+    assert devices is not None
+    assert page.projector._kind.currentText() == "White"
+    assert (devices.projector.world.image == 204).all()  # type: ignore[attr-defined]
+    # So much light saturates any exposure, so it is dimmed, and the panel says so.
+    qtbot.waitUntil(lambda: bool(notifier.told), timeout=30_000)
+    assert notifier.told[-1][1].startswith("Exposed for ")
+    level = page.projector._level.value()
+    assert 0.05 < level < 0.8
+    drive = round(255 * level)
+    assert (devices.projector.world.image == drive).all()  # type: ignore[attr-defined]
+    frame = page._live_state.frame.value
+    assert frame is not None
+    assert 1000 < np.quantile(frame.pixels, 0.99) < 4095
+    # A screen that is chosen later is black until it is told what to show.
+    devices.projector.world.image = np.zeros_like(devices.projector.world.image)  # type: ignore[attr-defined]
+    page.projector.screen_chosen.emit("")
+    qtbot.waitUntil(lambda: bool((devices.projector.world.image == drive).all()))  # type: ignore[attr-defined]
 
 
 def test_a_wrong_option_is_told_on_the_page(qtbot: QtBot, bench: Bench) -> None:
@@ -117,9 +140,9 @@ def test_options_as_people_type_them() -> None:
 def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, notifier = bench
     connect(qtbot, page, state)
+    qtbot.waitUntil(lambda: bool(notifier.told), timeout=30_000)
+    notifier.told.clear()
     assert not page.live.content.rectangle.isVisible()
-    click(page.live_button)
-    qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
     page.live.content.region_box.click()
     region = page.live.content.region
     assert region is not None
@@ -142,7 +165,6 @@ def test_a_region_limits_figures_and_exposure(qtbot: QtBot, bench: Bench) -> Non
 def test_raw_counts_are_read_by_keys_too(qtbot: QtBot, bench: Bench) -> None:
     page, state, _, _ = bench
     connect(qtbot, page, state)
-    click(page.live_button)
     qtbot.waitUntil(lambda: page._live_state.frame.value is not None, timeout=20_000)
     click(page.live_button)
     qtbot.waitUntil(lambda: not state.live.value)

@@ -1,0 +1,104 @@
+"""The Start page: three ways to begin, and recent files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFrame, QPushButton
+
+from dsl_app.shared.settings import RecentFiles
+from dsl_app.shared.widgets.forms import label, push_button
+from dsl_app.shared.widgets.layouts import STRETCH, boxed, column_of, row_of, scrolled
+from dsl_app.shared.widgets.page import PageWidget
+from dsl_app.shared.widgets.recent_list import RecentList
+from dsl_app.start.examples import EXAMPLES
+
+CARD_PX, GAP_PX = 300, 16
+
+
+class StartPage(PageWidget):
+    """Three cards, whose buttons call what they are made with, and the files that were open last."""
+
+    def __init__(
+        self,
+        recent: RecentFiles,
+        open_path: Callable[[Path], object],
+        show_example: Callable[[str], object],
+        start_live: Callable[[], object],
+        choose_rig: Callable[[], object],
+        choose_file: Callable[[], object],
+    ) -> None:
+        super().__init__()
+        self.examples = {
+            each.key: push_button(
+                each.title, each.about, partial(show_example, each.key), "" if place else "primary"
+            )
+            for place, each in enumerate(EXAMPLES)
+        }
+        self.live = push_button(
+            "Start the live view",
+            "Connect the rig, expose and show its camera",
+            start_live,
+        )
+        self.connect_rig = push_button(
+            "Choose a rig…", "Open the Rig page, where installed rigs and rig profiles are listed", choose_rig
+        )
+        self.choose = push_button("Open a file…", "Choose the folder of a result or of a scan", choose_file)
+        self.files = RecentList(recent, open_path)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        cards = (
+            _card(
+                "Look at a finished scan",
+                "Scans of the simulated rig, ready to explore: point at the picture to see a spectrum with"
+                " its band, click to pin it, turn the point cloud.",
+                *self.examples.values(),
+            ),
+            _card(
+                "Try the simulated rig",
+                "A digital twin of the published prototype behaves like the hardware: live picture,"
+                " calibration wizards, scans. Nothing has to be plugged in.",
+                self.live,
+            ),
+            _card(
+                "Connect my rig",
+                "Camera, projector and, for calibrations, stage and spectroradiometer. The self-test then"
+                " tells whether they are set up well.",
+                self.connect_rig,
+            ),
+        )
+        width = 3 * CARD_PX + 2 * GAP_PX
+        self.files.setFixedWidth(width)
+        column = column_of(
+            STRETCH,
+            label("dsl-scan", "title"),
+            label("Hyperspectral 3D scans with a camera, a projector and a diffraction film", "muted"),
+            14,
+            row_of(*cards, spacing=GAP_PX),
+            14,
+            row_of(self.choose, STRETCH),
+            8,
+            self.files,
+            STRETCH,
+            STRETCH,
+            margins=0,
+        )
+        middle = boxed(column)
+        middle.setFixedWidth(width)
+        content = boxed(row_of(STRETCH, middle, STRETCH, margins=12))
+        column_of(scrolled(content), on=self, margins=0)
+
+
+def _card(title: str, text: str, *buttons: QPushButton) -> QFrame:
+    """A raised panel: what it is for, and buttons at its lower edge."""
+    card = QFrame()
+    card.setProperty("role", "card")
+    card.setFixedWidth(CARD_PX)
+    about = label(text, wraps=True)
+    about.setAlignment(Qt.AlignmentFlag.AlignTop)
+    column_of(label(title, "heading"), 4, about, STRETCH, *buttons, on=card, margins=16, spacing=8)
+    return card

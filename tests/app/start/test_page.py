@@ -1,0 +1,49 @@
+from pathlib import Path
+
+from dsl_app.shared.settings import RecentFiles, Settings
+from dsl_app.start.examples import EXAMPLES
+from dsl_app.start.page import StartPage
+from pytestqt.qtbot import QtBot
+
+from dsl_core.resources import resource_path
+
+
+def make_page(qtbot: QtBot, recent: RecentFiles) -> tuple[StartPage, list[object]]:
+    asked: list[object] = []
+    page = StartPage(
+        recent,
+        asked.append,
+        asked.append,
+        lambda: asked.append("live"),
+        lambda: asked.append("rig"),
+        lambda: asked.append("file"),
+    )
+    qtbot.addWidget(page)
+    page.resize(1200, 700)
+    page.show()
+    return page, asked
+
+
+def test_each_button_asks_for_what_it_says(qtbot: QtBot) -> None:
+    page, asked = make_page(qtbot, RecentFiles(Settings()))
+    for button in (*page.examples.values(), page.live, page.connect_rig, page.choose):
+        button.click()
+    assert asked == [*(each.key for each in EXAMPLES), "live", "rig", "file"]
+    primary = [b for b in (*page.examples.values(), page.live) if b.property("role") == "primary"]
+    assert primary == [page.examples["color-checker"]]
+
+
+def test_recent_files_are_there_only_if_there_are_any(qtbot: QtBot, tmp_path: Path) -> None:
+    recent = RecentFiles(Settings())
+    page, asked = make_page(qtbot, recent)
+    assert not page.files.files.isVisible()
+    recent.add(tmp_path)
+    assert page.files.files.isVisible()
+    page.files.files.itemActivated.emit(page.files.files.item(0))
+    assert asked == [tmp_path]
+    page.release()
+
+
+def test_every_example_comes_with_the_program() -> None:
+    for each in EXAMPLES:
+        assert resource_path(f"examples/{each.key}.zarr").is_dir()
