@@ -22,7 +22,9 @@ def files() -> Iterator[Path]:
     yield from (path for path in ROOT.iterdir() if path.is_file() and path.suffix in TEXT)
     for folder in FOLDERS:
         for path in (ROOT / folder).rglob("*"):
-            if path.is_file() and path.suffix in TEXT and "__pycache__" not in path.parts:
+            is_text = path.suffix in TEXT and "__pycache__" not in path.parts
+            # Chunks of arrays have names without an ending.
+            if is_text and path.is_file() and not any(part.endswith(".zarr") for part in path.parts[:-1]):
                 yield path
 
 
