@@ -35,7 +35,7 @@ def window(qapp: QApplication, home: Path) -> Iterator[MainWindow]:
     patch = pytest.MonkeyPatch()
     patch.setenv("DSL_SCAN_HOME", str(home))
     # The rig of the whole demo takes long to open, and that cannot be cancelled.
-    patch.setattr(demo, "SCENE", {"scene": "plane", "size": "64x48"})
+    patch.setattr(demo, "LIVE_RIG", TWIN)
     composition = Composition(StartOptions(TWIN))
     made = composition.open_window(home)
     made.resize(1280, 800)
