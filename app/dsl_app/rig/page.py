@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QTimer, Signal
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLineEdit
 
 from dsl_app.connection.state import Link, RigChoice
@@ -36,6 +37,7 @@ class RigPage(PageWidget):
         super().__init__()
         self._rig_commands, self._commands = live.rig, live
         self._state, self._live_state = live.rig.state, live.state
+        self._looks_again = False
         self.stops: list[Callable[[], None]] = []
         self.live = Deferred(self._make_live)
         self.live.setObjectName("live-view")
@@ -179,6 +181,20 @@ class RigPage(PageWidget):
     def command_line(self) -> str:
         """How the command line tests this rig."""
         return f"dsl-scan selftest {self._state.choice.value.command}"
+
+    def hideEvent(self, event: QHideEvent) -> None:
+        """Let the camera rest while another page is open."""
+        super().hideEvent(event)
+        if self._state.live.value and not event.spontaneous():
+            self._looks_again = True
+            self._commands.stop()
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Look again, if the page was left while it did and nobody needs the rig."""
+        super().showEvent(event)
+        looks_again, self._looks_again = self._looks_again, False
+        if looks_again and self._state.link.value is Link.OPEN and not self._state.used_by.value:
+            self._commands.start()
 
     def release(self) -> None:
         """Stop the live view and follow nothing more."""

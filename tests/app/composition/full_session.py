@@ -97,6 +97,7 @@ class Session:
 
     def connect(self) -> None:
         """Type the rig's options and connect it."""
+        key(Qt.Key.Key_1, self.window, CONTROL)
         page = self.window.page_of("rig")
         assert isinstance(page, RigPage)
         write(page._options, RIG)
