@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from dsl_core.errors import DeviceError
@@ -98,10 +99,13 @@ class SerialLine:
             left_s = end - self._clock()
             if left_s <= 0:
                 return got
-            self._port.timeout = min(left_s, _STEP_S)
-            got += self._do(lambda: self._port.read(max(1, self._port.in_waiting)))
+            got += self._do(partial(self._arrived, min(left_s, _STEP_S)))
         got, self._rest = got[:wanted], got[wanted:]
         return got
+
+    def _arrived(self, wait_s: float) -> bytes:
+        self._port.timeout = wait_s  # this too fails on a port that is gone
+        return self._port.read(max(1, self._port.in_waiting))
 
     def _do(self, action: Callable[[], T]) -> T:
         if not self._is_open:

@@ -71,7 +71,7 @@ class FakePort:
     """A port of pyserial in memory; reading with nothing there lets its clock run instead of waiting."""
 
     def __init__(self, instrument: Instrument) -> None:
-        self.timeout: float | None = 0.1
+        self._timeout: float | None = 0.1
         self.now_s = 0.0
         self.is_closed = False
         self._instrument = instrument
@@ -84,6 +84,15 @@ class FakePort:
 
     def sleep(self, seconds: float) -> None:
         self.now_s += seconds
+
+    @property
+    def timeout(self) -> float | None:
+        return self._timeout
+
+    @timeout.setter
+    def timeout(self, seconds: float | None) -> None:
+        self._require()
+        self._timeout = seconds
 
     @property
     def in_waiting(self) -> int:
@@ -102,7 +111,7 @@ class FakePort:
         self._require()
         self._arrive()
         if len(self._buffer) < size:
-            end = self.now_s + (self.timeout or 0.0)
+            end = self.now_s + (self._timeout or 0.0)
             while self._coming and self._coming[0][0] <= end and len(self._buffer) < size:
                 self.now_s = max(self.now_s, self._coming[0][0])
                 self._arrive()
