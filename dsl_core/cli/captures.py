@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: What is left out of a table between its first and its last lines.
 HEAD_LINES, TAIL_LINES = 30, 10
+#: Endings of files with lenses and pose.
+STEREO_FILES = {".xml", ".yml", ".yaml", ".json"}
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,42 @@ def import_capture(
         with output.progress() as progress:
             captures.import_pictures(source, target, mapping, rig, progress)
         output.say(f"Imported to {target}. Next: dsl-scan reconstruct {target} --depth-only")
+        output.put(imported=target)
+
+
+@dataclass(frozen=True)
+class StereoOptions:
+    """What a calibration's file does not contain."""
+
+    base: Path | None
+    camera_size: str
+    projector: str | None
+    unit_mm: float
+    force: bool
+
+
+def import_stereo(output: Output, source: Path, target: Path | None, options: StereoOptions) -> None:
+    """Say which lenses and pose a file contains; make a rig for depth if there is a target."""
+    from dsl_core.errors import PlanError
+    from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo
+    from dsl_core.io.rig_file import load_rig, save_rig
+    from dsl_core.simulation.published_rig import published_rig
+
+    if options.projector is None:
+        raise PlanError(f"{source} does not say the size of the projector. Give --projector WIDTHxHEIGHT.")
+    camera = parse_size("--camera-size", options.camera_size)
+    projector = parse_size("--projector", options.projector)
+    found = load_any_stereo(source, camera, projector, options.unit_mm)
+    output.table(("part", "called"), list(found.names.items()))
+    for sentence in found.assumed:
+        output.say(f"Assumed: {sentence}.")
+    distance_mm = sum(value**2 for value in found.stereo.pose.translation_mm) ** 0.5
+    output.say(f"Camera {camera[0]} x {camera[1]} px; the projector is {distance_mm:.1f} mm from it.")
+    output.put(names=found.names, assumed=list(found.assumed), baseline_mm=round(distance_mm, 3))
+    if target is not None:
+        base = load_rig(options.base) if options.base else published_rig()
+        save_rig(lenses_on(base, found, source.name), target, overwrite=options.force)
+        output.say(f"Imported to {target}: for depth; its curves are not those of your devices.")
         output.put(imported=target)
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def import_(
     source: Annotated[
         Path,
-        typer.Argument(metavar="FOLDER", help="A published dataset or calibration, or pictures."),
+        typer.Argument(metavar="SOURCE", help="A published dataset or calibration, pictures, a stereo file."),
     ],
     target: Annotated[
         Path | None,
@@ -35,8 +35,12 @@ def import_(
         ),
     ] = None,
     camera_size: Annotated[
-        str, typer.Option("--camera-size", help="Image size of a published calibration.")
+        str, typer.Option("--camera-size", help="Image size of a calibration that does not contain it.")
     ] = "890x580",
+    unit_mm: Annotated[
+        float,
+        typer.Option("--unit-mm", min=1e-6, help="Unit of lengths in a stereo file, mm: 1000 for metres."),
+    ] = 1.0,
     guess: Annotated[
         bool,
         typer.Option("--guess", help="Find out what the pictures show; writes the mapping."),
@@ -60,15 +64,25 @@ def import_(
 
     For the former, list what is missing or misnamed; for the latter, what each picture shows.
     """
-    from dsl_core.cli.captures import PictureOptions, import_capture
+    from dsl_core.cli.captures import (
+        STEREO_FILES,
+        PictureOptions,
+        StereoOptions,
+        import_capture,
+        import_stereo,
+    )
     from dsl_core.io.published.calibration import check_calibration, holds_calibration
     from dsl_core.io.rig_file import load_rig, save_rig
     from dsl_core.simulation.published_rig import published_rig
     from dsl_core.workflows import exchange
 
+    output = Output(json)
+    if source.is_file() and source.suffix.lower() in STEREO_FILES:
+        import_stereo(output, source, target, StereoOptions(base, camera_size, projector, unit_mm, force))
+        output.finish()
+        return
     if not source.is_dir():
         raise StoreError(f"{source} is not a folder. Give the folder of a published dataset or calibration.")
-    output = Output(json)
     options = PictureOptions(guess, mapping, projector, chosen, force)
     if options.is_asked_for:
         import_capture(output, source, target, load_rig(base) if base else None, options)

@@ -51,7 +51,7 @@ def load_mapping(path: Path) -> Mapping:
 def sensor_of(scan: PictureScan) -> Sensor:
     """What is assumed of a camera that nobody described: the noise of a common one, no black level."""
     return Sensor(
-        bayer=scan.mapping.bayer or "RGGB",
+        bayer=scan.mapping.bayer or "MONO",
         bit_depth=scan.bit_depth,
         black_level_dn=0.0,
         electrons_per_dn=FULL_WELL / 2**scan.bit_depth,

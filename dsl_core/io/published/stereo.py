@@ -75,14 +75,14 @@ def load_stereo(path: Path, projector_size_px: Size, camera_size_px: Size | None
 
     Sizes are (width, height). Raises `CalibrationError` that names the node that is missing or wrong.
     """
-    nodes = _read_nodes(path)
+    nodes = read_nodes(path)
     dialect = _dialect_of(nodes, path)
     values = {part: _shaped(nodes, node, part, path) for part, node in _NODES[dialect].items()}
     size = _camera_size(nodes, camera_size_px, path)
     try:
         return Stereo(
-            camera=_lens(values["camera matrix"], values["camera distortion"], size),
-            projector=_lens(values["projector matrix"], values["projector distortion"], projector_size_px),
+            camera=lens_of(values["camera matrix"], values["camera distortion"], size),
+            projector=lens_of(values["projector matrix"], values["projector distortion"], projector_size_px),
             pose=Pose(
                 rotation=tuple(map(tuple, values["rotation"].tolist())),  # type: ignore[arg-type]
                 translation_mm=tuple(values["translation"].tolist()),
@@ -155,7 +155,7 @@ def fundamental_matrix(stereo: Stereo) -> NDArray[np.float64]:
     return fundamental / last if last else fundamental
 
 
-def _read_nodes(path: Path) -> dict[str, Any]:
+def read_nodes(path: Path) -> dict[str, Any]:
     """Every number and matrix at the top of the file, by name."""
     import cv2
 
@@ -220,11 +220,11 @@ def _shaped(nodes: dict[str, Any], node: str, part: str, path: Path) -> NDArray[
     if not np.isfinite(values).all():
         raise CalibrationError(f"{path}: {node} contains numbers that are not finite. Calibrate again.")
     if shape is None:
-        return _five_coefficients(values.ravel(), node, path)
+        return five_coefficients(values.ravel(), node, path)
     return values
 
 
-def _five_coefficients(values: NDArray[np.float64], node: str, path: Path) -> NDArray[np.float64]:
+def five_coefficients(values: NDArray[np.float64], node: str, path: Path) -> NDArray[np.float64]:
     """OpenCV's k1 k2 p1 p2 [k3 [...]]; the model ends at k3, so anything further must be zero."""
     if len(values) < 4 or np.any(values[5:]):
         raise CalibrationError(
@@ -234,7 +234,8 @@ def _five_coefficients(values: NDArray[np.float64], node: str, path: Path) -> ND
     return np.pad(values[:5], (0, max(0, 5 - len(values))))
 
 
-def _lens(matrix: NDArray[np.float64], distortion: NDArray[np.float64], size_px: Size) -> Lens:
+def lens_of(matrix: NDArray[np.float64], distortion: NDArray[np.float64], size_px: Size) -> Lens:
+    """A lens from a matrix (3, 3), five coefficients and the image size (width, height)."""
     return Lens(
         width_px=size_px[0],
         height_px=size_px[1],

@@ -1,0 +1,64 @@
+"""A stranger's folder, from pictures to exported columns and depth, by commands."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsl_core.cli import main
+from dsl_core.io.result.result_file import load_result
+from dsl_core.model.captured_code import Stripes
+from tests.cases.foreign_captures import CAMERA, PROJECTOR, frames, write
+
+
+def test_pictures_become_columns_and_with_a_calibration_depth(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    write(tmp_path / "set", {f"im{i:02d}.png": p for i, p in enumerate([*pictures, white, black])})
+    assert main(["import", "set", "--guess", "--projector", "128x96", "-o", "a.dsl"]) == 0
+    said = capsys.readouterr().out
+    assert "columns, gray bit 6 inverse" in said
+    assert "set.mapping.json" in said
+    assert main(["reconstruct", "a.dsl"]) == 0
+    assert "Name one with --calibration" in " ".join(capsys.readouterr().out.split())
+    assert main(["export", "a.zarr", "npy", "a.npy"]) == 0
+    assert np.isfinite(np.load("a_column.npy")).mean() > 0.9
+
+    width, height = CAMERA
+    focal = 1.5 * width
+    stereo = {
+        "cam_K": [[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]],
+        "proj_K": [[focal * 0.72, 0, 42], [0, focal * 0.72, PROJECTOR[1] / 2], [0, 0, 1]],
+        "R": np.eye(3).tolist(),
+        "T": [100, 0, 0],
+    }
+    Path("stereo.json").write_text(json.dumps(stereo), encoding="utf-8")
+    sizes = ["--camera-size", "160x120", "--projector", "128x96"]
+    assert main(["import", "stereo.json", *sizes, "-o", "rig.json"]) == 0
+    assert "no camera distortion" in capsys.readouterr().out
+    assert (
+        main(["import", "set", "--mapping", "set.mapping.json", "--calibration", "rig.json", "-o", "b.dsl"])
+        == 0
+    )
+    assert main(["import", "set", "--guess"]) == 2
+    assert "set.mapping.json" in capsys.readouterr().err
+    assert main(["reconstruct", "b.dsl"]) == 0
+    assert "have a depth" in capsys.readouterr().out
+    # The wall is where its columns meet the rays of the camera: 0.72 * 240 px * 100 mm over 20.7 px and more.
+    depth = load_result(Path("b.zarr"))["depth_mm"].values
+    assert np.nanmedian(depth[:10]) == pytest.approx(834, rel=0.1)
+
+
+def test_a_folder_of_no_capture_ends_in_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(tmp_path / "few", {"a.png": np.zeros((8, 8), np.uint16)})
+    assert main(["import", str(tmp_path / "few"), "--guess"]) == 2
+    assert "contains 1 pictures" in capsys.readouterr().err
+    assert main(["import", str(tmp_path / "few")]) == 2
+    assert "Add --guess for pictures of another program." in capsys.readouterr().err
