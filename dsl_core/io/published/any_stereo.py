@@ -78,7 +78,7 @@ def load_any_stereo(
         )
         pose = Pose(
             rotation=tuple(map(tuple, _rotation(values["rotation"]).tolist())),  # type: ignore[arg-type]
-            translation_mm=tuple((values["translation"] * unit_mm).tolist()),  # type: ignore[arg-type]
+            translation_mm=tuple((values["translation"] * unit_mm).tolist()),
         )
     except ValidationError as error:
         raise CalibrationError(

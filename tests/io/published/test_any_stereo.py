@@ -15,8 +15,8 @@ from dsl_core.io.published.any_stereo import lenses_on, load_any_stereo
 from tests.cases.small_rig import small_rig
 
 CAMERA, PROJECTOR = (64, 48), (32, 24)
-K_CAMERA = [[70.0, 0, 31], [0, 71, 23], [0, 0, 1]]
-K_PROJECTOR = [[40.0, 0, 15], [0, 41, 20], [0, 0, 1]]
+K_CAMERA: list[list[float]] = [[70.0, 0, 31], [0, 71, 23], [0, 0, 1]]
+K_PROJECTOR: list[list[float]] = [[40.0, 0, 15], [0, 41, 20], [0, 0, 1]]
 VECTOR = [0.0, 0.1, 0.0]
 ROTATION = cv2.Rodrigues(np.array(VECTOR))[0].tolist()
 SHIFT = [-120.0, 3, 4]
