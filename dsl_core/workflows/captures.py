@@ -50,12 +50,18 @@ def load_mapping(path: Path) -> Mapping:
 
 def sensor_of(scan: PictureScan) -> Sensor:
     """What is assumed of a camera that nobody described: the noise of a common one, no black level."""
+    common = common_sensor(scan.bit_depth)
+    return common.model_copy(update={"bayer": scan.mapping.bayer or "MONO"})
+
+
+def common_sensor(bit_depth: int) -> Sensor:
+    """The noise of a common monochrome camera of so many bits, without black level."""
     return Sensor(
-        bayer=scan.mapping.bayer or "MONO",
-        bit_depth=scan.bit_depth,
+        bayer="MONO",
+        bit_depth=bit_depth,
         black_level_dn=0.0,
-        electrons_per_dn=FULL_WELL / 2**scan.bit_depth,
-        read_noise_dn=max(0.5, 2.0**scan.bit_depth / 2000),
+        electrons_per_dn=FULL_WELL / 2**bit_depth,
+        read_noise_dn=max(0.5, 2.0**bit_depth / 2000),
     )
 
 

@@ -1,0 +1,99 @@
+"""Pictures and columns as arrays: decode a stack, and triangulate columns, without any files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsl_core.errors import DecodeError
+from dsl_core.model.plan import CapturePlan, CodeSet, NoSpectral, Setting, Shot
+from dsl_core.model.rig import Rig, Sensor
+from dsl_core.workflows.captures import common_sensor, decode_columns_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class _Stack:
+    """Arrays as a `FrameSource`: code, then white, then black."""
+
+    plan: CapturePlan
+    frames: NDArray[np.uint16]
+
+    def read(self, shot: Shot) -> NDArray[np.uint16]:
+        """The frame of a shot."""
+        return np.asarray(self.frames[shot.index])
+
+
+def decode_stack(
+    pictures: Sequence[ArrayLike],
+    code: CodeSet,
+    projector_size_px: tuple[int, int],
+    white: ArrayLike | None = None,
+    black: ArrayLike | None = None,
+    sensor: Sensor | None = None,
+) -> xr.Dataset:
+    """Columns, rows, deviations (px) and flags of grey pictures (rows, columns) in the order of a code.
+
+    Values are whole numbers as the camera gave them; without a ``sensor`` those of a common one, of 8 bits
+    or, where values are larger, 16. Without white or black the extremes of the pictures stand for it. Raises
+    `DecodeError` when pictures differ in size, or their number is not that of the code.
+    """
+    arrays = [np.asarray(each) for each in pictures]
+    if not arrays or any(each.ndim != 2 or each.shape != arrays[0].shape for each in arrays):
+        shapes = ", ".join(sorted({str(each.shape) for each in arrays})) or "none"
+        raise DecodeError(f"Pictures must be grey and of one size (rows, columns), given {shapes}.")
+    stack = np.stack(arrays)
+    lights = [
+        stack.max(0) if white is None else np.asarray(white),
+        stack.min(0) if black is None else np.asarray(black),
+    ]
+    if any(each.shape != stack.shape[1:] for each in lights):
+        raise DecodeError(f"White and black must have the size of the pictures, {stack.shape[1:]}.")
+    height, width = stack.shape[1:]
+    plan = CapturePlan(
+        name="stack",
+        camera_size_px=(width, height),
+        projector_size_px=projector_size_px,
+        code=code,
+        spectral=NoSpectral(),
+        settings=(Setting(exposure_ms=1.0, level=1.0),),
+        code_settings=(0,),
+    )
+    if len(stack) != plan.code_count:
+        raise DecodeError(
+            f"The code has {plan.code_count} pictures, given {len(stack)}. Give all in its order."
+        )
+    frames = np.stack([*stack, *lights])
+    if frames.min() < 0 or frames.max() > 65535 or (frames != np.rint(frames)).any():
+        raise DecodeError("Pictures must hold whole numbers from 0 to 65535, as the camera gave them.")
+    sensor = sensor or common_sensor(8 if frames.max() < 256 else 16)
+    return decode_columns_of(_Stack(plan, frames.astype(np.uint16)), sensor)
+
+
+def depth_of_columns(rig: Rig, column_px: ArrayLike) -> NDArray[np.float64]:
+    """Depth (mm) along the camera's axis of columns (rows, columns) of all pixels, NaN where there is none.
+
+    Each camera ray meets the plane of its projector column. Raises `DecodeError` when the columns are not of
+    the camera's size.
+    """
+    import torch
+
+    from dsl_core.optics.correspondence import triangulate
+
+    column = np.asarray(column_px, np.float64)
+    if column.shape != (rig.camera.height_px, rig.camera.width_px):
+        raise DecodeError(
+            f"The columns have shape {column.shape}; the camera of {rig.name!r} has"
+            f" {(rig.camera.height_px, rig.camera.width_px)} rows and columns."
+        )
+    depth = np.full(column.size, np.nan)
+    known = np.flatnonzero(np.isfinite(column))
+    found, _ = triangulate(rig, torch.as_tensor(known), torch.as_tensor(column.ravel()[known]))
+    depth[known] = found.numpy()
+    return depth.reshape(column.shape)

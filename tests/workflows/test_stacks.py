@@ -1,0 +1,78 @@
+"""Arrays are decoded and triangulated as files are."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsl_core.errors import DecodeError
+from dsl_core.model.captured_code import CapturedCode, Stripes
+from dsl_core.resources import resource_path
+from dsl_core.workflows.stacks import decode_stack, depth_of_columns
+from tests.cases.foreign_captures import PROJECTOR, frames, scene
+from tests.cases.small_rig import small_rig
+
+CODE = CapturedCode(column_sets=(Stripes(bits=7),))
+
+
+def test_a_stack_tells_the_columns_of_the_scene_with_and_without_lights() -> None:
+    pictures, white, black = frames([("columns", Stripes(bits=7))])
+    results = (
+        decode_stack(pictures, CODE, PROJECTOR, white, black),
+        decode_stack(pictures, CODE, PROJECTOR),
+    )
+    for result in results:
+        error = result["column_px"].values - scene().columns
+        known = np.isfinite(error)
+        assert known.mean() > 0.95
+        assert np.percentile(np.abs(error[known]), 97) < 0.55
+
+
+def test_depth_of_columns_is_where_rays_meet_them() -> None:
+    rig = small_rig()
+    z = 600.0
+    rows, columns = np.mgrid[: rig.camera.height_px, : rig.camera.width_px]
+    plain = {"distortion": (0.0,) * 5}
+    rig = rig.model_copy(
+        update={
+            "camera": rig.camera.model_copy(update=plain),
+            "projector": rig.projector.model_copy(update=plain),
+            "residual": None,
+            "correspondence": None,
+        }
+    )
+    ray = np.linalg.inv(rig.camera.matrix) @ np.stack([columns.ravel(), rows.ravel(), np.ones(rows.size)])
+    point = rig.pose.matrix @ (ray * z) + rig.pose.vector_mm[:, None]
+    column = (rig.projector.matrix @ point)[0] / point[2]
+    column = column.reshape(rows.shape)
+    column[0, 0] = np.nan
+    depth = depth_of_columns(rig, column)
+    assert np.isnan(depth[0, 0])
+    assert np.allclose(depth.ravel()[1:], z, atol=1e-3)
+
+
+def test_what_cannot_be_a_stack_is_refused() -> None:
+    small = np.zeros((4, 4))
+    with pytest.raises(DecodeError, match="The code has 14 pictures, given 2"):
+        decode_stack([small, small], CODE, PROJECTOR)
+    with pytest.raises(DecodeError, match="grey and of one size"):
+        decode_stack([small, np.zeros((4, 5))], CODE, PROJECTOR)
+    with pytest.raises(DecodeError, match="whole numbers from 0 to 65535"):
+        decode_stack([small + 0.5] * 14, CODE, PROJECTOR)
+    with pytest.raises(DecodeError, match="The columns have shape"):
+        depth_of_columns(small_rig(), small)
+
+
+def test_the_example_of_the_help_page_runs() -> None:
+    page = resource_path("help/importing.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    pictures, white, black = frames([("columns", Stripes(bits=7, inverse=False))])
+    lens = {"width_px": 160, "height_px": 120}
+    rig = small_rig()
+    rig = rig.model_copy(update={"camera": rig.camera.model_copy(update=lens)})
+    names: dict[str, Any] = {"pictures": pictures, "white": white, "black": black, "rig": rig}
+    exec(example, names)
+    assert np.asarray(names["depth_mm"]).shape == (120, 160)
