@@ -9,7 +9,14 @@ from scipy.ndimage import binary_dilation
 
 from dsl_core.model.rig import Rig
 from dsl_core.optics.pinhole import pixel_rays
-from dsl_core.reconstruction.surface import MIXED_REL_STD, Surface, reconstruct_surface, windows_px
+from dsl_core.reconstruction.surface import (
+    MIXED_REL_STD,
+    Surface,
+    _Best,
+    _Fits,
+    reconstruct_surface,
+    windows_px,
+)
 from dsl_core.simulation.published_rig import published_rig
 from dsl_core.simulation.rendering.renderer import surface_shading
 from dsl_core.simulation.scenes.catalogue import make_scene
@@ -150,3 +157,43 @@ def test_a_narrow_piece_beside_a_step_has_the_plane_of_its_own_side() -> None:
     piece = surface.normals[:, 24:56, 46:54]
     assert np.isfinite(piece).all()
     assert piece[2].max() < -0.999
+
+
+@pytest.mark.parametrize(("down", "right"), [(d, r) for d in (-1, 0, 1) for r in (-1, 0, 1)])
+@pytest.mark.parametrize(("count", "offered"), [(13.0, True), (12.0, False)])
+def test_a_pixel_takes_the_plane_of_the_window_on_any_side_of_it(
+    down: int, right: int, count: float, offered: bool
+) -> None:
+    """Windows of five pixels: of those beside a pixel, two away, more than half have to be known."""
+    shape = (11, 12)
+    fit, inverse = np.zeros((3, *shape)), np.full(shape, 0.002)
+    variance, zero = np.full(shape, np.inf), np.zeros(shape)
+    source = 5 + 2 * down, 6 + 2 * right
+    variance[source], fit[(slice(None), *source)] = 1e-12, (0.0, 0.0, 0.002)
+    best = _Best(np.ones((3, *shape)), inverse, np.full(shape, 1e-6))
+    # The window around the pixel itself does not fit.
+    misfit = zero.copy()
+    if (down, right) != (0, 0):
+        variance[5, 6], misfit[5, 6] = 0.1, 10.0
+    best.variance[5, 6] = 10.0
+    best.offer(_Fits(fit, variance, misfit, zero, np.full(shape, count)), 5)
+    here = down == right == 0
+    assert (best.variance[5, 6] == 1e-12) == (offered or here)
+    assert (best.fit[2, 5, 6] == 0.002) == (offered or here)
+
+
+def test_a_plane_is_taken_where_it_is_clearly_better_and_holds_the_pixel() -> None:
+    shape = (1, 3)
+    rays, inverse = np.zeros((3, *shape)), np.full(shape, 0.002)
+    rays[2] = 1.0
+    fit = np.zeros((3, *shape))
+    # On the plane within three deviations, and ten deviations off.
+    fit[2, 0] = [0.002, 0.002 + 2.9e-6, 0.002 + 10e-6]
+    best = _Best(rays, inverse, np.full(shape, 1e-6))
+    best.variance[:] = 1.0
+    one = np.ones(shape)
+    best.offer(_Fits(fit, np.full(shape, 0.69), 0 * one, 1e10 * one, 25 * one), 3)
+    assert best.variance[0] == pytest.approx([0.69, 0.69, 1.0])
+    best.variance[:] = 1.0
+    best.offer(_Fits(fit, np.full(shape, 0.71), 0 * one, 1e10 * one, 25 * one), 3)
+    assert best.variance[0].tolist() == [1.0, 1.0, 1.0]

@@ -177,14 +177,16 @@ def test_displacement_and_gain_scatter_by_what_is_stated() -> None:
     assert found[:, 1].std() == pytest.approx(found[:, 3].mean(), rel=0.2)
 
 
-def test_bright_signals_do_not_decide_alone() -> None:
-    """An error of the model of three percent is granted: without it the noise alone would weigh."""
-    data, model, slope, std = shifted(0.0, 1.0, 1e-6, 0)
-    data = data * (1 + 0.1 * (model > 4))
-    _, gain, *_ = _shift(data, model, slope, std)
-    weight = np.where(model > 1e-4, 1.0, 0.0)
-    even = (weight * data / np.where(model > 0, model, 1)).sum() / weight.sum()
-    assert abs(gain - even) < 0.02
+def test_bright_and_faint_signals_that_are_off_by_the_same_share_count_alike() -> None:
+    model = np.repeat([5.0, 0.5], 100)
+    slope = np.tile([1e-3, -1e-3], 100)
+    data = model * np.repeat([1.02, 0.98], 100)
+    shift, gain, *_ = _shift(data, model, slope, np.full(200, 1e-9))
+    assert gain == pytest.approx(1.0, abs=1e-6)
+    assert shift == pytest.approx(0.0, abs=1e-6)
+    # Noise of a tenth is far more than three percent of either.
+    _, by_noise, *_ = _shift(data, model, slope, np.full(200, 10.0))
+    assert by_noise == pytest.approx((25 * 1.02 + 0.25 * 0.98) / 25.25, abs=1e-4)
 
 
 def test_figures_have_limits_on_both_sides() -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.calibration.orders.response import BandSample, fit_response
+from dsl_core.calibration.common.spectral_nodes import NODES_NM
+from dsl_core.calibration.orders.response import BandSample, _place, _result, _usable, fit_response
 from dsl_core.model.rig import Rgb, Rig
 from dsl_core.model.spectral import SpectralCurve
 from dsl_core.optics.filters import FINE_NM, nominal_filter, passed
 from dsl_core.optics.spectra import chain_response
 from dsl_core.simulation.published_rig import published_rig
+from dsl_core.solve.smooth_functions import SmoothSolution
 
 CENTRES = range(430, 661, 10)
 NM = np.arange(440.0, 651.0, 10.0)
@@ -73,3 +75,54 @@ def test_deviations_of_the_response_hold() -> None:
         assert (std / true.at(NM))[bright].max() < 0.01
         sigmas.append(((scale * curve.at(NM) - true.at(NM)) / std)[bright])
     assert 0.1 < np.sqrt(np.mean(np.concatenate(sigmas) ** 2)) < 2.0
+
+
+def test_the_scale_takes_what_white_makes_green_see_with_its_deviation() -> None:
+    """Two filters: three functions, two factors, a drive level and the white scale."""
+    rng, n = np.random.default_rng(2), len(NODES_NM)
+    count = 3 * n + 4
+    values, root = 0.02 * rng.standard_normal(count), 0.01 * rng.standard_normal((count, count))
+    covariance = root @ root.T
+    green = rng.random(n)
+    green /= green.sum()
+    rig = published_rig()
+    found = _result(rig, SmoothSolution(values, covariance, 1.0, covariance, 0.0), green)
+    mean = float(green @ values[n : 2 * n])
+    assert found.white_scale == pytest.approx(rig.white_scale * np.exp(values[-1] + mean))
+    sums = np.zeros(count)
+    sums[n : 2 * n], sums[-1] = green, 1
+    assert found.white_scale_rel_std == pytest.approx(np.sqrt(sums @ covariance @ sums))
+    for colour, (old, new) in enumerate(zip(rig.response, found.response, strict=True)):
+        change = values[colour * n : (colour + 1) * n] - mean
+        assert new.at(NODES_NM) == pytest.approx(old.at(NODES_NM) * np.exp(change))
+        part = np.zeros(count)
+        part[colour * n + 7] += 1
+        part[n : 2 * n] -= green
+        assert new.std is not None
+        stated = np.interp(NODES_NM[7], new.wavelengths_nm, new.std)
+        assert stated == pytest.approx(new.at(NODES_NM[7:8])[0] * np.sqrt(part @ covariance @ part))
+
+
+def test_colours_of_less_than_a_hundredth_of_the_brightest_say_nothing() -> None:
+    light = np.ones((3, len(FINE_NM)))
+    std = np.full(3, 0.1)
+    assert _usable(BandSample(np.array([0.9, 100.0, 1.1]), std, light, True)) == [1, 2]
+    assert _usable(BandSample(np.array([9.0, 100.0, 11.0]), np.array([0.1, np.inf, 0.1]), light, True)) == [
+        0,
+        2,
+    ]
+    dark = light.copy()
+    dark[2] = 0.0
+    assert _usable(BandSample(np.array([9.0, 100.0, 11.0]), std, dark, True)) == [0, 1]
+
+
+def test_a_filters_signal_knows_its_factor_the_drive_level_and_the_scale() -> None:
+    n = len(NODES_NM)
+    row = np.arange(1.0, n + 1)
+    one = _place(row, 1, 2, 1)
+    assert one[n : 2 * n].tolist() == row.tolist()
+    assert one[3 * n :].tolist() == [0, 1, 1, 1]
+    assert np.count_nonzero(one) == n + 3
+    white = _place(row, 2, 2, None)
+    assert white[3 * n :].tolist() == [0, 0, 0, 1]
+    assert white[2 * n : 3 * n].tolist() == row.tolist()
