@@ -10,6 +10,7 @@ import pytest
 from dsl_core.capture.proof.contest import Contest
 from dsl_core.capture.proof.finding import Finding, Verdict
 from dsl_core.capture.proof.verifier import FrameProof
+from dsl_core.model.geometry import Pose
 from dsl_core.model.plan import CapturePlan, GrayCode, LineComb, Setting, Shot
 from dsl_core.simulation.published_rig import published_rig
 
@@ -155,3 +156,18 @@ def test_rivals_are_the_shots_before_and_after() -> None:
     ]
     assert judge._rivals(SHOTS[0]) == [(Verdict.SWAPPED, SHOTS[1])]
     assert judge._rivals(SHOTS[-1]) == [(Verdict.LATE, SHOTS[-2])]
+
+
+@pytest.mark.parametrize(("turned", "rises"), [(False, True), (True, False)])
+def test_columns_rise_as_the_calibration_says(turned: bool, rises: bool) -> None:
+    rig = published_rig()
+    if turned:
+        about_the_axis = Pose(rotation=((-1, 0, 0), (0, -1, 0), (0, 0, 1)), translation_mm=(-70, 0, 0))
+        rig = rig.model_copy(update={"pose": about_the_axis})
+    code = FrameProof(PLAN, rig)._code
+    assert code is not None
+    assert code._rises is not None
+    assert bool(code._rises) is rises
+    unknown = proof(False)._code
+    assert unknown is not None
+    assert unknown._rises is None
