@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from dsl_core.capture.preflight import fit_plan, require_possible
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.runner import Runner, Status
+from dsl_core.capture.sentinels import SentinelWatch
 from dsl_core.capture.sink import Watch, WatchedSink
 from dsl_core.devices.base import DeviceRig
 from dsl_core.evaluation import summary
@@ -25,7 +26,7 @@ from dsl_core.evaluation.summary import Evaluation, Truth
 from dsl_core.io.scan.folder import ScanReader, ScanWriter
 from dsl_core.io.staging import write_text
 from dsl_core.model.fit import FitFinding
-from dsl_core.model.frames import FrameSource
+from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.options import Options
 from dsl_core.model.plan import CapturePlan
 from dsl_core.model.rig import Rig
@@ -50,21 +51,31 @@ def open_scan(
     token: CancelToken | None = None,
     watch: Watch | None = None,
     prove: bool = True,
+    waits: bool = False,
 ) -> Iterator[Runner]:
     """A runner over a scan's folder, for callers that pause, cancel or listen; ``watch`` sees every frame.
 
     An interrupted scan resumes at its next missing frame. Pictures that do not show their pattern are
-    captured again, unless ``prove`` is off, as for cameras that can only repeat what they gave before.
+    captured again, unless ``prove`` is off, as for cameras that can only repeat what they gave before. When
+    sentinels show that something moved, the scan pauses if it ``waits`` for a person, and ends otherwise.
     """
     require_possible(rig, plan)
     with ScanWriter.open(folder, plan, rig, notes) as writer:
-        sink = WatchedSink(writer, watch) if watch else writer
+        sink: FrameSink = WatchedSink(writer, watch) if watch else writer
         camera = rig.camera.info
         proof = FrameProof(plan, rig.calibration, camera.bit_depth, camera.bayer) if prove else None
         stored = ScanReader(folder)
-        yield Runner(
-            rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored
+        sentinels = (
+            SentinelWatch(plan, rig.calibration.sensor if rig.calibration else None) if prove else None
         )
+        if sentinels is not None:
+            missing = {shot.index for shot in writer.missing()}
+            sentinels.learn(stored, (shot for shot in plan.shots() if shot.index not in missing))
+            sink = WatchedSink(sink, lambda shot, frame: sentinels.add(shot, frame.pixels))
+        yield Runner(
+            rig, plan, sink, pattern_image, progress=progress, token=token, proof=proof, stored=stored,
+            sentinels=sentinels, waits=waits,
+        )  # fmt: skip
 
 
 def scan(
@@ -92,6 +103,7 @@ def reconstruct(
     from dsl_core.reconstruction.columns.line_spread import own_spread, with_own_spread
     from dsl_core.reconstruction.geometry import reconstruct_geometry, require_light, require_pixels
     from dsl_core.reconstruction.lenses import follow_lenses
+    from dsl_core.reconstruction.light.followed import read_steady
     from dsl_core.reconstruction.scan_result import assemble, known_pixels
     from dsl_core.reconstruction.spectral.solvers import check_solver, solve_spectra
     from dsl_core.reconstruction.spread_findings import spread_findings
@@ -105,9 +117,14 @@ def reconstruct(
         code, white = decode_columns(merged, progress)
         require_light(white.radiance, white.saturated)
     with timer.stage("read and merge the line frames"):
-        stack = stack_lines(merged, progress)
-    with timer.stage("columns, depth, normals"):
         findings: list[FitFinding] = []
+        if options.as_calibrated:
+            stack = stack_lines(merged, progress)
+        else:
+            steady = read_steady(merged, code, white, progress)
+            code, white, stack = steady.code, steady.white, steady.stack
+            findings += steady.findings
+    with timer.stage("columns, depth, normals"):
         if options.refine_columns and not options.as_calibrated:
             found = own_spread(rig, LineSet.of(plan), code, white, stack)
             if found is not None:

@@ -17,8 +17,9 @@ from dsl_core.capture.exposure import PatternImage, RetryPolicy, ShotTaker
 from dsl_core.capture.preflight import require_possible
 from dsl_core.capture.proof.verifier import FrameProof
 from dsl_core.capture.proven import ProvenShots
+from dsl_core.capture.sentinels import SentinelWatch
 from dsl_core.devices.base import DeviceRig
-from dsl_core.errors import Cancelled, DslError, StoreError
+from dsl_core.errors import Cancelled, DriftError, DslError, StoreError
 from dsl_core.model.frames import FrameSink, FrameSource
 from dsl_core.model.plan import CapturePlan, Shot, describe_shot
 from dsl_core.progress import CancelToken, NoProgress, Progress
@@ -47,7 +48,8 @@ class Status:
     """A moment of a scan; ``done`` counts saved frames, those of earlier runs included.
 
     ``elapsed_s`` is the time spent running, pauses left out; ``remaining_s`` is estimated from it.
-    ``corrected`` counts shots that were taken again because a picture did not show their pattern.
+    ``corrected`` counts shots that were taken again because a picture did not show their pattern, and
+    ``warning`` says what moved meanwhile.
     """
 
     state: State
@@ -58,6 +60,7 @@ class Status:
     remaining_s: float = 0.0
     message: str = ""
     corrected: int = 0
+    warning: str = ""
 
 
 Listener = Callable[[Status], None]
@@ -85,11 +88,14 @@ class Runner:
         progress: Progress | None = None,
         token: CancelToken | None = None,
         clock: Callable[[], float] = time.monotonic,
+        sentinels: SentinelWatch | None = None,
+        waits: bool = False,
     ) -> None:
         """Keep the parts; ``clock`` gives seconds and only serves the estimate of the remaining time.
 
         With ``proof`` every picture is judged, and taken again if it does not show its pattern; ``stored``
-        has the frames of earlier runs, from which it learns.
+        has the frames of earlier runs, from which it learns. When ``sentinels``, which see the frames of the
+        sink, find that something moved, the scan pauses if it ``waits``, and ends otherwise.
         """
         self._rig = rig
         self._plan = plan
@@ -100,6 +106,7 @@ class Runner:
         self._stored = stored
         self._progress = progress or NoProgress()
         self._pace = _Pace(clock, rig.projector.info.latency_ms)
+        self._sentinels, self._waits = sentinels, waits
         self._status = Status(State.IDLE, total=plan.shot_count)
         self._listeners: list[Listener] = []
         self._condition = threading.Condition()
@@ -159,12 +166,19 @@ class Runner:
         except BaseException as error:
             self._end(State.FAILED, f"{type(error).__name__}: {error}")
             raise
-        self._end(State.FINISHED, f"All {self._plan.shot_count} frames are saved.{self._shots.note}")
+        self._end(
+            State.FINISHED, f"All {self._plan.shot_count} frames are saved.{self._shots.note}{self._note}"
+        )
         return self._status
+
+    @property
+    def _note(self) -> str:
+        return f" {self._status.warning}" if self._status.warning else ""
 
     def _take_all(self, missing: list[Shot]) -> None:
         done = self._plan.shot_count - len(missing)
         self._pace.start(missing)
+        last = max((shot.index for shot in missing if shot.role != "sentinel"), default=-1)
         for shot in missing:
             self._between_shots(shot, done)
             self._set(State.RUNNING, shot=shot, done=done)
@@ -173,6 +187,22 @@ class Runner:
             done += 1
             self._set(State.RUNNING, shot=shot, done=done, corrected=self._shots.corrected)
             self._report(done)
+            self._heed(only_sentinels_left=shot.index >= last)
+
+    def _heed(self, only_sentinels_left: bool) -> None:
+        """Pause or end when something has moved; a scan that has all it needs ends as usual."""
+        moved = None if self._sentinels is None else self._sentinels.found
+        if moved is None or self._status.warning:
+            return
+        self._set(State.RUNNING, warning=f"{moved.sentence} {moved.advice}")
+        if only_sentinels_left:
+            return
+        if not self._waits:
+            raise DriftError(
+                f"{moved.sentence} {moved.advice} To continue all the same, resume the scan without checking"
+                " that the scene has not moved."
+            )
+        self.pause()
 
     def _complete(self) -> None:
         """Read everything back and take again what is not there, so that a finished scan is a whole one."""

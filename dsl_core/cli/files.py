@@ -158,7 +158,11 @@ def info(
 
 
 def _proof_of(path: Path) -> dict[str, Any]:
-    from dsl_core.workflows.scans import prove_scan
+    from dsl_core.workflows.scans import moved_during, prove_scan
 
-    found = prove_scan(path)
-    return {"wrong_pictures": list(found.sentences), "pictures_not_judged": found.not_judged or "none"}
+    found, moved = prove_scan(path), list(moved_during(path))
+    return {
+        "moved": moved or "nothing",
+        "wrong_pictures": list(found.sentences),
+        "pictures_not_judged": found.not_judged or "none",
+    }

@@ -32,6 +32,7 @@ from dsl_core.errors import StoreError
 from dsl_core.io import MANIFEST_NAME
 
 if TYPE_CHECKING:
+    from dsl_core.capture.runner import Status
     from dsl_core.devices.base import DeviceRig
     from dsl_core.model.plan import CapturePlan
 
@@ -117,7 +118,7 @@ def scan(
         notes = rig_notes(rig, options) | overridden
         with output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
             status = pipeline.scan(calibrated, fitted, target, progress, notes)
-    _done(output, target, status.total, status.elapsed_s)
+    _done(output, target, status)
 
 
 def resume(
@@ -144,7 +145,7 @@ def resume(
     opened = open_rig(rig, parse_options(option)) if rig else scans.reopen_rig(target)
     with opened as devices, output.progress() as progress, resumed_by(f"dsl-scan resume {target}"):
         status = scans.resume(devices, target, progress, drift)
-    _done(output, target, status.total, status.elapsed_s)
+    _done(output, target, status)
 
 
 def _say_gaps(output: Output, target: Path) -> None:
@@ -199,9 +200,13 @@ def _state(output: Output, plan: CapturePlan, folder: Path, devices: DeviceRig) 
     output.put(needed_bytes=needs.needed_bytes, free_bytes=needs.free_bytes)
 
 
-def _done(output: Output, target: Path, frames: int, seconds: float) -> None:
+def _done(output: Output, target: Path, status: Status) -> None:
     output.say(
-        f"All {frames} frames are saved in {target} ({seconds:.1f} s). Next: dsl-scan reconstruct {target}"
+        f"All {status.total} frames are saved in {target} ({status.elapsed_s:.1f} s)."
+        f" Next: dsl-scan reconstruct {target}"
     )
-    output.put(session=target, frames=frames, seconds=round(seconds, 2), state="finished")
+    if status.warning:
+        output.say(status.warning)
+        output.put(warning=status.warning)
+    output.put(session=target, frames=status.total, seconds=round(status.elapsed_s, 2), state="finished")
     output.finish()

@@ -112,10 +112,14 @@ class HdrMerger:
         self._work = [np.empty(block, np.float32) for _ in range(4)]
 
     def merge(
-        self, raws: Sequence[NDArray[np.unsignedinteger]], out: MergedFrame | None = None
+        self,
+        raws: Sequence[NDArray[np.unsignedinteger]],
+        out: MergedFrame | None = None,
+        levels: Sequence[float] | None = None,
     ) -> MergedFrame:
         """Merge one raw mosaic per setting, in the order of the gains; writes into ``out`` if given.
 
+        ``levels`` is the light that each was exposed to, relative to what the gains assume (None: all 1).
         Raises `DecodeError` when a frame is missing, has another size, or is not of whole numbers.
         """
         if len(raws) != len(self._black):
@@ -128,14 +132,17 @@ class HdrMerger:
             out = MergedFrame(
                 np.empty(self.shape, np.float32), np.empty(self.shape, np.float32), np.empty(self.shape, bool)
             )
+        light = [np.float32(level) for level in levels or [1.0] * len(raws)]
         with np.errstate(divide="ignore", invalid="ignore"):
             for start in range(0, self.shape[0], _BLOCK_ROWS):
                 rows = slice(start, min(start + _BLOCK_ROWS, self.shape[0]))
                 block = MergedFrame(out.radiance[rows], out.variance[rows], out.saturated[rows])
-                self._merge_block([raw[rows] for raw in raws], rows, block)
+                self._merge_block([raw[rows] for raw in raws], rows, block, light)
         return out
 
-    def _merge_block(self, raws: list[NDArray[np.unsignedinteger]], rows: slice, out: MergedFrame) -> None:
+    def _merge_block(
+        self, raws: list[NDArray[np.unsignedinteger]], rows: slice, out: MergedFrame, light: list[np.float32]
+    ) -> None:
         count = rows.stop - rows.start
         signal, gains = [a[:count] for a in self._signal], [a[:count] for a in self._open]
         total, weight, term, expected = (a[:count] for a in self._work)
@@ -144,7 +151,7 @@ class HdrMerger:
         for i, raw in enumerate(raws):
             np.subtract(raw, self._black[i][rows], out=signal[i])
             # The gain of a saturated value is zero, so that it drops out of every sum.
-            np.multiply(self._gain[i], raw < self._limit_dn, out=gains[i])
+            np.multiply(self._gain[i] * light[i], raw < self._limit_dn, out=gains[i])
             weight += gains[i]
             np.greater(gains[i], 0, out=term)
             term *= signal[i]
@@ -156,7 +163,7 @@ class HdrMerger:
         np.fmax(expected, total, out=expected)
         weight[...] = 0
         for i in range(len(raws)):
-            np.multiply(expected, self._shot[i], out=term)
+            np.multiply(expected, self._shot[i] * light[i], out=term)
             term += self._floor[i][rows]
             np.divide(gains[i], term, out=term)
             weight += np.multiply(term, gains[i], out=gains[i])
@@ -165,12 +172,13 @@ class HdrMerger:
         np.divide(total, weight, out=out.radiance)
         np.divide(1, weight, out=out.variance)
         if out.saturated.any():
-            self._bound(rows, out)
+            self._bound(rows, out, light)
 
-    def _bound(self, rows: slice, out: MergedFrame) -> None:
+    def _bound(self, rows: slice, out: MergedFrame, light: list[np.float32]) -> None:
         """The least radiance that saturates every setting, where every setting is saturated."""
         bounds = [
-            (self._limit_dn - black[rows]) / gain for black, gain in zip(self._black, self._gain, strict=True)
+            (self._limit_dn - black[rows]) / (gain * level)
+            for black, gain, level in zip(self._black, self._gain, light, strict=True)
         ]
         np.copyto(out.radiance, np.max(bounds, axis=0), where=out.saturated)
 

@@ -23,6 +23,7 @@ from dsl_core.patterns.captured_code import decode_captured
 from dsl_core.patterns.gray_code import DecodedCode
 from dsl_core.progress import NoProgress, Progress
 from dsl_core.reconstruction.hdr import BlackFrame, HdrMerger, MergedFrame, black_frame, setting_gains_ms
+from dsl_core.reconstruction.light.setting_ratios import Ratio, compare_settings
 
 T = TypeVar("T")
 THREADS = 2
@@ -43,8 +44,11 @@ class Readout(Protocol):
 class MergedScan:
     """Reads the settings of a shot and merges them; one merger and its buffers per thread."""
 
-    def __init__(self, source: FrameSource, rig: Readout) -> None:
-        self.source, self.rig, self.plan = source, rig, source.plan
+    def __init__(self, source: FrameSource, rig: Readout, levels: NDArray[np.float64] | None = None) -> None:
+        """``levels`` (shots,) is the light of each shot relative to that it should have had; None: all 1."""
+        self.source, self.rig, self.plan, self._levels = source, rig, source.plan, levels
+        #: What settings of one pattern say of each other's light, of the patterns merged so far.
+        self.ratios: dict[tuple[Role, int], tuple[Ratio | None, ...]] = {}
         self._shots: dict[tuple[Role, int], list[Shot]] = {}
         for shot in self.plan.shots():
             self._shots.setdefault((shot.role, shot.pattern), []).append(shot)
@@ -58,9 +62,19 @@ class MergedScan:
 
     def merge(self, role: Role, pattern: int, out: MergedFrame | None = None) -> MergedFrame:
         """Linear radiance of one pattern, from every setting it was captured with."""
-        shots = self._shots[role, pattern]
-        merger = self._merger(tuple(shot.setting for shot in shots))
-        return merger.merge([self.source.read(shot) for shot in shots], out)
+        shots = self.shots_of(role, pattern)
+        settings = [shot.setting for shot in shots]
+        merger = self._merger(tuple(settings))
+        raws = [self.source.read(shot) for shot in shots]
+        if len(shots) > 1:
+            blacks, gains = [self.blacks[i] for i in settings], [float(self.gains_ms[i]) for i in settings]
+            self.ratios[role, pattern] = compare_settings(raws, blacks, gains, self.rig.sensor)
+        levels = None if self._levels is None else [float(self._levels[shot.index]) for shot in shots]
+        return merger.merge(raws, out, levels)
+
+    def shots_of(self, role: Role, pattern: int) -> list[Shot]:
+        """The shots of a pattern, one for each setting it was captured with."""
+        return self._shots[role, pattern]
 
     def _merger(self, settings: tuple[int, ...]) -> HdrMerger:
         mergers: dict[tuple[int, ...], HdrMerger] = self._local.__dict__.setdefault("mergers", {})

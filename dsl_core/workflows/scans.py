@@ -12,6 +12,7 @@ from dsl_core.capture.movement import check_movement, pick_reference_shots
 from dsl_core.capture.proof.finding import ProofReport
 from dsl_core.capture.proof.report import WatchedSource, prove
 from dsl_core.capture.runner import Status
+from dsl_core.capture.sentinels import movement_of
 from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import conditions_of
 from dsl_core.devices.registry import is_built_in, open_rig
@@ -25,7 +26,7 @@ from dsl_core.io.scan.origin import is_of_this_computer, model_notes, rig_of_not
 from dsl_core.model.conditions import differences
 from dsl_core.model.frames import FrameSource
 from dsl_core.model.plan import CapturePlan
-from dsl_core.model.rig import Rig
+from dsl_core.model.rig import Rig, Sensor
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.patterns.images import pattern_image
 from dsl_core.pipeline import Options, reconstruct, scan
@@ -109,9 +110,10 @@ def reconstruct_scan(
     result = reconstruct(watched, rig, options, progress, timer)
     with timer.stage("compare frames with their patterns"):
         proof = watched.report(rig, rig.sensor.bit_depth, rig.sensor.bayer)
+        doubts = (*_moved(reader, rig.sensor), *proof.sentences)
     return result.assign_attrs(
         {
-            **({DOUBTS: json.dumps(proof.sentences)} if proof.wrong else {}),
+            **({DOUBTS: json.dumps(doubts)} if doubts else {}),
             **({NOT_JUDGED: proof.not_judged} if proof.untold else {}),
             **reader.manifest.notes,
             **model_notes(rig, options.correspondence),
@@ -122,6 +124,19 @@ def reconstruct_scan(
             "stage_costs": json.dumps([asdict(stage) for stage in timer.stages]),
         }
     )
+
+
+def _moved(reader: ScanReader, sensor: Sensor | None) -> tuple[str, ...]:
+    """What moved during a scan, by its sentinels."""
+    sound = set(reader.entries) & reader.store.stored()
+    found = movement_of(reader, sensor, (s.index for s in reader.plan.shots() if s.index not in sound))
+    return () if found is None else (f"{found.sentence} {found.advice}",)
+
+
+def moved_during(folder: Path) -> tuple[str, ...]:
+    """What moved during a scan, as a sentence; empty if nothing did. Raises `StoreError`."""
+    reader = ScanReader(folder)
+    return _moved(reader, None if reader.calibration is None else reader.calibration.sensor)
 
 
 def prove_scan(folder: Path) -> ProofReport:

@@ -144,12 +144,23 @@ class ScanController:
             self._ended(Phase.PLANNING)
         status, picture = scan.take_news()
         if status is not None:
+            before = self.state.status.value
             self.state.status.set(status)
+            if status.warning and status.warning != (before.warning if before else ""):
+                self._warn(status)
             if self.state.phase.value.is_busy and self.state.phase.value is not Phase.STOPPING:
                 self.state.phase.set(_PHASES.get(status.state, self.state.phase.value))
         if picture is not None:
             self.state.picture.set(picture)
             self._draw_graph()
+
+    def _warn(self, status: Status) -> None:
+        """Say what moved, and what can be done about it."""
+        more = ""
+        if status.done < status.total:
+            more = " The scan is paused: cancel it, or continue if the frames are to be kept all the same."
+        self.state.note.set(status.warning)
+        self._notifier.tell("warning", status.warning + more)
 
     def _was_refused(self) -> bool:
         """Whether the scan waited for the live view and then found the rig taken."""

@@ -73,7 +73,7 @@ class ScanJob:
         with pipeline.open_scan(
             devices, plan, request.folder, progress, notes, self.token,
             lambda shot, frame: self._watch(shot, frame, info),
-            prove=not request.is_resumed or request.check_drift,
+            prove=not request.is_resumed or request.check_drift, waits=True,
         ) as runner:  # fmt: skip
             runner.listen(self._listen)
             with self._pausing:

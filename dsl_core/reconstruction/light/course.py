@@ -1,0 +1,152 @@
+"""The course of the light over a scan: a slow drift, and what changes from shot to shot.
+
+Three witnesses are heard: frames of patterns relative to white, the same pattern at several settings, and
+white taken again. The drift is a smooth curve that starts at zero with the first shot, because the light is
+taken to have been as calibrated when the scan began. Flicker is what is left, frame by frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: What the terms of the drift may be before a scan is seen: linear and quadratic over the scan.
+DRIFT_STD = (0.5, 0.3)
+NO_DRIFT = 1e-6
+#: Witnesses needed to say anything.
+FEWEST = 4
+#: What settings may differ by through the response of the rig, and levels of lines by over the picture.
+SETTING_STD, SLOPE_STD = 0.01, 0.02
+#: Scatter that remains where nothing flickers.
+QUIET = 0.002
+#: Changes of light below these are left as they are.
+LEAST_DRIFT, LEAST_FLICKER = 0.006, 0.008
+#: Deviations that a change has to be from none: its place on the curve is chosen after the fact.
+SIGMAS = 4.5
+
+
+@dataclass(frozen=True)
+class Witness:
+    """The logarithm of the light of one shot over that of another one, and its deviation.
+
+    Shots are named by their index; ``against`` None is white as it was merged, of unknown level. ``slope``
+    is what a witness may be wrong by in common with others, as a multiple of one unknown.
+    """
+
+    shot: int
+    against: int | None
+    log: float
+    std: float
+    slope: float = 0.0
+    between_settings: bool = False
+
+
+@dataclass(frozen=True)
+class LightCourse:
+    """The light over a scan of ``shots``: ``log`` (shots,) of its level as it drifts, and its deviation.
+
+    ``white`` is the logarithm of the level of white as it was merged, ``slope`` that unknown of the
+    witnesses, ``flicker`` the rms from shot to shot; both kinds of change are zero where they do not matter.
+    """
+
+    log: Floats
+    std: Floats
+    white: float
+    slope: float
+    drift: float
+    drift_std: float
+    flicker: float
+    flicker_std: float
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the light drifts, more than by chance and more than nobody minds."""
+        return abs(self.drift) > max(LEAST_DRIFT, SIGMAS * self.drift_std)
+
+    @property
+    def flickers(self) -> bool:
+        """The same of shot to shot."""
+        return self.flicker > max(LEAST_FLICKER, SIGMAS * self.flicker_std)
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether there is nothing to follow."""
+        return not (self.drifts or self.flickers)
+
+
+def light_course(witnesses: Sequence[Witness], shots: int) -> LightCourse | None:
+    """The course that fits all witnesses best; None with too few.
+
+    A drift that may be chance is left out: the curve is then zero, and other figures are those without it.
+    """
+    if len(witnesses) < FEWEST:
+        return None
+    found = _course(witnesses, shots, DRIFT_STD)
+    if found.drifts:
+        return found
+    level = _course(witnesses, shots, (NO_DRIFT, NO_DRIFT))
+    return replace(level, drift=found.drift, drift_std=found.drift_std)
+
+
+def _course(witnesses: Sequence[Witness], shots: int, drift_std: tuple[float, float]) -> LightCourse:
+    flicker = 0.0
+    for _ in range(6):
+        values, covariance, left = _fit(witnesses, shots, flicker, drift_std)
+        flicker, flicker_std = _flicker(witnesses, left)
+    time = np.linspace(0, 1, shots)
+    terms = np.stack([time, time**2], 1)
+    log = terms @ values[:2]
+    std = np.sqrt(np.einsum("sp,pq,sq->s", terms, covariance[:2, :2], terms))
+    furthest = int(np.abs(log).argmax())
+    return LightCourse(
+        log=log,
+        std=std,
+        white=float(values[2]),
+        slope=float(values[3]),
+        drift=float(log[furthest]),
+        drift_std=float(std[furthest]),
+        flicker=flicker,
+        flicker_std=flicker_std,
+    )
+
+
+def _fit(
+    witnesses: Sequence[Witness], shots: int, flicker: float, drift_std: tuple[float, float]
+) -> tuple[Floats, Floats, Floats]:
+    """Terms of the drift, level of white, slope, settings; their covariance; what is left of each witness."""
+    last = max(shots - 1, 1)
+    design = np.zeros((len(witnesses), 5))
+    for row, each in zip(design, witnesses, strict=True):
+        time, other = each.shot / last, None if each.against is None else each.against / last
+        row[:2] = time - (other or 0.0), time**2 - (other or 0.0) ** 2
+        row[2] = -1.0 if other is None else 0.0
+        row[3], row[4] = each.slope, float(each.between_settings)
+    log = np.array([each.log for each in witnesses])
+    noise = np.array([each.std**2 + QUIET**2 for each in witnesses])
+    noise += np.array([1.0 if each.against is None else 2.0 for each in witnesses]) * flicker**2
+    prior = np.diag(np.array([*drift_std, 1.0, SLOPE_STD, SETTING_STD]) ** -2)
+    weight = 1 / noise
+    for _ in range(4):
+        covariance = np.linalg.inv((design.T * weight) @ design + prior)
+        values = covariance @ (design.T @ (weight * log))
+        left = log - design @ values
+        away = np.abs(left) / np.sqrt(noise)
+        weight = np.minimum(1, 2.5 / np.maximum(away, 1e-9)) / noise
+    return np.asarray(values), np.asarray(covariance), np.asarray(left)
+
+
+def _flicker(witnesses: Sequence[Witness], left: Floats) -> tuple[float, float]:
+    """The rms of single shots, from the scatter of witnesses beyond their own deviations."""
+    many = np.array([1.0 if each.against is None else 2.0 for each in witnesses])
+    own = np.array([each.std**2 + QUIET**2 for each in witnesses])
+    square = (left**2 / 0.455 - own) / many
+    # The median of squares stands for their mean, so that a few outliers do not make flicker.
+    found = float(np.median(square))
+    scatter = float(np.median((left**2 + own) / many)) * np.sqrt(2 / len(left)) * 2
+    value = float(np.sqrt(max(found, 0.0)))
+    return value, float(scatter / (2 * value)) if value > 0 else float(np.sqrt(scatter))

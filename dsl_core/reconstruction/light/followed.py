@@ -1,0 +1,169 @@
+"""Frames as they would be in steady light: what a scan says of its light is taken off them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.fit import FitFinding
+from dsl_core.model.plan import Shot
+from dsl_core.optics.sensor import raw_variance
+from dsl_core.patterns.gray_code import DecodedCode
+from dsl_core.progress import Progress
+from dsl_core.reconstruction.hdr import MergedFrame
+from dsl_core.reconstruction.light.course import (
+    LEAST_DRIFT,
+    LEAST_FLICKER,
+    LightCourse,
+    Witness,
+    light_course,
+)
+from dsl_core.reconstruction.light.line_levels import LineLevels, line_levels
+from dsl_core.reconstruction.merge import LineStack, MergedScan, decode_columns, stack_lines
+
+#: Frames whose sum is this far from white are of a scene that moved, or not what was asked for.
+MOST_MISFIT = 0.2
+#: What levels of frames may be wrong by beyond their own deviations: the sum of light is not exact.
+LEVEL_ERROR = 0.004
+_CORRECTED = " The frames are corrected for it."
+
+
+@dataclass(frozen=True)
+class SteadyFrames:
+    """Columns, white and lines in steady light, and what was found."""
+
+    code: DecodedCode
+    white: MergedFrame
+    stack: LineStack
+    findings: tuple[FitFinding, ...] = ()
+
+
+def read_steady(
+    scan: MergedScan, code: DecodedCode, white: MergedFrame, progress: Progress | None = None
+) -> SteadyFrames:
+    """Read the lines of a scan, and take the course of its light off all its frames.
+
+    Frames of several settings are read a second time if these had different light.
+    """
+    stack = stack_lines(scan, progress)
+    before = light_course([*_of_settings(scan), *_of_whites(scan)], scan.plan.shot_count)
+    if before is not None and not before.is_steady:
+        del stack  # the largest array of a reconstruction
+        scan = MergedScan(scan.source, scan.rig, _between_settings(scan, before))
+        code, white = decode_columns(scan, progress)
+        stack = stack_lines(scan, progress)
+    lines = line_levels(
+        scan.plan, code.column, (white.radiance, white.variance), stack.radiance, stack.std, stack.black_std
+    )
+    if lines is not None and lines.misfit > MOST_MISFIT:
+        lines = None
+    witnesses = [*_of_settings(scan), *_of_whites(scan), *_of_lines(scan, lines)]
+    course = light_course(witnesses, scan.plan.shot_count)
+    if course is None:
+        return SteadyFrames(code, white, stack)
+    if not course.is_steady:
+        white = _corrected(scan, course, lines, white, stack)
+    return SteadyFrames(code, white, stack, tuple(light_findings(course, lines is not None)))
+
+
+def light_findings(course: LightCourse, with_lines: bool) -> Iterator[FitFinding]:
+    """What the course of the light says to a person."""
+    drift = FitFinding.judged(
+        "light",
+        "drift of the light",
+        (course.drift, course.drift_std),
+        "1",
+        LEAST_DRIFT,
+        f"The light drifted by {course.drift:+.1%} (±{course.drift_std:.1%}) during the scan.{_CORRECTED}",
+        "Let the projector warm up for longer.",
+    )
+    yield drift.model_copy(update={"significant": course.drifts})
+    corrected = _CORRECTED if with_lines else " These patterns do not allow a correction."
+    flicker = FitFinding.judged(
+        "light",
+        "flicker of the light",
+        (course.flicker, course.flicker_std),
+        "1",
+        LEAST_FLICKER,
+        f"The light flickered from frame to frame by {course.flicker:.1%} (rms).{corrected}",
+        "Check the lamp and its supply, and expose for whole colour cycles of the projector.",
+    )
+    yield flicker.model_copy(update={"significant": course.flickers})
+
+
+def _of_settings(scan: MergedScan) -> Iterator[Witness]:
+    for (role, pattern), ratios in sorted(scan.ratios.items()):
+        shots = scan.shots_of(role, pattern)
+        for shot, ratio in zip(shots[:-1], ratios, strict=False):
+            if ratio is not None:
+                yield Witness(shot.index, shots[-1].index, ratio.log, ratio.std, between_settings=True)
+
+
+def _of_whites(scan: MergedScan) -> Iterator[Witness]:
+    """White taken again, over white as it was taken first, each less the black next to it."""
+    plan = scan.plan
+    again = {shot: plan.original(shot) for shot in plan.shots() if shot.role == "sentinel"}
+    blacks = [shot for shot, old in again.items() if old.role == "black"]
+    for shot, old in again.items():
+        near = [black for black in blacks if abs(black.index - shot.index) < 4]
+        if old.role != "white" or not near:
+            continue
+        first = scan.source.read(old) - scan.blacks[old.setting].mean
+        now = scan.source.read(shot).astype(np.float32) - scan.source.read(near[0])
+        yield _compared(scan, shot, old, first, now)
+
+
+def _compared(
+    scan: MergedScan, shot: Shot, old: Shot, first: NDArray[np.floating], now: NDArray[np.floating]
+) -> Witness:
+    limit = 0.9 * scan.rig.sensor.full_scale_dn
+    used = (first > 0.25 * np.percentile(first, 95)) & (first < limit) & (now < limit)
+    sums = [max(float(each[used].sum(dtype=np.float64)), 1.0) for each in (now, first)]
+    noise = [float(raw_variance(scan.rig.sensor, each[used]).sum(dtype=np.float64)) for each in (now, first)]
+    std = np.sqrt(noise[0] / sums[0] ** 2 + noise[1] / sums[1] ** 2)
+    return Witness(shot.index, old.index, float(np.log(sums[0] / sums[1])), float(std))
+
+
+def _of_lines(scan: MergedScan, lines: LineLevels | None) -> Iterator[Witness]:
+    if lines is None:
+        return
+    for pattern, (log, std) in enumerate(zip(lines.log, lines.std, strict=True)):
+        shot = scan.shots_of("spectral", pattern)[-1]
+        slope = 2 * (pattern + 0.5) / len(lines.log) - 1
+        yield Witness(shot.index, None, float(log), float(np.hypot(std, LEVEL_ERROR)), slope)
+
+
+def _between_settings(scan: MergedScan, course: LightCourse) -> NDArray[np.float64]:
+    """Levels (shots,) that make the shots of a pattern agree with that of its last setting."""
+    levels = np.ones(scan.plan.shot_count)
+    for (role, pattern), ratios in scan.ratios.items():
+        shots = scan.shots_of(role, pattern)
+        for shot, ratio in zip(shots[:-1], ratios, strict=False):
+            drift = course.log[shot.index] - course.log[shots[-1].index]
+            seen = ratio.log if ratio is not None and course.flickers else drift
+            levels[shot.index] = np.exp(seen)
+    return levels
+
+
+def _corrected(
+    scan: MergedScan, course: LightCourse, lines: LineLevels | None, white: MergedFrame, stack: LineStack
+) -> MergedFrame:
+    """White in steady light; the lines are changed where they are."""
+    follows = lines is not None and course.flickers
+    for pattern in range(len(stack.radiance)):
+        shot = scan.shots_of("spectral", pattern)[-1].index
+        log, std = course.log[shot], course.std[shot]
+        if lines is not None and follows:
+            slope = course.slope * (2 * (pattern + 0.5) / len(lines.log) - 1)
+            own, std = lines.log[pattern] + course.white - slope, np.hypot(lines.std[pattern], LEVEL_ERROR)
+            share = course.flicker**2 / (course.flicker**2 + std**2)
+            log, std = log + share * (own - log), np.sqrt(share) * std
+        stack.radiance[pattern] /= np.float32(np.exp(log))
+        deviation = stack.std[pattern].astype(np.float32) / np.float32(np.exp(log))
+        stack.std[pattern] = np.hypot(deviation, np.float32(std) * stack.radiance[pattern])
+    level = course.white if follows else course.log[scan.shots_of("white", 0)[-1].index]
+    factor = np.float32(np.exp(-level))
+    return replace(white, radiance=white.radiance * factor, variance=white.variance * factor**2)

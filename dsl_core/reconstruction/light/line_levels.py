@@ -1,0 +1,174 @@
+"""The light of each pattern frame relative to white, from two laws that need no model of the scene.
+
+Light adds up: the frames of a set that covers all columns evenly are together a multiple of white, in every
+pixel and whatever surfaces do with the light. That gives the level of each frame relative to white. And away
+from a line itself a picture changes slowly from frame to frame, because only first orders reach there: a
+frame that is brighter than its neighbours in all of these pixels had more light. The first law tells slow
+changes, the second one quick ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsl_core.model.plan import CapturePlan, ScanLines
+from dsl_core.patterns.images import spectral_profiles
+
+Floats = NDArray[np.float64]
+
+#: Pixels asked at most, and at least.
+PIXELS, FEWEST = 12_000, 300
+#: Share of the light that a pixel gets straight, roughly: what is left of coverage by the lines' edges.
+STRAIGHT = 0.85
+#: How far coverage of columns, softened as a line is, may be from even for the sum to be a multiple of white.
+EVEN, SOFT_PX = 0.06, 0.9
+#: Relative error of that sum in a pixel, and of the second law in a frame.
+SUM_ERROR, SMOOTH_ERROR = 0.1, 0.0025
+#: A frame from its neighbours two before to two behind: cubic interpolation.
+AROUND = {-2: -1 / 6, -1: 4 / 6, 1: 4 / 6, 2: -1 / 6}
+#: Pixels within so many columns of a line's edge see it by the zero order, on a camera as fine as the lines.
+ZERO_PX = 6.0
+#: What frames are expected to differ by, unless they say more.
+LEAST_SPREAD = 0.01
+
+
+@dataclass(frozen=True)
+class LineLevels:
+    """``log`` (frames,) of the light relative to white, with the deviation of each; ``misfit`` of the sum.
+
+    ``quick`` is by how much frames differ from their neighbours (rms, noise taken off).
+    """
+
+    log: Floats
+    std: Floats
+    misfit: float
+    quick: float
+
+
+def line_levels(
+    plan: CapturePlan,
+    column: NDArray[np.integer],
+    white: tuple[NDArray[np.floating], NDArray[np.floating]],
+    radiance: NDArray[np.floating],
+    std: NDArray[np.floating],
+    black_std: NDArray[np.floating],
+) -> LineLevels | None:
+    """Levels of the frames (frames, rows, columns); None where the patterns or the picture do not tell.
+
+    ``column`` is the projector column of each pixel (negative: unknown), ``white`` radiance and variance.
+    """
+    cover = _coverage(plan)
+    picked = _pick(column, white, std)
+    if cover is None or len(picked) < FEWEST:
+        return None
+    flat = column.ravel()[picked]
+    frames = radiance.reshape(len(radiance), -1)[:, picked].T.astype(np.float64)
+    variance = std.reshape(len(std), -1)[:, picked].T.astype(np.float64) ** 2
+    light, light_variance = (each.ravel()[picked].astype(np.float64) for each in white)
+    mean = float(cover.mean())
+    total = light * (STRAIGHT * cover[flat] + (1 - STRAIGHT) * mean)
+    # What black is off by adds up over all frames.
+    blacks = len(radiance) * black_std.ravel()[picked].astype(np.float64)
+    # Weights must not know the noise of white: they would prefer pixels whose white is too dark.
+    summed = frames.sum(1) * (total.sum() / frames.sum())
+    usual = np.polyval(np.polyfit(summed, light_variance, 1), summed).clip(light_variance.min())
+    noise = (SUM_ERROR * summed) ** 2 + mean**2 * usual + blacks**2
+    smooth, smooth_std = _smooth_rows(plan, flat, frames, variance, _pitch(column))
+    return _solve(frames, variance, total, noise, smooth, smooth_std)
+
+
+def _solve(
+    frames: Floats, variance: Floats, total: Floats, noise: Floats, smooth: Floats, smooth_std: Floats
+) -> LineLevels:
+    count = frames.shape[1]
+    quick = _quick(smooth, smooth_std)
+    spread = max(1.1 * quick, LEAST_SPREAD)
+    weight = 1 / noise
+    for _ in range(3):
+        heavy = frames * weight[:, None]
+        matrix = heavy.T @ frames
+        # Noise in the frames themselves adds its squares, which the sum of light does not have.
+        matrix[np.diag_indices(count)] -= (weight[:, None] * variance).sum(0)
+        right = heavy.T @ total
+        mean = float(right.sum() / matrix.sum())
+        matrix += (smooth.T * (mean * smooth_std) ** -2) @ smooth + np.eye(count) / (spread * mean) ** 2
+        inverse = np.linalg.inv(matrix)
+        needed = inverse @ (right + 1 / (spread**2 * mean))
+        away = np.abs(frames @ needed - total) / np.sqrt(noise)
+        usual = max(float(np.median(away)) / 0.6745, 1e-9)
+        weight = np.minimum(1, 2.5 * usual / np.maximum(away, 1e-9)) / noise
+    misfit = float(np.median(np.abs(frames @ needed - total) / total)) / 0.6745
+    deviation = np.sqrt(np.diag(inverse).clip(0)) * max(usual, 1.0) / mean
+    return LineLevels(-np.log(needed.clip(1e-3)), deviation, misfit, quick)
+
+
+def _quick(smooth: Floats, smooth_std: Floats) -> float:
+    """By how much frames differ, from how far they are off their neighbours."""
+    if len(smooth) < 8:
+        return 0.0
+    off = smooth.sum(1)
+    norm = np.sqrt((smooth**2).sum(1))
+    return float(np.sqrt(max(np.median((off / norm) ** 2) / 0.455 - np.median(smooth_std / norm) ** 2, 0.0)))
+
+
+def _coverage(plan: CapturePlan) -> Floats | None:
+    """How many frames light each column, softened; None where that is uneven."""
+    from scipy.ndimage import gaussian_filter1d
+
+    profiles = spectral_profiles(plan)
+    if len(profiles) < 8:
+        return None
+    cover = gaussian_filter1d(profiles.sum(0).mean(1).astype(np.float64), SOFT_PX, mode="nearest")
+    edge = len(cover) // 16
+    inner = cover[edge:-edge]
+    return cover if inner.std() < EVEN * inner.mean() else None
+
+
+def _pick(
+    column: NDArray[np.integer],
+    white: tuple[NDArray[np.floating], NDArray[np.floating]],
+    std: NDArray[np.floating],
+) -> NDArray[np.intp]:
+    """Flat indices of pixels that are lit, decoded, and saturated in no frame, spread over the picture."""
+    light, variance = white
+    lit = (column >= 0) & np.isfinite(variance) & (light > 5 * np.sqrt(np.maximum(variance, 0)))
+    some = np.flatnonzero(lit.ravel())
+    some = some[:: max(len(some) // (2 * PIXELS), 1)]
+    sound = np.isfinite(std.reshape(len(std), -1)[:, some]).all(0)
+    some = some[sound]
+    return np.asarray(some[:: max(len(some) // PIXELS, 1)])
+
+
+def _pitch(column: NDArray[np.integer]) -> float:
+    """Projector columns from one pixel to the next."""
+    known = (column[:, 1:] >= 0) & (column[:, :-1] >= 0)
+    steps = np.abs(np.diff(column, axis=1))[known]
+    return float(np.median(steps)) if steps.size else 1.0
+
+
+def _smooth_rows(
+    plan: CapturePlan, column: NDArray[np.integer], frames: Floats, variance: Floats, pitch: float
+) -> tuple[Floats, Floats]:
+    """Equations (n, frames) that the inverse levels fulfil, and how well; none for several lines a frame."""
+    count = frames.shape[1]
+    if not isinstance(plan.spectral, ScanLines) or count < 16:
+        return np.zeros((0, count)), np.zeros(0)
+    step, width = plan.spectral.step_px, plan.spectral.width_px
+    zone = width / 2 + 2 * step + ZERO_PX + 1.5 * pitch
+    rows, stds = [], []
+    for k in range(2, count - 2):
+        away = np.abs(column - (k * step + width / 2)) > zone
+        own = float(frames[away, k].sum())
+        noise = float(variance[away, k].sum())
+        row = np.zeros(count)
+        row[k] = 1.0
+        for by, share in AROUND.items():
+            row[k + by] = -share * float(frames[away, k + by].sum()) / own if own > 0 else 0.0
+            noise += share**2 * float(variance[away, k + by].sum())
+        if own > 10 * np.sqrt(noise):
+            rows.append(row)
+            stds.append(np.hypot(SMOOTH_ERROR, np.sqrt(noise) / own))
+    return np.array(rows).reshape(-1, count), np.array(stds)

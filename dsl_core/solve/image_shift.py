@@ -1,0 +1,122 @@
+"""How far parts of a picture have moved since another one, in fractions of a pixel.
+
+Least squares on the gradient of the older picture, tile by tile, with the brightness of each tile left free
+(Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981); a shift common to all tiles is
+found first, so that it may be larger than a pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: Steps of the least squares, and the furthest that tiles are followed beyond the common shift, px.
+STEPS, FURTHEST_PX = 4, 2.5
+
+
+@dataclass(frozen=True)
+class TileShifts:
+    """Shifts of tiles, each array (tiles down, tiles across): along x and y with their deviations, px.
+
+    ``change`` is the rms of what no shift and no brightness explains, as a share of the tile's light, less
+    noise; ``gain`` the brightness. Tiles without structure have infinite deviations.
+    """
+
+    x: Floats
+    y: Floats
+    x_std: Floats
+    y_std: Floats
+    change: Floats
+    gain: Floats
+
+    @property
+    def length(self) -> Floats:
+        """How far each tile moved, px."""
+        return np.hypot(self.x, self.y)
+
+    @property
+    def sigmas(self) -> Floats:
+        """The same in deviations; 0 where nothing is known."""
+        return np.hypot(self.x / self.x_std, self.y / self.y_std)
+
+
+def tile_shifts(old: Floats, new: Floats, variance: Floats, tiles: tuple[int, int]) -> TileShifts:
+    """Shifts of ``tiles`` (down, across) from ``old`` to ``new``, whose difference has this ``variance``."""
+    from scipy.ndimage import spline_filter
+
+    common = _common_shift(old, new)
+    old = spline_filter(old, order=3, mode="nearest")
+    down, across = (
+        np.linspace(0, size, count + 1).astype(int) for size, count in zip(old.shape, tiles, strict=True)
+    )
+    found = np.full((6, *tiles), np.inf)
+    for i in range(tiles[0]):
+        for j in range(tiles[1]):
+            part = slice(down[i], down[i + 1]), slice(across[j], across[j + 1])
+            found[:, i, j] = _one_tile(old, new, variance, part, common)
+    return TileShifts(*found)
+
+
+def _one_tile(
+    old: Floats, new: Floats, variance: Floats, part: tuple[slice, slice], common: tuple[float, float]
+) -> tuple[float, ...]:
+    lost = (0.0, 0.0, np.inf, np.inf, 0.0, 1.0)
+    shift = np.array(common)
+    weight = 1 / variance[part].ravel()
+    seen = new[part].ravel()
+    for _ in range(STEPS):
+        moved, gx, gy = (each.ravel() for each in _moved(old, part, shift))
+        # new = gain old - shift . gradient + offset
+        design = np.stack([-gx, -gy, moved, np.ones_like(moved)], 1)
+        matrix = (design.T * weight) @ design
+        scale = np.sqrt(np.diag(matrix)) + 1e-12
+        whole = matrix / np.outer(scale, scale)
+        if np.linalg.cond(whole) > 1e6:
+            return lost
+        covariance = np.linalg.inv(whole) / np.outer(scale, scale)
+        values = covariance @ ((design.T * weight) @ seen)
+        gain = values[2]
+        if not 0.05 < gain < 20:
+            return lost
+        shift = shift + values[:2] / gain
+        if np.hypot(*(shift - common)) > FURTHEST_PX:
+            break
+    std = np.sqrt(np.diag(covariance)[:2]) / gain
+    left = seen - design @ values
+    size = float(np.mean(np.abs(moved * gain))) + 1e-12
+    change = np.sqrt(max(float(np.mean(left**2)) - float(np.mean(variance[part])), 0.0)) / size
+    if np.hypot(*(shift - common)) > FURTHEST_PX:
+        shift = np.array(common)
+        std = np.full(2, np.inf)
+    return shift[0], shift[1], std[0], std[1], change, gain
+
+
+def _moved(old: Floats, part: tuple[slice, slice], shift: Floats) -> tuple[Floats, Floats, Floats]:
+    """A part of the old picture (coefficients of its spline) as moved by (x, y), and its gradients."""
+    from scipy.ndimage import map_coordinates
+
+    rows, columns = np.mgrid[part[0].start - 1 : part[0].stop + 1, part[1].start - 1 : part[1].stop + 1]
+    wide = map_coordinates(
+        old, [rows - shift[1], columns - shift[0]], order=3, mode="nearest", prefilter=False
+    )
+    gx, gy = (wide[1:-1, 2:] - wide[1:-1, :-2]) / 2, (wide[2:, 1:-1] - wide[:-2, 1:-1]) / 2
+    return wide[1:-1, 1:-1], gx, gy
+
+
+def _common_shift(old: Floats, new: Floats) -> tuple[float, float]:
+    """Shift (x, y) of most of the picture, whole pixels, by the correlation of edges; 0 unless sure."""
+    window = np.outer(np.hanning(old.shape[0]), np.hanning(old.shape[1]))
+    first, second = (np.fft.rfft2(_edges(each) * window) for each in (old, new))
+    peak = np.fft.irfft2(second * first.conj(), old.shape)
+    at = np.unravel_index(int(peak.argmax()), peak.shape)
+    y, x = (int(i) if i <= size // 2 else int(i) - size for i, size in zip(at, peak.shape, strict=True))
+    return (float(x), float(y)) if max(abs(x), abs(y)) > 1 and peak.max() > 1.05 * peak[0, 0] else (0.0, 0.0)
+
+
+def _edges(picture: Floats) -> Floats:
+    gy, gx = np.gradient(picture)
+    return np.asarray(np.hypot(gx, gy) - np.hypot(gx, gy).mean())

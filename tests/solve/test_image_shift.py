@@ -1,0 +1,49 @@
+"""Shifts of tiles between pictures made by hand."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter, shift
+
+from dsl_core.solve.image_shift import TileShifts, tile_shifts
+
+NOISE = 2.0
+
+
+def found(moved: np.ndarray, old: np.ndarray, seed: int = 1) -> TileShifts:
+    rng = np.random.default_rng(seed)
+    first, second = (each + NOISE * rng.normal(size=old.shape) for each in (old, moved))
+    return tile_shifts(first, second, np.full(old.shape, 2 * NOISE**2), (2, 3))
+
+
+@pytest.fixture
+def scene() -> np.ndarray:
+    return 200 + 900 * gaussian_filter(np.random.default_rng(7).normal(size=(48, 72)), 2.0)
+
+
+@pytest.mark.parametrize("by", [(0.0, 0.0), (0.3, -0.2), (1.0, 0.6), (-3.4, 2.2)])
+def test_a_shift_of_all_is_measured(scene: np.ndarray, by: tuple[float, float]) -> None:
+    moved = 0.9 * shift(scene, by[::-1], order=3, mode="nearest") + 5
+    got = found(moved, scene)
+    assert np.median(got.x) == pytest.approx(by[0], abs=0.05)
+    assert np.median(got.y) == pytest.approx(by[1], abs=0.05)
+    assert (np.hypot(got.x - by[0], got.y - by[1]) < 6 * np.hypot(got.x_std, got.y_std) + 0.05)[0, 1]
+
+
+def test_what_has_not_moved_is_within_its_deviations(scene: np.ndarray) -> None:
+    worst = max(found(scene, scene, seed).sigmas.max() for seed in range(10))
+    assert worst < 6
+
+
+def test_a_part_that_moves_is_found_there(scene: np.ndarray) -> None:
+    moved = scene.copy()
+    moved[:24, :24] = shift(scene, (0, 0.8), order=3, mode="nearest")[:24, :24]
+    got = found(moved, scene)
+    assert got.length[0, 0] == pytest.approx(0.8, abs=0.1)
+    assert np.delete(got.length.ravel(), 0).max() < 0.15
+
+
+def test_an_empty_picture_tells_nothing() -> None:
+    flat = np.full((48, 72), 100.0)
+    got = tile_shifts(flat, flat, np.ones_like(flat), (2, 3))
+    assert np.isinf(got.x_std).all()
+    assert not got.sigmas.any()
