@@ -35,7 +35,7 @@ def test_an_unpacked_wheel_finds_its_own_copy(tmp_path: Path) -> None:
     wheel = tmp_path / "dsl_scan.whl"
     source = Path(resources.__file__).parent
     with zipfile.ZipFile(wheel, "w") as archive:
-        for name in ("__init__.py", "errors.py", "resources.py"):
+        for name in ("__init__.py", "errors.py", "resources.py", "version.py"):
             archive.write(source / name, f"dsl_core/{name}")
         archive.writestr("dsl_core/_resources/bibliography.bib", "from the wheel")
     site = tmp_path / "site"

@@ -188,7 +188,7 @@ CASES = (
         "spectra in micrometres",
         "reading the spectra",
         _redo("spectralon", "emission"),
-        r"red\.csv: the wavelengths, 400 to 780, are micrometres",
+        r"red\.csv: the wavelengths, 400 to 780, are not micrometres",
         prepare=_spectra("wavelength (µm);W/(sr m2 nm)"),
     ),
     BadInput(

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int, c_int64, c_size_t, c_uint, c_uint64, c_void_p
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from dsl_core.errors import DeviceError
@@ -20,7 +21,8 @@ _NAMES = {
     "linux": ("libaravis-0.8.so.0",),
     "darwin": (
         "libaravis-0.8.0.dylib",
-        "/opt/homebrew/lib/libaravis-0.8.0.dylib",
+        # Where Homebrew puts libraries, which the loader does not search on every Mac.
+        str(Path("/opt", "homebrew", "lib", "libaravis-0.8.0.dylib")),
         "/usr/local/lib/libaravis-0.8.0.dylib",
     ),
     "win32": ("libaravis-0.8-0.dll",),

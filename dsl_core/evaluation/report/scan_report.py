@@ -202,10 +202,11 @@ def _honesty(content: ReportContent) -> list[Curve]:
 
 def _plan_facts(plan: CapturePlan) -> dict[str, str]:
     settings = ", ".join(f"{s.exposure_ms:.4g} ms at level {s.level:g}" for s in plan.settings)
+    repeats = f", {plan.sentinel_count} repeats" if plan.sentinel_count else ""
     return {
         "Plan": plan.name,
-        "Frames": f"{plan.shot_count} ({plan.code_count} code, {plan.spectral_count} spectral patterns,"
-        f" {plan.sentinel_count} repeats)",
+        "Frames": f"{plan.shot_count} ({plan.code_count} code, {plan.spectral_count} spectral"
+        f" patterns{repeats})",
         "Settings": settings,
         "Exposure": f"{plan.duration_s() / 60:.1f} min without latency",
         "Raw data": f"{plan.raw_bytes / 1e6:.0f} MB before compression",

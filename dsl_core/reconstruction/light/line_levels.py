@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.model.plan import CapturePlan, ScanLines
+from dsl_core.model.plan import CapturePlan, NoSpectral, ScanLines
 from dsl_core.patterns.images import spectral_profiles
 
 Floats = NDArray[np.float64]
@@ -60,6 +60,8 @@ def line_levels(
 
     ``column`` is the projector column of each pixel (negative: unknown), ``white`` radiance and variance.
     """
+    if isinstance(plan.spectral, NoSpectral):
+        return None
     cover = _coverage(plan)
     picked = _pick(column, white, std)
     if cover is None or len(picked) < FEWEST:

@@ -20,6 +20,7 @@ from dsl_core.planning import prediction, samples
 from tests.app.support.doubles import InlineRunner
 from tests.app.support.scan_bench import (
     COMB,
+    SHORT,
     TWIN,
     ScanBench,
     made_up_prediction,
@@ -36,7 +37,10 @@ def forecast(bench: ScanBench, folder: Path, automatic: bool = True) -> Forecast
 
 @pytest.fixture
 def bench(tmp_path: Path) -> ScanBench:
-    return planned_bench(tmp_path)
+    """A bench that plans a preset."""
+    made = planned_bench(tmp_path)
+    made.plan(SHORT)
+    return made
 
 
 @pytest.fixture
