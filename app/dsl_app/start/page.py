@@ -16,7 +16,7 @@ from dsl_app.shared.widgets.page import PageWidget
 from dsl_app.shared.widgets.recent_list import RecentList
 from dsl_app.start.examples import EXAMPLES
 
-CARD_PX, GAP_PX = 300, 16
+CARD_PX, GAP_PX = 286, 16
 
 
 class StartPage(PageWidget):

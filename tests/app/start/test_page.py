@@ -7,6 +7,9 @@ from pytestqt.qtbot import QtBot
 
 from dsl_core.resources import resource_path
 
+#: Width of the rail at the left of the window.
+RAIL_PX = 84
+
 
 def make_page(qtbot: QtBot, recent: RecentFiles) -> tuple[StartPage, list[object]]:
     asked: list[object] = []
@@ -31,6 +34,13 @@ def test_each_button_asks_for_what_it_says(qtbot: QtBot) -> None:
     assert asked == [*(each.key for each in EXAMPLES), "live", "rig", "file"]
     primary = [b for b in (*page.examples.values(), page.live) if b.property("role") == "primary"]
     assert primary == [page.examples["color-checker"]]
+
+
+def test_all_cards_fit_the_smallest_window(qtbot: QtBot) -> None:
+    page, _ = make_page(qtbot, RecentFiles(Settings()))
+    page.resize(1024 - RAIL_PX, 600)
+    right = page.connect_rig.mapTo(page, page.connect_rig.rect().topRight()).x()
+    assert right < page.width() - 16
 
 
 def test_recent_files_are_there_only_if_there_are_any(qtbot: QtBot, tmp_path: Path) -> None:
