@@ -24,7 +24,7 @@ from dsl_core.reconstruction.spectral.causes import (
     Causes,
     fit_causes,
 )
-from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion
+from dsl_core.reconstruction.spectral.film_motion import LEAST_MOTION_PX, FilmMotion, coarseness
 from dsl_core.reconstruction.spectral.line_probe import PROFILE
 from dsl_core.reconstruction.spectral.probe import Probe
 
@@ -266,7 +266,7 @@ def _film(causes: Causes, probe: Probe) -> FitFinding:
         "place of the first orders",
         (causes.rms_px, causes.rms_std_px),
         "px",
-        MOST_SHIFT_PX,
+        MOST_SHIFT_PX * coarseness(probe.step_nm),
         f"Wavelengths are off by {causes.rms_px * probe.nm_per_px:.2f} nm: order +1 lies {plus:+.3f} columns"
         f" from its place, order -1 {minus:+.3f}, on average; the film has moved or is bent otherwise.",
         "Run the drift check, and calibrate the depth stage again.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from dsl_core.model.rig import Rig
 from dsl_core.model.spectral import WavelengthGrid
 from dsl_core.optics.correspondence import correspondence
 from dsl_core.reconstruction.fit_findings import band_findings, cause_findings, line_width_nm, share_findings
+from dsl_core.reconstruction.spectral.causes import MOST_SHIFT_PX
 from dsl_core.reconstruction.spectral.film_motion import FilmMotion
 from dsl_core.reconstruction.spectral.probe import Probe, probe
 from dsl_core.reconstruction.spectral.spectra import SpectralReconstruction
@@ -161,6 +163,17 @@ def test_the_part_that_is_wrong_is_named(
     assert devices.calibration is not None
     fit = Fit.of(cause_findings(probed(wrong(devices.calibration), scan)))
     assert fit.parts[:1] == (() if part is None else (part,)), fit.words
+
+
+def test_bands_must_be_narrow_to_tell_a_small_displacement(scanned: tuple[DeviceRig, MemoryScan]) -> None:
+    devices, scan = scanned
+    assert devices.calibration is not None
+    found = probed(shifted_film(devices.calibration), scan)
+    limits = [
+        next(f.limit for f in cause_findings(replace(found, step_nm=step_nm)) if "place of" in f.name)
+        for step_nm in (2.5, 5.0, 10.0)
+    ]
+    np.testing.assert_allclose(limits, [MOST_SHIFT_PX, MOST_SHIFT_PX, 4 * MOST_SHIFT_PX])
 
 
 def test_the_gain_of_an_order_is_found_by_its_size(scanned: tuple[DeviceRig, MemoryScan]) -> None:

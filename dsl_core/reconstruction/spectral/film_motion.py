@@ -87,10 +87,17 @@ def fit_motion(scan: ProbedScan, probe: Probe) -> FilmMotion | None:
     shift = effect[probe.sound][:, _SHIFT]
     spread = np.einsum("nok,kl,nol->no", shift, covariance, shift)
     shift_px, shift_std_px = (float(np.sqrt(np.mean(square))) for square in ((shift @ values) ** 2, spread))
-    least_px = LEAST_MOTION_PX * max(probe.step_nm / FINE_NM, 1) ** 2
-    if shift_px < least_px or not _explains(probe, effect):
+    if shift_px < LEAST_MOTION_PX * coarseness(probe.step_nm) or not _explains(probe, effect):
         return None
     return FilmMotion(values, std, shift_px, shift_std_px)
+
+
+def coarseness(step_nm: float) -> float:
+    """How many times more bands of a width displace lines than those of `FINE_NM` do.
+
+    What a spectrum curves between the middles of two bands rises with the square of their distance.
+    """
+    return max(step_nm / FINE_NM, 1.0) ** 2
 
 
 def _effect(scan: ProbedScan, correspondence: GratingModel, probe: Probe) -> Floats:
