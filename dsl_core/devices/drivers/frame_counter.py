@@ -35,5 +35,5 @@ class FrameCounter:
         return number
 
     def restart(self) -> None:
-        """The camera was opened anew: whatever id comes next follows the last."""
+        """The camera was opened again: whatever id comes next follows the last."""
         self._before = None

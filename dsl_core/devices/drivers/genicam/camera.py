@@ -82,7 +82,7 @@ class GenicamCamera(Camera):
         return self._retrying(lambda port: self._take(port, timeout_ms / 1000.0))
 
     def restart(self, meanwhile: Callable[[GenicamPort], None] = lambda port: None) -> None:
-        """Drop frames on their way and acquire anew; ``meanwhile`` may set what is locked otherwise."""
+        """Drop frames on their way and acquire again; ``meanwhile`` may set what is locked otherwise."""
         port = self._ready_port()
         port.stop()
         meanwhile(port)
