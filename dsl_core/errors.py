@@ -33,5 +33,9 @@ class StoreError(DslError):
     """A scan, result or export on disk cannot be read or written."""
 
 
+class MissingPackageError(DslError):
+    """The work needs a package that belongs to an extra, which was not installed."""
+
+
 class Cancelled(DslError):
     """The user stopped the work; everything finished so far is kept."""

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Set up dsl-scan in a virtual environment and run it; needs only Python 3.11 to 3.13 and a network.
+"""Set up dsl-scan in a virtual environment and run it; needs only Python 3.11 to 3.14 and a network.
 
 python3 packaging/run.py demo [...]       a scan on the digital twin, from patterns to a report
 python3 packaging/run.py test [...]       all checks and tests; the rest goes to pytest (-n 0: one process)
@@ -22,9 +22,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 # Before the first annotation that an old Python cannot read, so that this sentence is what the user sees.
-if not (3, 11) <= sys.version_info[:2] <= (3, 13):  # a newer one lacks wheels of torch
+if not (3, 11) <= sys.version_info[:2] <= (3, 14):  # a newer one lacks wheels of what we need
     sys.exit(
-        "dsl-scan needs Python 3.11, 3.12 or 3.13; this is {}.{}. Start the script with one of those, "
+        "dsl-scan needs Python 3.11, 3.12, 3.13 or 3.14; this is {}.{}. Start the script with one of those, "
         "for example: python3.12 packaging/run.py demo".format(*sys.version_info[:2])
     )
 
@@ -143,24 +143,35 @@ def find_links(settings: dict[str, list[str]]) -> list[str]:
 
 
 def torch_options(choice: str, links: Sequence[str], platform: str = sys.platform) -> list[str]:
-    """Options of ``uv pip install`` for the requested build of torch.
+    """Options of ``uv pip install`` for a build of torch: cpu, cuda, or what the ``registry`` has.
 
-    The registry's default is a CUDA build on Linux and a CPU build elsewhere. Raises `SetupError` for
-    CUDA on macOS, which has none.
+    The registry has a CUDA build for Linux, of several gigabytes, and a CPU build for other systems. Raises
+    `SetupError` for CUDA on macOS, which has none.
     """
     local = [option for link in links for option in ("--find-links", link)]
-    if choice == "default":
+    if choice == "registry":
         return local
-    again = ["--reinstall-package", "torch"]  # the other build has the same version and would be kept
     linux = platform.startswith("linux")
     if choice == "cuda":
         if platform == "darwin":
             raise SetupError("There is no CUDA build of torch for macOS; leave out --torch cuda.")
         # Local wheels are left out: one of the CPU build would win over the registry's.
-        return again if linux else [*again, "--torch-backend", "cu130"]
+        return [] if linux else ["--torch-backend", "cu130"]
     has_local_cpu = any(list(Path(link).glob("torch-*+cpu-*.whl")) for link in links)
     backend = ["--torch-backend", "cpu"] if linux and not has_local_cpu else []
-    return [*again, *local, *backend]
+    return [*local, *backend]
+
+
+def torch_choices(asked: str, links: Sequence[str], platform: str = sys.platform) -> list[list[str]]:
+    """Options for torch to try one after the other; a build that was asked for has no substitute.
+
+    Without a wish it is the CPU build, or the registry's where the CPU build's index cannot be reached.
+    """
+    if asked == "default":
+        options = [torch_options(choice, links, platform) for choice in ("cpu", "registry")]
+        return options if options[0] != options[1] else options[:1]
+    # The other build has the same version and would be kept.
+    return [["--reinstall-package", "torch", *torch_options(asked, links, platform)]]
 
 
 def digest(torch: str) -> str:
@@ -211,16 +222,19 @@ def install(venv: Path, torch: str) -> None:
             [python, "-m", "pip", "config", "list"], capture_output=True, text=True, check=False
         )
         settings = pip_settings(listing.stdout)
-        options = torch_options(torch, find_links(settings))
+        index = []
         if "index-url" in settings and "UV_DEFAULT_INDEX" not in os.environ:
-            options += ["--default-index", settings["index-url"][0]]
+            index = ["--default-index", settings["index-url"][0]]
         variables = {key: value for key, value in os.environ.items() if key != "UV_FIND_LINKS"}
         if "cert" in settings:
             variables.setdefault("SSL_CERT_FILE", settings["cert"][0])
-        command = [python, "-m", "uv", "pip", "install", "--python", python, *options, *constraints]
+        command = [python, "-m", "uv", "pip", "install", "--python", python, *index, *constraints]
         command += ["--build-constraints", str(CONSTRAINTS), "--editable", f"{ROOT}[test]"]
-        with timed("Installing dsl-scan and what it needs"):
-            done = subprocess.run(command, env=variables, check=False)
+        for options in torch_choices(torch, find_links(settings)):
+            with timed("Installing dsl-scan and what it needs"):
+                done = subprocess.run([*command, *options], env=variables, check=False)
+            if done.returncode == 0:
+                break
     if done.returncode != 0:
         raise SetupError(
             "The installation failed; the lines above say why. It needs a network, or PIP_FIND_LINKS with a "
@@ -296,9 +310,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--venv", type=Path, default=ROOT / ".venv", help="virtual environment (default .venv)"
     )
-    parser.add_argument(
-        "--torch", choices=("cpu", "cuda"), help="build of torch (default: local wheel, else the registry's)"
-    )
+    parser.add_argument("--torch", choices=("cpu", "cuda"), help="build of torch (default: CPU)")
     parser.add_argument("command", choices=COMMANDS)
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="passed on to the command")
     return parser.parse_args(arguments)

@@ -70,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("path", nargs="?", type=Path, help="a scan, result, reference or calibration to open")
     parser.add_argument("--rig", help="rig to connect instead of the one used last")
     parser.add_argument(
-        "--option", "-o", action="append", default=[], metavar="KEY=VALUE", help="option of the rig"
+        "--option", "-O", action="append", default=[], metavar="KEY=VALUE", help="option of the rig"
     )
     parser.add_argument("--demo", action="store_true", help="open a finished scan of the simulated rig")
     parser.add_argument(

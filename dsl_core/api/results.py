@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import dsl_core.api.accessor  # noqa: F401  (registers ``.dsl``)
 from dsl_core.api import FilePath
+from dsl_core.extras import names_missing_packages
 from dsl_core.io.export import export_by_ending
 from dsl_core.io.result import result_file
 
@@ -26,6 +27,7 @@ def save_result(result: xr.Dataset, path: FilePath, *, overwrite: bool = False) 
     return result_file.save_result(result, Path(path), overwrite=overwrite)
 
 
+@names_missing_packages
 def export(
     result: xr.Dataset, path: FilePath, format: str | None = None, *, overwrite: bool = False
 ) -> list[Path]:
@@ -37,6 +39,7 @@ def export(
     return export_by_ending(result, Path(path), format, overwrite=overwrite)
 
 
+@names_missing_packages
 def evaluate(result: xr.Dataset) -> Evaluation:
     """Errors and coverage of a result of the simulated rig, whose truth is known.
 

@@ -13,6 +13,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.registry import open_rig as open_by_texts
 from dsl_core.devices.registry import rig_names
 from dsl_core.errors import PlanError
+from dsl_core.extras import names_missing_packages
 from dsl_core.io import rig_file
 from dsl_core.io.scan.folder import ScanReader
 from dsl_core.io.scan.origin import rig_notes
@@ -32,6 +33,7 @@ def rigs() -> list[str]:
     return rig_names()
 
 
+@names_missing_packages
 def open_rig(name: str = "twin", **options: object) -> DeviceRig:
     """Open the devices of a rig; use it in a ``with`` statement, so that they are closed.
 
@@ -49,6 +51,7 @@ def _as_text(value: object) -> str:
     return os.fspath(value) if isinstance(value, os.PathLike) else str(value)
 
 
+@names_missing_packages
 def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> CapturePlan:
     """What a scan captures: the preset of that name for the picture sizes and exposures of a rig.
 
@@ -66,6 +69,7 @@ def plan(rig: DeviceRig, preset: str = "reference", **changes: object) -> Captur
     return fit_plan(chosen, rig)
 
 
+@names_missing_packages
 def scan(
     rig: DeviceRig, folder: FilePath, plan: CapturePlan | None = None, progress: Progress | None = None
 ) -> ScanReader:
@@ -95,6 +99,7 @@ def load_calibration(path: FilePath) -> Rig:
     return rig_file.load_rig(Path(path))
 
 
+@names_missing_packages
 def reconstruct(
     scan: ScanReader | FilePath,
     calibration: Rig | FilePath | None = None,

@@ -13,6 +13,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.conditions import current_conditions
 from dsl_core.errors import CalibrationError
 from dsl_core.io.campaign_folder import CampaignFolder
+from dsl_core.model.base import problems_in_words
 from dsl_core.model.calibration.accepted import AcceptedCalibration
 from dsl_core.model.conditions import differences
 from dsl_core.model.rig import Provenance, Rig
@@ -124,10 +125,9 @@ def record_of(recipe: Recipe[RecordT], accepted: AcceptedCalibration) -> RecordT
     try:
         return recipe.record_type.model_validate_json(json.dumps(accepted.record))
     except ValidationError as error:
-        first = error.errors()[0]
         raise CalibrationError(
             f"The accepted calibration {recipe.name} of {accepted.accepted[:10]} is damaged or of another"
-            f" version ({'.'.join(map(str, first['loc'])) or 'record'}: {first['msg']})."
+            f" version ({problems_in_words(error)})."
             " Fit it again; its captures are kept."
         ) from error
 

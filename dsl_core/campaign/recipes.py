@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, get_origin, get_type_hints
 
 from dsl_core.campaign.common.recipe import AnyRecipe
 from dsl_core.errors import CalibrationError
+from dsl_core.model.base import problems_in_words
 
 if TYPE_CHECKING:
     from dsl_core.io.campaign_folder import CampaignFolder
@@ -69,9 +70,7 @@ def _build(kind: type[Any], name: str, settings: Mapping[str, str]) -> Any:
                 values[key] = [value]
         return TypeAdapter(kind).validate_python(values)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise CalibrationError(f"The setting {where} of {name} is wrong: {first['msg']}.") from error
+        raise CalibrationError(f"A setting of {name} is wrong: {problems_in_words(error)}.") from error
 
 
 def _value(text: str) -> Any:

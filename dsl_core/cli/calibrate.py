@@ -95,7 +95,9 @@ def geometry(
         float | None,
         typer.Option(help="Pictures: distance from camera to projector, to check the printed size."),
     ] = None,
-    target: Annotated[Path | None, typer.Option("--output", help="Pictures: GEOMETRY.json to write.")] = None,
+    target: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Pictures: GEOMETRY.json to write.")
+    ] = None,
     xml: Annotated[Path | None, typer.Option(help="Pictures: published XML or YAML to write.")] = None,
     force: Force = False,
     json: Json = False,

@@ -42,7 +42,7 @@ def list_(json: Json = False) -> None:
 @calibrations.command()
 def show(
     name: Name,
-    report: Annotated[Path | None, typer.Option(help="Also write this HTML page.")] = None,
+    report: Annotated[Path | None, typer.Option("--report", "-o", help="Also write this HTML page.")] = None,
     force: Force = False,
     json: Json = False,
 ) -> None:

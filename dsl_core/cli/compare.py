@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dsl_core.cli.options import Force, Json, parse_numbers, parse_region
+from dsl_core.cli.options import Force, Json, Report, parse_numbers, parse_region
 from dsl_core.cli.output import Output
 from dsl_core.io.staging import check_targets, write_text
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from dsl_core.evaluation.report.series_page import Table
 
 Results = Annotated[list[Path], typer.Argument(metavar="RESULT.zarr...", help="Results of 'reconstruct'.")]
-Report = Annotated[Path | None, typer.Option("--report", help="Also write everything as an HTML page.")]
 
 
 def compare(

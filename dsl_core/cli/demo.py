@@ -26,9 +26,10 @@ PUBLISHED = {"spectral_rmse": 0.038, "spectral_angle_rad": 0.138}
 
 
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder to write; a number is added if it exists.")] = Path(
-        "dsl-demo"
-    ),
+    out: Annotated[
+        Path,
+        typer.Option("--output", "-o", "--out", help="Folder to write; a number is added if it exists."),
+    ] = Path("dsl-demo"),
     size: Annotated[str, typer.Option(help="Camera pixels; the published rig has 890x580.")] = "445x290",
     scene: Annotated[
         str, typer.Option(help="A scene of the twin; 'dsl-scan scenes' lists them.")
@@ -43,7 +44,7 @@ def demo(
     width, height = parse_size("--size", size)
     options = with_effects({"scene": scene, "size": f"{width}x{height}"}, effects, tolerance)
     folder = _choose_folder(out, options)
-    with resumed_by(f"dsl-scan demo --out {out}"):
+    with resumed_by(f"dsl-scan demo -o {out}"):
         _capture(output, timer, folder, options)
         result = _reconstruct(output, timer, folder)
     figures = _evaluate(output, timer, folder, result)

@@ -11,6 +11,7 @@ import typer
 
 from dsl_core.cli.options import RigOptions
 from dsl_core.errors import DslError
+from dsl_core.extras import missing_package
 
 #: The window of this package, so that it opens in a source tree without metadata too.
 WINDOW = EntryPoint("dsl-scan-gui", "dsl_app.__main__:main", "gui_scripts")
@@ -46,8 +47,9 @@ def gui(
     try:
         main = WINDOW.load()
     except ImportError as error:
-        raise DslError(
+        missing = missing_package(error) if isinstance(error, ModuleNotFoundError) else None
+        raise missing or DslError(
             f"The window cannot be opened here: {error}. Install dsl-scan with its desktop application:"
-            " pip install dsl-scan."
+            " pip install 'dsl-scan[gui]'."
         ) from error
     raise typer.Exit(main(words))

@@ -21,9 +21,10 @@ N = TypeVar("N", int, float)
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object instead of text.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
+Report = Annotated[Path | None, typer.Option("--report", "-o", help="Also write everything as an HTML page.")]
 RigName = Annotated[str, typer.Option("--rig", help="Name of a rig; 'dsl-scan rigs' lists them.")]
 RigOptions = Annotated[
-    list[str], typer.Option("--option", "-o", help="Option of the rig as key=value; may be repeated.")
+    list[str], typer.Option("--option", "-O", help="Option of the rig as key=value; may be repeated.")
 ]
 Effects = Annotated[
     str | None,
@@ -243,10 +244,13 @@ def _checked(name: str, make: Callable[[], T]) -> T:
     """What ``make`` makes; a value that its record refuses becomes a `PlanError`."""
     from pydantic import ValidationError
 
+    from dsl_core.model.base import what_is_wrong
+
     try:
         return make()
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        what = first["msg"].removeprefix("Value error, ")
-        raise PlanError(f"{name}{f' ({where})' if where else ''}: {what}. Change the value.") from error
+        gap = f" ({where})" if where else ""
+        colon = ":" if first["type"] == "value_error" else ""
+        raise PlanError(f"{name}{gap}{colon} {what_is_wrong(first)}. Change the value.") from error

@@ -22,6 +22,7 @@ def board_of(
     """The printed board that options describe, None without them; raises `CalibrationError`."""
     from pydantic import ValidationError
 
+    from dsl_core.model.base import problems_in_words
     from dsl_core.model.board import Charuco, Checkerboard
 
     if text is None and square_mm is None and marker_mm is None:
@@ -36,9 +37,7 @@ def board_of(
             columns=columns, rows=rows, square_mm=square_mm, marker_mm=marker_mm, dictionary=dictionary
         )
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "board"
-        raise CalibrationError(f"The board is impossible: {where}: {first['msg']}. Correct it.") from error
+        raise CalibrationError(f"The board is impossible: {problems_in_words(error)}. Correct it.") from error
 
 
 def calibrate_pictures(

@@ -137,7 +137,7 @@ def evaluate(
     ] = None,
     option: RigOptions = [],  # noqa: B006 - typer reads it, nobody changes it
     report: Annotated[
-        Path | None, typer.Option(help="HTML page to write; the default is RESULT.html next to the result.")
+        Path | None, typer.Option("--report", "-o", help="HTML page to write; the default is RESULT.html.")
     ] = None,
     force: Force = False,
     json: Json = False,

@@ -29,6 +29,7 @@ from dsl_core.cli import (
     tradeoff,
 )
 from dsl_core.errors import Cancelled, DslError
+from dsl_core.extras import missing_package
 from dsl_core.version import __version__
 
 OK, BUG, WRONG_INPUT, STOPPED = 0, 1, 2, 130
@@ -116,6 +117,8 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return STOPPED, str(error)
     if isinstance(error, KeyboardInterrupt | typer.Abort):
         return STOPPED, "Stopped. What was finished before is kept."
+    if isinstance(error, ModuleNotFoundError):
+        error = missing_package(error) or error
     if isinstance(error, DslError):
         return WRONG_INPUT, str(error)
     if isinstance(error, _WrongUse):
@@ -140,6 +143,8 @@ def _usage(error: BaseException) -> str:
     message = " ".join(str(getattr(error, "format_message", error.__str__)()).split())
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "dsl-scan"
+    if getattr(error, "option_name", "") == "-o":
+        message = "There is no option -o here; options of a rig are given with -O or --option"
     return f"{message.rstrip('.')}. See '{command} --help'."
 
 

@@ -22,6 +22,7 @@ from dsl_core.devices.base import DeviceRig
 from dsl_core.devices.device_thread import DeviceThread
 from dsl_core.devices.guard import guarded, open_on
 from dsl_core.errors import DeviceError, DslError
+from dsl_core.extras import missing_package
 from dsl_core.version import __version__
 
 GROUP = "dsl_scan.rigs"
@@ -165,6 +166,9 @@ def _load(point: EntryPoint) -> OpenRig:
     try:
         function = point.load()
     except Exception as error:
+        missing = missing_package(error) if isinstance(error, ModuleNotFoundError) else None
+        if missing is not None:
+            raise missing from error
         reason = f"cannot be loaded from {point.value} ({type(error).__name__}: {error})"
         raise DeviceError(_fault(point, reason)) from error
     if not callable(function):
@@ -181,7 +185,7 @@ def _describe(point: EntryPoint) -> RigEntry:
     package, version = _package(point)
     try:
         function = _load(point)
-    except DeviceError as error:
+    except DslError as error:
         return RigEntry(point.name, package, version, error=str(error))
     lines = (inspect.getdoc(function) or "").splitlines()
     return RigEntry(

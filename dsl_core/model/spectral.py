@@ -10,6 +10,10 @@ from pydantic import Field, model_validator
 
 from dsl_core.model.base import Record
 
+#: What sensors of silicon see, nm.
+LIGHT_NM = (300.0, 1100.0)
+MOST_BANDS = 1001
+
 
 class WavelengthGrid(Record):
     """Evenly spaced band centres, both ends included."""
@@ -20,6 +24,16 @@ class WavelengthGrid(Record):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.start_nm < LIGHT_NM[0] or self.stop_nm > LIGHT_NM[1]:
+            raise ValueError(
+                f"bands from {self.start_nm:g} to {self.stop_nm:g} nm reach beyond the {LIGHT_NM[0]:g} to"
+                f" {LIGHT_NM[1]:g} nm that cameras see; choose others within these"
+            )
+        if (self.stop_nm - self.start_nm) / self.step_nm > MOST_BANDS - 1:
+            raise ValueError(
+                f"steps of {self.step_nm:g} nm from {self.start_nm:g} to {self.stop_nm:g} nm are more than"
+                f" {MOST_BANDS} bands; choose larger steps, as no band is narrower than some nm"
+            )
         steps = (self.stop_nm - self.start_nm) / self.step_nm
         if steps < 1 or abs(steps - round(steps)) > 1e-6:
             raise ValueError(

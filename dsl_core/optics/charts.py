@@ -1,4 +1,4 @@
-"""Reflectance spectra of classic colour charts, from the tables that colour-science carries."""
+"""Reflectance spectra of classic colour charts, from tables of the resources."""
 
 from __future__ import annotations
 
@@ -7,24 +7,23 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsl_core.optics.colour import colour_library
+from dsl_core.optics.colour import read_columns
 
 #: Rows and columns of the classic chart; its patches are named in reading order.
 CHART_SHAPE = (4, 6)
 
 
+_FILES = {"BabelColor Average": "babelcolor_average", "ISO 17321-1": "iso_17321_1"}
+
+
 @cache
 def _tables(name: str) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    known = colour_library().SDS_COLOURCHECKERS
-    return {
-        patch: (np.asarray(sd.wavelengths, float), np.asarray(sd.values, float))
-        for patch, sd in known[name].items()
-    }
+    return read_columns(f"colour/{_FILES[name]}.csv")
 
 
 def chart_names() -> tuple[str, ...]:
     """Names of the tables that hold the classic 24 patches over 400 to 700 nm."""
-    return ("BabelColor Average", "ISO 17321-1")
+    return tuple(_FILES)
 
 
 def chart_reflectance(

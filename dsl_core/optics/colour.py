@@ -3,15 +3,12 @@
 The bands of a scan need not cover the visible range (430 to 660 nm by default, which holds 99 % of Y,
 95 % of X and 88 % of Z of a white under D65). As ASTM E308 recommends for truncated data, the weights of
 the missing ends go to the first and the last band, as if the spectrum went on unchanged; so a perfect
-diffuser is white on every grid. Weights are tabulated; colour-science is imported only for illuminants
-other than D65.
+diffuser is white on every grid. The tables are files of the resources.
 """
 
 from __future__ import annotations
 
-import warnings
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,22 +35,28 @@ _BLOCK = 32768
 
 
 @cache
-def colour_library() -> Any:
-    """The colour-science package, imported late (seconds) and without its notice about optional parts."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message=r'\W*"[\w-]+" related API features are not available')
-        import colour
-    return colour
+def _illuminants() -> dict[str, Floats]:
+    """Relative power of illuminants but D65 on the table's wavelengths, (81,) each."""
+    return {name: power for name, (_, power) in read_columns("colour/illuminants.csv").items()}
+
+
+def read_columns(resource: str) -> dict[str, tuple[Floats, Floats]]:
+    """Wavelengths in nm and values of each named column of a table of the resources."""
+    with resource_path(resource).open(encoding="utf-8") as lines:
+        next(lines)  # where the table is from
+        names = next(lines).rstrip("\n").split(",")
+        nm, *columns = np.loadtxt(lines, delimiter=",", unpack=True)
+    return {name: (nm, column) for name, column in zip(names[1:], columns, strict=True)}
 
 
 def _illuminant(name: str) -> Floats:
     """Relative power on the table's wavelengths, shape (81,)."""
     if name == "D65":
         return CIE_D65
-    known = colour_library().SDS_ILLUMINANTS
+    known = _illuminants()
     if name not in known:
-        raise ValueError(f"unknown illuminant {name!r}; known are {', '.join(known)}")
-    return np.asarray(np.interp(CIE_NM, known[name].wavelengths, known[name].values))
+        raise ValueError(f"unknown illuminant {name!r}; known are D65, {', '.join(known)}")
+    return known[name]
 
 
 def observer_weights(wavelengths_nm: Floats, illuminant: str = "D65") -> Floats:

@@ -23,5 +23,5 @@ def test_settings_are_read_from_text() -> None:
     assert built == FakeRecipe(keys=("day",), scale=3.0, bad_steps={"day"})
     assert _build(kind, "fake", {"keys": "a,b"}).keys == ("a", "b")
     assert _value("430:460:15") == [430.0, 445.0, 460.0]
-    with pytest.raises(CalibrationError, match="The setting scale of fake is wrong"):
+    with pytest.raises(CalibrationError, match="A setting of fake is wrong: scale must be a number"):
         _build(kind, "fake", {"scale": "large"})

@@ -84,7 +84,7 @@ def test_a_broken_driver_is_named(name: str, reason: str) -> None:
 
 
 def test_wrong_settings_name_each_field_and_what_there_is() -> None:
-    with pytest.raises(DeviceError, match=r"port: Field required.*baud.*Its settings are: port"):
+    with pytest.raises(DeviceError, match=r"port is missing.*baud.*Its settings are: port"):
         open_device("stage", "trolley", {"baud": 3})
 
 

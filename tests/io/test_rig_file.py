@@ -44,12 +44,12 @@ def _edited(tmp_path: Path, *steps: str | int, value: object) -> Path:
 @pytest.mark.parametrize(
     ("steps", "value", "says"),
     [
-        (("camera", "fx_px"), -3, r"camera\.fx_px: .*greater than 0 \(given -3\)"),
-        (("film", "distance_mm"), "far", r"film\.distance_mm: .*\(given 'far'\)"),
+        (("camera", "fx_px"), -3, r"camera\.fx_px .*greater than 0 \(given -3\)"),
+        (("film", "distance_mm"), "far", r"film\.distance_mm .*\(given 'far'\)"),
         (("response", 1, "values"), [1.0], r"response\.1: .*one value per wavelength"),
         (("pose", "rotation"), [[1, 0, 0], [0, 1, 0], [0, 0, 2]], "pose: .*orthonormal"),
-        (("white_scale",), float("nan"), r"white_scale: .*finite"),
-        (("colour",), "red", "colour: .*not permitted"),
+        (("white_scale",), float("nan"), r"white_scale .*finite"),
+        (("colour",), "red", "colour is not a field"),
         (("schema_version",), 2, "schema version 2; this program supports version 1"),
     ],
 )
@@ -62,7 +62,7 @@ def test_errors_name_the_field(
 
 def test_many_problems_are_told_at_once_but_not_all(tmp_path: Path) -> None:
     (tmp_path / "rig.json").write_text("{}")
-    with pytest.raises(CalibrationError, match=r"name: Field required.*camera: .*and 4 more"):
+    with pytest.raises(CalibrationError, match=r"name is missing.*camera.*and 4 more"):
         load_rig(tmp_path / "rig.json")
 
 

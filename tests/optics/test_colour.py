@@ -9,6 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from dsl_core.optics import colour as ours
+from dsl_core.optics.relighting import LIGHTS
+from tests.cases.colour_science import colour_library
 
 GRID = np.arange(430.0, 661.0, 5.0)
 WIDE = np.arange(380.0, 781.0, 5.0)
@@ -16,7 +18,7 @@ WIDE = np.arange(380.0, 781.0, 5.0)
 
 @pytest.fixture(scope="module")
 def library() -> Any:
-    return ours.colour_library()
+    return colour_library()
 
 
 def smooth_spectra(wavelengths: NDArray[np.float64], count: int) -> NDArray[np.float64]:
@@ -31,6 +33,14 @@ def test_tables_equal_colour_science(library: Any) -> None:
     daylight = library.SDS_ILLUMINANTS["D65"]
     np.testing.assert_allclose(ours.CIE_1931_XYZ.T, observer[ours.CIE_NM], rtol=1e-5, atol=1e-12)
     np.testing.assert_allclose(ours.CIE_D65, daylight[ours.CIE_NM], rtol=1e-5)
+
+
+def test_tables_of_illuminants_and_charts_equal_colour_science(library: Any) -> None:
+    for name, (nm, power) in ours.read_columns("colour/illuminants.csv").items():
+        np.testing.assert_array_equal(nm, ours.CIE_NM)
+        spectrum = library.SDS_ILLUMINANTS[name]
+        np.testing.assert_allclose(power, np.interp(nm, spectrum.wavelengths, spectrum.values), rtol=1e-9)
+    assert set(LIGHTS) <= {"D65", *ours.read_columns("colour/illuminants.csv")}
 
 
 @pytest.mark.parametrize("illuminant", ["D65", "A", "D50"])

@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.optics.colour import colour_library
 from dsl_core.optics.relighting import LIGHTS, adaptation, relight
+from tests.cases.colour_science import colour_library
 
 NM = np.arange(430.0, 661.0, 5.0)
 

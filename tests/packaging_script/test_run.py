@@ -58,7 +58,7 @@ def test_wrong_arguments_end_with_code_2_and_the_usage(arguments: tuple[str, ...
     assert "usage: run.py" in answer.stderr
 
 
-@pytest.mark.parametrize("version", [(3, 8), (3, 14)])
+@pytest.mark.parametrize("version", [(3, 8), (3, 15)])
 def test_a_python_that_does_not_fit_is_told_so(version: tuple[int, int]) -> None:
     code = f"import sys, runpy; sys.version_info = {(*version, 0)}; runpy.run_path({str(SCRIPT)!r})"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -94,13 +94,18 @@ def test_links_of_pip_and_uv_are_joined_once(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_torch_comes_from_a_local_folder_where_there_is_one(tmp_path: Path) -> None:
     links = [str(tmp_path)]
-    anew = ["--reinstall-package", "torch"]
     local = ["--find-links", links[0]]
-    assert run.torch_options("cpu", links, "linux") == [*anew, *local, "--torch-backend", "cpu"]
-    assert run.torch_options("cpu", links, "win32") == [*anew, *local]
+    assert run.torch_options("cpu", links, "linux") == [*local, "--torch-backend", "cpu"]
+    assert run.torch_options("cpu", links, "win32") == local
     (tmp_path / "torch-2.13.0+cpu-cp311-cp311-manylinux_2_28_x86_64.whl").touch()
-    assert run.torch_options("cpu", links, "linux") == [*anew, *local]
-    assert run.torch_options("default", links, "linux") == local
+    assert run.torch_options("cpu", links, "linux") == local
+
+
+def test_without_a_wish_torch_is_small_where_that_can_be_had() -> None:
+    small, registry = ["--torch-backend", "cpu"], list[str]()
+    assert run.torch_choices("default", [], "linux") == [small, registry]
+    assert run.torch_choices("default", [], "darwin") == [registry]
+    assert run.torch_choices("cpu", [], "linux") == [["--reinstall-package", "torch", *small]]
 
 
 def test_cuda_is_never_taken_from_a_local_cpu_folder(tmp_path: Path) -> None:

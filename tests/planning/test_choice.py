@@ -139,7 +139,7 @@ def test_the_commands_write_no_plan_that_the_rig_refuses(
 
 def test_a_designed_plan_has_the_size_of_the_rig(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
-    command = ["design", str(tmp_path / "set.json"), "--frames", "8", "--orders", "1", "-o", "size=112x72"]
+    command = ["design", str(tmp_path / "set.json"), "--frames", "8", "--orders", "1", "-O", "size=112x72"]
     assert main([*command, "--plan", str(path)]) == 0
     with open_rig("twin", {"size": "112x72"}) as devices:
         assert find_obstacles(devices, load_plan(path)) == []

@@ -15,7 +15,7 @@ import pytest
 from dsl_core.cli import main
 
 #: A rig and plan that scan and reconstruct in a few seconds.
-SMALL_RIG = ["-o", "size=112x72"]
+SMALL_RIG = ["-O", "size=112x72"]
 SMALL_PLAN = ["--code", "columns", "--lines", "5x5", "--setting", "333.3@0.8"]
 
 

@@ -19,7 +19,7 @@ from tests.cases import fake_recipe
 
 from .conftest import Give
 
-TWIN = ["-o", "size=32x24", "-o", "scene=plane"]
+TWIN = ["-O", "size=32x24", "-O", "scene=plane"]
 
 
 @pytest.fixture(autouse=True)
@@ -184,7 +184,7 @@ def test_captures_of_another_rig_are_named(give: Give, tmp_path: Path) -> None:
         (["selftest", "--set", "colour=1"], "selftest has no setting colour; it has"),
         (["selftest", "--set", "good_look=many"], "The setting good_look of selftest is wrong"),
         (["selftest", "c", "--rig", "nothing"], "There is no rig 'nothing'"),
-        (["selftest", "c", "-o", "size=1x1"], "The twin's size must be"),
+        (["selftest", "c", "-O", "size=1x1"], "The twin's size must be"),
         (["calibrate", "geometry", "c", "--output", "x.json"], "--output and --xml need --pictures"),
         (["calibrate", "geometry", "c", "--board", "9x7"], "A board needs both"),
         (["calibrate", "all", "c", "--set", "scale=3"], "like bandpass.line_px=5, not scale=3"),

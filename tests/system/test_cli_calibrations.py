@@ -16,7 +16,7 @@ from dsl_core.model.rig import Rig
 
 from .conftest import Give
 
-PLANE = ["-o", "size=112x72", "-o", "scene=plane"]
+PLANE = ["-O", "size=112x72", "-O", "scene=plane"]
 
 
 @pytest.fixture

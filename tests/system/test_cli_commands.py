@@ -144,7 +144,7 @@ def test_evaluate_finds_the_truth_by_itself(give: Give, finished: Path, tmp_path
     # Another scene at another distance must give worse figures, or truth would not be looked at.
     other = give(
         "evaluate", finished / "scan.zarr", "--report", tmp_path / "other.html", "--json",
-        "--truth-rig", "twin", *SMALL_RIG, "-o", "scene=plane", "-o", "depth_mm=800",
+        "--truth-rig", "twin", *SMALL_RIG, "-O", "scene=plane", "-O", "depth_mm=800",
     ).json  # fmt: skip
     assert other["figures"]["depth_rmse_mm"] > 50
 

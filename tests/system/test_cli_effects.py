@@ -10,7 +10,7 @@ import pytest
 from dsl_core.cli import main
 from dsl_core.io.scan.manifest import read_manifest
 
-SMALL = ["-o", "size=64x42"]
+SMALL = ["-O", "size=64x42"]
 
 
 def test_effects_says_what_a_scene_needs(capsys: pytest.CaptureFixture[str]) -> None:
@@ -32,8 +32,8 @@ def test_effects_says_what_a_scene_needs(capsys: pytest.CaptureFixture[str]) -> 
     [
         (["effects", "--effects", "sparkle"], "no effect 'sparkle'"),
         (["effects", "--tolerance", "much"], "0.5DN"),
-        (["effects", "--scene", "plane", "-o", "scene=box"], "not both"),
-        (["scan", "s.dsl", "--effects", "all", "-o", "effects=none"], "not both"),
+        (["effects", "--scene", "plane", "-O", "scene=box"], "not both"),
+        (["scan", "s.dsl", "--effects", "all", "-O", "effects=none"], "not both"),
     ],
 )
 def test_wrong_choices_are_told(arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -44,7 +44,7 @@ def test_wrong_choices_are_told(arguments: list[str], told: str, capsys: pytest.
 def test_a_scan_notes_its_effects(tmp_path: Path) -> None:
     target = tmp_path / "s.dsl"
     plan = ["--code", "columns", "--comb", "20x20x320", "--setting", "100@0.5"]
-    chosen = ["--effects", "auto", "--tolerance", "2DN", "-o", "scene=plane"]
+    chosen = ["--effects", "auto", "--tolerance", "2DN", "-O", "scene=plane"]
     assert main(["scan", str(target), *plan, *chosen, *SMALL]) == 0
     notes = read_manifest(target).notes
     assert json.loads(str(notes["effects"]))["tolerance"] == "2 DN"

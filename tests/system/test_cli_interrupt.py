@@ -20,9 +20,9 @@ from .conftest import SMALL_RIG, Give, without_progress
 ROOT = Path(__file__).parents[2]
 #: Small frames, and enough of them to be interrupted in the middle.
 SCAN = [
-    "-o",
+    "-O",
     "size=56x36",
-    "-o",
+    "-O",
     "scene=plane",
     "--code",
     "columns",
@@ -100,7 +100,7 @@ def test_an_interrupted_reconstruction_leaves_nothing(
 
 def test_a_scan_of_another_scene_is_not_mixed_in(give: Give, scan_copy: Path) -> None:
     (scan_copy / "frames" / "c.140.0.0").unlink()
-    moved = [*SMALL_RIG, "-o", "scene=plane", "-o", "depth_mm=760"]
+    moved = [*SMALL_RIG, "-O", "scene=plane", "-O", "depth_mm=760"]
     ending = give("resume", scan_copy, "--rig", "twin", *moved)
     assert ending.code == 2
     assert "changed since the scan stopped" in ending.sentence

@@ -90,13 +90,13 @@ def test_it_is_listed_scanned_resumed_and_reconstructed(give: Give, tmp_path: Pa
     said = give("reconstruct", scan, "--json").json
     assert said["pixels_with_depth"] > 0.3
     assert "has no ground truth" in give("evaluate", tmp_path / "scan.zarr").sentence
-    truth = ["--truth-rig", "twin", "-o", "size=112x72"]
+    truth = ["--truth-rig", "twin", "-O", "size=112x72"]
     figures = give("evaluate", tmp_path / "scan.zarr", *truth, "--json").json["figures"]
     assert figures["depth_rmse_mm"] < 2
     assert give("export", tmp_path / "scan.zarr", "ply", tmp_path / "a.ply").code == 0
 
 
 def test_its_own_errors_speak_for_themselves(give: Give, tmp_path: Path) -> None:
-    ending = give("scan", tmp_path / "scan.dsl", "--rig", "lab", "-o", "cable=out")
+    ending = give("scan", tmp_path / "scan.dsl", "--rig", "lab", "-O", "cable=out")
     assert ending.code == 2
     assert ending.sentence == "The lab camera does not answer. Plug in its cable."

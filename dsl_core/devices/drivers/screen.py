@@ -23,7 +23,7 @@ from dsl_core.devices.driver_table import Driver
 from dsl_core.errors import DeviceError
 from dsl_core.model.base import Record
 
-BRINGS = "the window's libraries, which are installed with dsl-scan"
+BRINGS = "the window's libraries: pip install 'dsl-scan[gui]'"
 _PROGRAM = "dsl_app.rig.projector_process"
 _END_S = 5.0
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dsl_core.optics.colour import colour_library, delta_e_2000, reflectance_to_lab
+from dsl_core.optics.colour import delta_e_2000, reflectance_to_lab
 from dsl_core.simulation.scenes import materials
 from dsl_core.simulation.scenes.truth import FINE_NM
+from tests.cases.colour_science import colour_library
 
 
 def at(spectrum: materials.Spectrum, wavelength_nm: float) -> float:

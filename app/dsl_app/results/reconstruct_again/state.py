@@ -9,6 +9,7 @@ from pathlib import Path
 from dsl_app.shared.evented import Event, Value
 from dsl_app.shared.known_files import first_free
 from dsl_core.errors import DslError, PlanError
+from dsl_core.model.base import what_is_wrong
 from dsl_core.model.spectral import WavelengthGrid
 
 RESULT_SUFFIX = ".zarr"
@@ -99,7 +100,7 @@ def bands_of(request: ReconstructionRequest) -> WavelengthGrid:
     try:
         return WavelengthGrid(start_nm=request.start_nm, stop_nm=request.stop_nm, step_nm=request.step_nm)
     except ValidationError as error:
-        what = error.errors()[0]["msg"].removeprefix("Value error, ")
+        what = what_is_wrong(error.errors()[0])
         raise PlanError(f"The bands do not fit: {what}.") from error
 
 

@@ -1,0 +1,57 @@
+"""Parts of the program that are installed on request, and the sentence where one is missing."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+from dsl_core.errors import MissingPackageError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+#: The extra that brings a module which the core does without, and what it is for.
+EXTRA_OF = {
+    "torch": "reconstruct",
+    "cv2": "reconstruct",
+    "PySide6": "gui",
+    "pyqtgraph": "gui",
+    "pyvista": "gui",
+    "shiboken6": "gui",
+    "superqt": "gui",
+    "vtk": "gui",
+    "vtkmodules": "gui",
+}
+_PURPOSE = {
+    "reconstruct": "depth and spectra from frames, the twin, calibration, planning",
+    "gui": "the window",
+}
+
+
+def missing_package(error: ModuleNotFoundError) -> MissingPackageError | None:
+    """What to install where a module of an extra is missing; None where another module is."""
+    module = (error.name or "").partition(".")[0]
+    extra = EXTRA_OF.get(module)
+    if extra is None:
+        return None
+    return MissingPackageError(
+        f"This needs the package {module}, which is not installed here. It comes with the extra {extra!r}"
+        f" ({_PURPOSE[extra]}): pip install 'dsl-scan[{extra}]'"
+    )
+
+
+def names_missing_packages(function: Callable[P, R]) -> Callable[P, R]:
+    """The function, which raises `MissingPackageError` where a package of an extra is missing."""
+
+    @functools.wraps(function)
+    def named(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return function(*args, **kwargs)
+        except ModuleNotFoundError as error:
+            missing = missing_package(error)
+            if missing is None:
+                raise
+            raise missing from error
+
+    return named
