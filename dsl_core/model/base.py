@@ -55,7 +55,8 @@ def what_is_wrong(fault: Mapping[str, Any]) -> str:
     wanted = _WANTED.get(fault["type"])
     if wanted is None:
         return str(fault["msg"]).removeprefix("Value error, ").removeprefix("Assertion failed, ")
-    return wanted.format_map(fault.get("ctx", {}))
+    told = fault.get("ctx", {})
+    return wanted.format_map({k: f"{v:g}" if isinstance(v, float) else v for k, v in told.items()})
 
 
 def problems_in_words(error: ValidationError, most: int = 1) -> str:
