@@ -1,4 +1,4 @@
-"""Commands for results: reconstruct, evaluate, export."""
+"""Commands for results: reconstruct, evaluate, export, mesh."""
 
 from __future__ import annotations
 
@@ -172,7 +172,11 @@ def export(
     ],
     form: Annotated[
         str,
-        typer.Argument(metavar="FORMAT", help="ply, envi, exr, csv, png, tiff, npy, dataset or calibration."),
+        typer.Argument(
+            metavar="FORMAT",
+            help="ply, envi, exr, csv, png, tiff, npy; glb, obj, stl or mesh for the surface; dataset or"
+            " calibration.",
+        ),
     ],
     target: Annotated[Path, typer.Argument(metavar="TARGET", help="File or folder to write.")],
     pixel: Annotated[list[str], typer.Option(help="x,y of a pixel, for csv only; may be repeated.")] = [],  # noqa: B006
@@ -181,7 +185,33 @@ def export(
 ) -> None:
     """Export a result for other programs, or a scan or rig in the published layout."""
     output = Output(json)
-    files = _export(output, path, form, target, parse_pixels(pixel), force)
+    _say_written(output, _export(output, path, form, target, parse_pixels(pixel), force))
+
+
+def mesh(
+    path: Result,
+    target: Annotated[
+        Path, typer.Argument(metavar="TARGET", help="File to write: .glb, .obj, .ply or .stl.")
+    ],
+    every: Annotated[
+        int, typer.Option(help="Use each N-th row and column only, for a smaller file.", min=1)
+    ] = 1,
+    force: Force = False,
+    json: Json = False,
+) -> None:
+    """Write the surface of a result as a mesh, cut at depth jumps, with its colours as texture.
+
+    .glb is glTF in metres with its texture, .obj has .mtl and .png beside it, .ply colours and spectra at
+    each vertex, .stl triangles only; lengths of the last three are in mm.
+    """
+    from dsl_core.io.export import export_mesh
+    from dsl_core.io.result.result_file import load_result
+
+    output = Output(json)
+    _say_written(output, export_mesh(load_result(path), target, overwrite=force, every=every))
+
+
+def _say_written(output: Output, files: list[Path]) -> None:
     shown = [str(file) for file in files[:10]] + (["..."] if len(files) > 10 else [])
     output.say(f"Written ({len(files)} files): {', '.join(shown)}")
     output.put(files=[str(file) for file in files])

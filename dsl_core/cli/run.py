@@ -57,6 +57,7 @@ for command in (
     compare.depth_test,
     compare.sweep,
     results.export,
+    results.mesh,
 ):
     app.command()(command)
 app.command("import")(files.import_)

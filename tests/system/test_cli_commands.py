@@ -45,6 +45,7 @@ def test_help_and_version_need_no_heavy_library() -> None:
         "reconstruct",
         "evaluate",
         "export",
+        "mesh",
         "import",
         "info",
     ],
@@ -171,6 +172,19 @@ def test_export_of_a_result(
     assert again.code == 2
     assert "already exists" in again.sentence
     assert give("export", finished / "scan.zarr", form, tmp_path / name, *more, "--force").code == 0
+
+
+def test_the_surface_of_a_result_as_a_mesh(give: Give, finished: Path, tmp_path: Path) -> None:
+    trimesh = pytest.importorskip("trimesh")
+    for every in (1, 2):
+        target = tmp_path / f"{every}.glb"
+        said = give("mesh", finished / "scan.zarr", target, "--every", every, "--json").json
+        assert said["files"] == [str(target)]
+    fine, coarse = (trimesh.load_mesh(tmp_path / f"{every}.glb") for every in (1, 2))
+    assert len(fine.faces) > 3 * len(coarse.faces) > 0
+    result = load_result(finished / "scan.zarr")
+    assert float(-fine.bounds[0, 2] * 1000) == pytest.approx(float(result["depth_mm"].max()), rel=1e-3)
+    assert "does not end in" in give("mesh", finished / "scan.zarr", tmp_path / "x.doc").sentence
 
 
 def test_reconstruct_by_another_solver(give: Give, finished: Path, tmp_path: Path) -> None:

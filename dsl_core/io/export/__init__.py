@@ -8,6 +8,7 @@ raise to stop; then nothing is left behind.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -16,6 +17,7 @@ from dsl_core.io.export.csv import export_csv
 from dsl_core.io.export.depth_maps import export_npy, export_tiff
 from dsl_core.io.export.envi import export_envi
 from dsl_core.io.export.exr import export_exr
+from dsl_core.io.export.mesh.export import export_mesh
 from dsl_core.io.export.ply import export_ply
 from dsl_core.io.export.png import export_png
 from dsl_core.solve.many import Check, never
@@ -23,7 +25,7 @@ from dsl_core.solve.many import Check, never
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FORMATS", "Exporter", "export", "export_by_ending", "export_csv", "export_png"]
+__all__ = ["FORMATS", "Exporter", "export", "export_by_ending", "export_csv", "export_mesh", "export_png"]
 
 
 class Exporter(Protocol):
@@ -40,9 +42,13 @@ FORMATS: dict[str, Exporter] = {
     "csv": export_csv,
     "envi": export_envi,
     "exr": export_exr,
+    "glb": partial(export_mesh, endings=(".glb",)),
+    "mesh": export_mesh,
     "npy": export_npy,
+    "obj": partial(export_mesh, endings=(".obj",)),
     "ply": export_ply,
     "png": export_png,
+    "stl": partial(export_mesh, endings=(".stl",)),
     "tiff": export_tiff,
 }
 

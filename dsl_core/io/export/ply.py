@@ -1,4 +1,4 @@
-"""Point cloud as binary little-endian PLY, with spectra as ``scalar_`` properties.
+"""Point cloud or mesh as binary little-endian PLY, with spectra as ``scalar_`` properties.
 
 Layout: G. Turk, The PLY Polygon File Format (1994); the prefix ``scalar_`` is how CloudCompare names and
 recognises scalar fields. Only pixels with a point are written; a band without an answer is NaN, a
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dsl_core.io.export.common import ascii_text, plane, provenance, require, require_suffix, wavelengths_nm
 from dsl_core.io.staging import staged
+from dsl_core.solve.grid_mesh import GridMesh
 from dsl_core.solve.many import Check, never
 
 if TYPE_CHECKING:
@@ -37,15 +38,38 @@ def export_ply(
     require_suffix(path, ".ply")
     require(result, "A PLY file", "points_mm")
     lit: NDArray[np.bool_] = np.asarray(np.isfinite(plane(result, "points_mm")).all(axis=0))
+    table = _table(result, lit, check)
+    with staged([path], overwrite=overwrite) as (draft,), draft.open("wb") as file:
+        file.write(_header(table, provenance(result)))
+        table.tofile(file)
+    return [path]
+
+
+def write_mesh_ply(
+    result: xr.Dataset, path: Path, mesh: GridMesh, *, overwrite: bool, check: Check = never
+) -> None:
+    """As `export_ply`, but the pixels of a mesh, and its triangles."""
+    lit = np.zeros(result["points_mm"].shape[1:], bool)
+    lit.ravel()[mesh.pixels] = True
+    # Pixels of a mesh ascend, so vertices are in the order of the mask.
+    table = _table(result, lit, check)
+    faces = np.empty(len(mesh.triangles), [("corners", "u1"), ("vertices", "<i4", 3)])
+    faces["corners"], faces["vertices"] = 3, mesh.triangles
+    with staged([path], overwrite=overwrite) as (draft,), draft.open("wb") as file:
+        file.write(_header(table, provenance(result), len(faces)))
+        table.tofile(file)
+        check()
+        faces.tofile(file)
+
+
+def _table(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> NDArray[Any]:
+    """The vertices with all their properties."""
     columns = _columns(result, lit, check)
     table = np.empty(int(lit.sum()), [(name, column.dtype.str) for name, column in columns.items()])
     for name, column in columns.items():
         check()
         table[name] = column
-    with staged([path], overwrite=overwrite) as (draft,), draft.open("wb") as file:
-        file.write(_header(table, provenance(result)))
-        table.tofile(file)
-    return [path]
+    return table
 
 
 def _columns(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> dict[str, NDArray[Any]]:
@@ -70,7 +94,7 @@ def _columns(result: xr.Dataset, lit: NDArray[np.bool_], check: Check) -> dict[s
     return columns
 
 
-def _header(table: NDArray[Any], comments: dict[str, str]) -> bytes:
+def _header(table: NDArray[Any], comments: dict[str, str], triangles: int = 0) -> bytes:
     lines = [
         "ply",
         "format binary_little_endian 1.0",
@@ -80,6 +104,8 @@ def _header(table: NDArray[Any], comments: dict[str, str]) -> bytes:
     lines.append(f"element vertex {len(table)}")
     assert table.dtype.names is not None
     lines += [f"property {_PLY_NAMES[table.dtype[name].str]} {name}" for name in table.dtype.names]
+    if triangles:
+        lines += [f"element face {triangles}", "property list uchar int vertex_indices"]
     return ("\n".join([*lines, "end_header"]) + "\n").encode("ascii")
 
 

@@ -26,9 +26,13 @@ SUFFIX = {
     "csv": ".csv",
     "envi": ".hdr",
     "exr": ".exr",
+    "glb": ".glb",
+    "mesh": ".ply",
     "npy": ".npy",
+    "obj": ".obj",
     "ply": ".ply",
     "png": ".png",
+    "stl": ".stl",
     "tiff": ".tiff",
 }
 
@@ -331,14 +335,14 @@ def test_every_format_refuses_wrong_endings_and_places(tmp_path: Path, name: str
             export(small_result(), tmp_path / "file" / f"x{SUFFIX[name]}", name)
 
 
-@pytest.mark.parametrize("name", ["csv", "envi", "exr", "npy", "ply", "tiff"])
+@pytest.mark.parametrize("name", ["csv", "envi", "exr", "glb", "mesh", "npy", "obj", "ply", "stl", "tiff"])
 def test_every_format_says_what_the_result_lacks(tmp_path: Path, name: str) -> None:
     with pytest.raises(StoreError, match="contains only shading"):
         export(small_result()[["shading"]], tmp_path / f"x{SUFFIX[name]}", name)
 
 
 def test_an_unknown_format(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="csv, envi, exr, npy, ply, png, tiff"):
+    with pytest.raises(StoreError, match="csv, envi, exr, glb, mesh, npy, obj, ply, png, stl, tiff"):
         export(small_result(), tmp_path / "x.las", "las")
 
 

@@ -27,6 +27,9 @@ class Format:
 
 FORMATS = (
     Format("ply", ".ply", "PLY – points with normals, colours, spectra and deviations"),
+    Format("glb", ".glb", "glTF – surface with its colours, in metres"),
+    Format("obj", ".obj", "OBJ – surface with its colours, in mm, in three files"),
+    Format("stl", ".stl", "STL – surface without colours, in mm"),
     Format("envi", ".hdr", "ENVI – spectral cube and its deviation", needs_spectra=True),
     Format("exr", ".exr", "OpenEXR – spectral image", needs_spectra=True),
     Format("csv", ".csv", "CSV – spectra of the pins, with deviations", needs_spectra=True, needs_pins=True),
@@ -115,6 +118,7 @@ class ExportController:
 def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]:
     """Files that an export writes."""
     from dsl_core.io.export.depth_maps import depth_files
+    from dsl_core.io.export.mesh.export import mesh_files
 
     files: list[Path] = []
     for form, path in targets.items():
@@ -125,6 +129,8 @@ def expected_files(targets: dict[str, Path], result: ResultArrays) -> list[Path]
             files += [file for header in headers for file in (header, header.with_suffix(".img"))]
         elif form in ("tiff", "npy"):
             files += depth_files(path, "depth_std_mm" in result.arrays, "flags" in result.arrays)
+        elif form == "obj":
+            files += mesh_files(path, "rgb" in result.arrays)
         elif form == "png":
             files += sorted(path.parent.glob(f"{path.stem}_*.png"))
         else:

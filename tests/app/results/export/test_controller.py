@@ -22,15 +22,16 @@ def test_export_says_what_it_wrote_and_replaces_nothing_unasked(bench: Bench, tm
         "csv": tmp_path / "a.csv",
         "envi": tmp_path / "a.hdr",
         "tiff": tmp_path / "a.tiff",
+        "obj": tmp_path / "a.obj",
     }
     assert bench.control.export.taken(targets) == []
     bench.control.export.write(targets, overwrite=False)
-    assert "Wrote 9 files" in bench.told
-    assert len(bench.control.export.taken(targets)) == 9
+    assert "Wrote 12 files" in bench.told
+    assert len(bench.control.export.taken(targets)) == 12
     bench.control.export.write(targets, overwrite=False)
     assert "already exists" in bench.told
     bench.control.export.write(targets, overwrite=True)
-    assert "Wrote 9 files" in bench.told
+    assert "Wrote 12 files" in bench.told
 
 
 def test_pictures_are_exported_as_they_are_shown(bench: Bench, tmp_path: Path) -> None:

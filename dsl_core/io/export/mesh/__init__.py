@@ -1,0 +1,1 @@
+"""The surface of a result as triangles: glTF, OBJ with its texture, PLY and STL."""
