@@ -76,7 +76,7 @@ def surface_of(result: xr.Dataset, every: int = 1, check: Check = never) -> Surf
 
 def _texture(rgb: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Colours as bytes; pixels without one take that of the nearest, so that none bleeds in at edges."""
-    known = np.isfinite(rgb).all(0)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(rgb).all(0))
     if not known.any() or known.all():
         return rgb_picture(rgb)
     from scipy.ndimage import distance_transform_edt

@@ -1,0 +1,154 @@
+"""What the points of a result say about shape: a plane through a region, a section along a line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float32] | NDArray[np.float64]
+
+#: Residuals beyond this many robust deviations are weighted down (J. W. Tukey's biweight).
+TUKEY = 4.685
+#: Rounds of weighting, which settle long before.
+ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class PlaneFit:
+    """A plane ``normal . point = offset_mm`` in camera coordinates, its normal towards the camera.
+
+    ``rms_mm`` and ``range_mm`` are the root mean square and the range of the distances of the points that
+    were used, ``expected_mm`` the root mean square that their stated deviations promise, and ``tilt_deg`` the
+    angle between the normal and the camera's axis with its deviation. ``used`` of ``points`` were not too far
+    off to count.
+    """
+
+    normal: NDArray[np.float64]
+    offset_mm: float
+    rms_mm: float
+    range_mm: float
+    expected_mm: float
+    tilt_deg: float
+    tilt_std_deg: float
+    points: int
+    used: int
+
+
+def fit_plane(points_mm: Floats, depth_std_mm: Floats | None = None) -> PlaneFit | None:
+    """The plane through points (n, 3), weighted by the deviation of their depths; None for fewer than four.
+
+    Depth errs along the ray of a pixel. Along a ray a plane's inverse depth is affine in the ray, ``1/z =
+    (n . ray) / d``, so that the fit is linear in what is uncertain. Points off the plane by far more than
+    others count less.
+    """
+    points = np.asarray(points_mm, np.float64)
+    std = None if depth_std_mm is None else np.asarray(depth_std_mm, np.float64)
+    known = np.isfinite(points).all(1) & (True if std is None else np.isfinite(std) & (std > 0))
+    points = points[known]
+    if len(points) < 4:
+        return None
+    z = points[:, 2]
+    rays, inverse = points / z[:, None], 1 / z
+    spread = (np.ones(len(z)) if std is None else std[known]) * inverse**2
+    weights, solution, inverted = np.ones(len(z)), np.zeros(3), np.zeros((3, 3))
+    for _ in range(ROUNDS):
+        scaled = rays * (np.sqrt(weights) / spread)[:, None]
+        normal_matrix = scaled.T @ scaled
+        if np.linalg.cond(normal_matrix) > 1e14:
+            return None
+        inverted = np.linalg.inv(normal_matrix)
+        last, solution = solution, inverted @ (scaled.T @ (inverse * np.sqrt(weights) / spread))
+        residual = (rays @ solution - inverse) / spread
+        robust = max(1.4826 * float(np.median(np.abs(residual))), 1e-12)
+        weights = np.maximum(1 - (residual / (TUKEY * robust)) ** 2, 0) ** 2
+        if np.allclose(last, solution, rtol=1e-10):
+            break
+    length = float(np.linalg.norm(solution))
+    # 1/z = solution . ray, so solution . point = 1; the normal shall point against the rays.
+    normal, used = -solution / length, weights > 0
+    off = (points @ normal + 1 / length)[used]
+    expected = float("nan")
+    if std is not None:
+        expected = float(np.sqrt(np.mean((std[known][used] * (rays[used] @ normal)) ** 2)))
+    noise = 1.0 if std is not None else float(np.mean(residual[used] ** 2))
+    tilt = float(np.degrees(np.arccos(np.clip(-normal[2], -1, 1))))
+    # Only the part of an error that is across the normal tilts it, towards or from the axis.
+    towards = np.array([0.0, 0.0, -1.0]) - normal * -normal[2]
+    size = float(np.linalg.norm(towards))
+    if size < 1e-9:
+        towards, size = np.array([1.0, 0.0, 0.0]), 1.0
+    towards /= size
+    tilt_std = float(np.degrees(np.sqrt(noise * towards @ inverted @ towards) / length))
+    return PlaneFit(
+        normal=normal,
+        offset_mm=-1 / length,
+        rms_mm=float(np.sqrt(np.mean(off**2))),
+        range_mm=float(np.ptp(off)),
+        expected_mm=expected,
+        tilt_deg=tilt,
+        tilt_std_deg=tilt_std,
+        points=len(points),
+        used=int(used.sum()),
+    )
+
+
+@dataclass(frozen=True)
+class Section:
+    """A cut between two pixels, in the plane through both points and the camera; arrays of (samples,).
+
+    ``along_mm`` runs along the straight line between the two points, from 0 to its length; ``height_mm`` is
+    how far the surface is from that line, towards the camera; ``std_mm`` the deviation of that height by the
+    deviation of depth. NaN where the surface has no point.
+    """
+
+    along_mm: NDArray[np.float64]
+    height_mm: NDArray[np.float64]
+    std_mm: NDArray[np.float64]
+
+
+def section(
+    points_mm: Floats, depth_std_mm: Floats | None, first: tuple[int, int], last: tuple[int, int]
+) -> Section | None:
+    """The cut of points (3, rows, columns) between two pixels (x, y); None where one of them has no point.
+
+    All pixels on the straight line between the two in the image are in one plane with the camera, so the
+    cut is exact. Between two pixels next to the line, points are interpolated along the image.
+    """
+    ends = [np.asarray(points_mm[:, y, x], np.float64) for x, y in (first, last)]
+    base = ends[1] - ends[0]
+    length = float(np.linalg.norm(base))
+    if not np.isfinite(length) or length == 0:
+        return None
+    count = max(abs(last[0] - first[0]), abs(last[1] - first[1])) + 1
+    x, y = (np.linspace(a, b, count) for a, b in zip(first, last, strict=True))
+    points, std = _on_line(points_mm, depth_std_mm, x, y)
+    along = base / length
+    across = -ends[0] + (ends[0] @ along) * along
+    size = float(np.linalg.norm(across))
+    if size < 1e-9:
+        return None
+    across /= size
+    moved = points - ends[0][:, None]
+    rays = points / points[2]
+    return Section(along @ moved, across @ moved, np.abs(across @ rays) * std)
+
+
+def _on_line(
+    points: Floats, std: Floats | None, x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points (3, samples) and deviations (samples,) at places of the image, one of them whole numbers."""
+    left, top = np.floor(x + 1e-9).astype(int), np.floor(y + 1e-9).astype(int)
+    share = np.clip(x - left + y - top, 0, 1)
+    right = np.minimum(left + (x - left > 1e-6), points.shape[2] - 1)
+    below = np.minimum(top + (y - top > 1e-6), points.shape[1] - 1)
+    one, other = (np.asarray(points[:, *at], np.float64) for at in ((top, left), (below, right)))
+    # Where only one of the two has a point, nothing is made up; the nearer one decides.
+    mixed = one + share * (other - one)
+    found = np.where(np.isfinite(mixed), mixed, np.where(share < 0.5, one, other))
+    if std is None:
+        return found, np.full(len(x), np.nan)
+    a, b = (np.asarray(std[at], np.float64) for at in ((top, left), (below, right)))
+    spread = np.hypot((1 - share) * a, share * b)
+    return found, np.where(np.isfinite(spread), spread, np.where(share < 0.5, a, b))

@@ -1,0 +1,84 @@
+"""Planes and sections against surfaces that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from dsl_core.evaluation.shape import fit_plane, section
+
+FOCAL_PX, SHAPE = 500.0, (48, 64)
+
+
+def _rays() -> NDArray[np.float64]:
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    return np.stack([(x - 31.5) / FOCAL_PX, (y - 23.5) / FOCAL_PX, np.ones(SHAPE)])
+
+
+def _tilted(degrees: float, distance_mm: float = 700.0) -> NDArray[np.float64]:
+    """Points of a plane turned about the vertical axis."""
+    rays, turn = _rays(), np.radians(degrees)
+    return np.asarray(rays * distance_mm / (1 - np.tan(turn) * rays[0]))
+
+
+def test_a_plane_is_found_with_the_deviation_that_it_states() -> None:
+    rng, points = np.random.default_rng(0), _tilted(20.0)
+    tilts, stated = [], []
+    for _ in range(60):
+        std = np.full(SHAPE, 0.3)
+        noisy = points * (1 + rng.normal(0, std) / points[2])
+        fit = fit_plane(noisy.reshape(3, -1).T, std.ravel())
+        assert fit is not None
+        tilts.append(fit.tilt_deg)
+        stated.append(fit.tilt_std_deg)
+        assert fit.rms_mm == pytest.approx(fit.expected_mm, rel=0.1)
+    assert np.mean(tilts) == pytest.approx(20.0, abs=4 * np.mean(stated) / 60**0.5)
+    assert np.std(tilts) == pytest.approx(np.mean(stated), rel=0.3)
+
+
+def test_what_stands_out_does_not_tilt_the_plane() -> None:
+    points = _tilted(0.0).reshape(3, -1).T.copy()
+    points[:300] *= 0.98
+    fit = fit_plane(points + np.random.default_rng(1).normal(0, 0.01, points.shape))
+    assert fit is not None
+    assert fit.tilt_deg < 0.1
+    assert fit.used == pytest.approx(fit.points - 300, abs=40)
+    assert fit.offset_mm == pytest.approx(-700, abs=0.1)
+    assert fit_plane(points[:3]) is None
+    assert fit_plane(np.full((9, 3), np.nan)) is None
+
+
+def test_a_section_of_a_step_shows_its_height_and_length() -> None:
+    rays = _rays()
+    depth = np.where((np.arange(64) > 20) & (np.arange(64) < 44), 690.0, 700.0) * np.ones(SHAPE)
+    cut = section(rays * depth, np.full(SHAPE, 0.2), (2, 24), (61, 24))
+    assert cut is not None
+    assert cut.along_mm[0] == 0
+    assert cut.along_mm[-1] == pytest.approx(59 * 700 / FOCAL_PX)
+    assert cut.height_mm[0] == pytest.approx(0)
+    assert cut.height_mm[30] == pytest.approx(10.0, abs=1e-3)
+    np.testing.assert_allclose(cut.std_mm, 0.2, rtol=0.01)
+
+
+@pytest.mark.parametrize("last", [(60, 40), (9, 44), (60, 3)])
+def test_a_section_of_a_plane_is_straight_in_any_direction(last: tuple[int, int]) -> None:
+    points = _tilted(35.0)
+    cut = section(points, None, (5, 6), last)
+    assert cut is not None
+    np.testing.assert_allclose(cut.height_mm, 0, atol=2e-3)
+    assert (np.diff(cut.along_mm) > 0).all()
+    assert cut.along_mm[-1] == pytest.approx(
+        float(np.linalg.norm(points[:, last[1], last[0]] - points[:, 6, 5]))
+    )
+
+
+def test_a_section_over_a_hole_has_a_gap() -> None:
+    points = _tilted(0.0)
+    points[:, :, 30:33] = np.nan
+    cut = section(points, None, (10, 10), (50, 40))
+    assert cut is not None
+    assert np.isnan(cut.height_mm[20:23]).all()
+    assert np.isfinite(cut.height_mm).sum() >= 36
+    assert section(points, None, (31, 10), (50, 40)) is None
+    assert section(points, None, (10, 10), (10, 10)) is None
