@@ -52,13 +52,15 @@ def fit_plane(points_mm: Floats, depth_std_mm: Floats | None = None) -> PlaneFit
     z = points[:, 2]
     rays, inverse = points / z[:, None], 1 / z
     spread = (np.ones(len(z)) if std is None else std[known]) * inverse**2
-    weights, solution, inverted = np.ones(len(z)), np.zeros(3), np.zeros((3, 3))
+    weights: NDArray[np.float64] = np.ones(len(z))
+    solution: NDArray[np.float64] = np.zeros(3)
+    inverted: NDArray[np.float64] = np.zeros((3, 3))
     for _ in range(ROUNDS):
         scaled = rays * (np.sqrt(weights) / spread)[:, None]
         normal_matrix = scaled.T @ scaled
         if np.linalg.cond(normal_matrix) > 1e14:
             return None
-        inverted = np.linalg.inv(normal_matrix)
+        inverted = np.asarray(np.linalg.inv(normal_matrix), np.float64)
         last, solution = solution, inverted @ (scaled.T @ (inverse * np.sqrt(weights) / spread))
         residual = (rays @ solution - inverse) / spread
         robust = max(1.4826 * float(np.median(np.abs(residual))), 1e-12)
