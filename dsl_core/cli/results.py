@@ -201,7 +201,7 @@ def mesh(
 ) -> None:
     """Write the surface of a result as a mesh, cut at depth jumps, with its colours as texture.
 
-    .glb is glTF in metres with its texture, .obj has .mtl and .png beside it, .ply colours and spectra at
+    .glb is glTF in metres with its texture, .obj comes with .mtl and .png, .ply colours and spectra at
     each vertex, .stl triangles only; lengths of the last three are in mm.
     """
     from dsl_core.io.export import export_mesh

@@ -32,7 +32,7 @@ def export_mesh(
 ) -> list[Path]:
     """Write the surface between neighbouring points, cut at depth jumps, as the ending of ``path`` says.
 
-    ``.glb`` is binary glTF in metres, y up, with its texture; ``.obj`` has ``.mtl`` and ``.png`` beside it,
+    ``.glb`` is binary glTF in metres, y up, with its texture; ``.obj`` comes with ``.mtl`` and ``.png``,
     ``.ply`` the colours and fields of each vertex, ``.stl`` nothing but triangles, all three in mm in the
     camera's frame. Only each ``every``-th row and column is used; ``endings`` are those that are
     accepted. Raises `StoreError`.
