@@ -40,8 +40,8 @@ def grid_of(result: xr.Dataset, every: int = 1) -> GridMesh:
     points = plane(result, "points_mm")
     if not 1 <= every <= min(points.shape[1:]) // 2:
         raise StoreError(
-            f"A mesh of every {every}th pixel was asked for, of a result of {points.shape[2]} x"
-            f" {points.shape[1]}. Choose 1 for all pixels, or a small number such as 4."
+            f"Every {every}th pixel was requested of a result of {points.shape[2]} x {points.shape[1]}."
+            " That leaves no surface. Choose 1 for all pixels, or a small number such as 4."
         )
     std = plane(result, "depth_std_mm") if "depth_std_mm" in result else None
     edge = (result["flags"].values & int(Flag.DEPTH_EDGE)) != 0 if "flags" in result else None

@@ -133,6 +133,6 @@ def test_a_surface_of_nothing_is_refused_in_one_sentence(tmp_path: Path) -> None
     result["points_mm"][:] = np.nan
     with pytest.raises(StoreError, match="No two neighbouring pixels"):
         export_mesh(result, tmp_path / "x.glb")
-    with pytest.raises(StoreError, match="every 4th pixel"):
+    with pytest.raises(StoreError, match="Every 4th pixel"):
         export_mesh(small_result(), tmp_path / "x.glb", every=4)
     assert not list(tmp_path.iterdir())
